@@ -1,0 +1,31 @@
+"""Pinhole projection between pixels and the camera frame (paper, appendix "Coordinate Transformation")."""
+
+import numpy as np
+
+from materialist.types import Array, Camera
+
+
+def pixel_rays(camera: Camera) -> Array:
+    """[H, W, 3] float32 rays through pixel centres, scaled to z = -1, so that `rays * depth` is the surface point."""
+    x = (np.arange(camera.width) + 0.5 - camera.width / 2) / camera.focal
+    y = -(np.arange(camera.height) + 0.5 - camera.height / 2) / camera.focal
+    rays = np.empty((camera.height, camera.width, 3), np.float32)
+    rays[..., 0], rays[..., 1], rays[..., 2] = x[None, :], y[:, None], -1
+    return rays
+
+
+def unproject(depth: Array, camera: Camera) -> Array:
+    """[H, W, 3] camera-frame points of planar depth [H, W] (scene units)."""
+    return pixel_rays(camera) * depth[..., None].astype(np.float32)
+
+
+def project(points: Array, camera: Camera) -> tuple[Array, Array]:
+    """Screen position x_s = S(x) [..., 2] in pixels (x right, y down) and planar depth [...] of points [..., 3].
+
+    Depth is <= 0 behind the camera; the position is then meaningless.
+    """
+    depth = -points[..., 2]
+    safe = np.where(np.abs(depth) < 1e-12, 1e-12, depth)
+    xs = points[..., 0] / safe * camera.focal + camera.width / 2
+    ys = -points[..., 1] / safe * camera.focal + camera.height / 2
+    return np.stack([xs, ys], -1), depth

@@ -1,0 +1,25 @@
+"""sRGB and linear Rec.709. The only place where colour is encoded or decoded."""
+
+import numpy as np
+
+from materialist.types import Array
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+"""Rec.709 luminance weights of linear RGB."""
+
+
+def srgb_to_linear(srgb: Array) -> Array:
+    """Decode sRGB in [0, 1] (any shape) by the piecewise curve of IEC 61966-2-1; returns float32."""
+    srgb = np.asarray(srgb, np.float32)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def linear_to_srgb(linear: Array) -> Array:
+    """Encode linear values (any shape, clipped to [0, 1]) as sRGB in [0, 1]; returns float32."""
+    linear = np.clip(np.asarray(linear, np.float32), 0, 1)
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def luminance(linear: Array) -> Array:
+    """Rec.709 luminance [...] of linear RGB [..., 3]."""
+    return np.asarray(linear, np.float32) @ LUMINANCE

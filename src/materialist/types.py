@@ -1,0 +1,133 @@
+"""The nouns of the project: frozen dataclasses, with shape and unit on every array.
+
+Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the origin looking down -Z, +Y up,
++X right; pixel (0, 0) is top left with its centre at (0.5, 0.5); depth is planar along -Z, 0 where there is no surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Pinhole camera at the origin, looking down -Z."""
+
+    width: int
+    height: int
+    fov: float = 35.0
+    """Horizontal field of view, degrees, in (0, 180)."""
+
+    @property
+    def focal(self) -> float:
+        """Focal length in pixels."""
+        return 0.5 * self.width / float(np.tan(np.radians(self.fov) / 2))
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A photograph at working size, with its untouched original beside it."""
+
+    linear: Array
+    """[H, W, 3] float32 linear Rec.709 at working size, >= 0; HDR input clipped to [0, 10]."""
+    camera: Camera
+    original: Array
+    """[H0, W0, 3] float32 linear at native size (after EXIF rotation)."""
+    hdr: bool = False
+    """True when the file holds scene-linear values above 1 (EXR, HDR)."""
+    fov_source: str = "default"
+    """Where camera.fov came from: 'exif', 'option' or 'default'."""
+    path: str | None = None
+    source: bytes | None = field(default=None, repr=False)
+    """The input file, byte for byte."""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Materials:
+    """Per-pixel parameters of the simplified Disney BRDF."""
+
+    albedo: Array
+    """[H, W, 3] float32 linear, in [0, 1]."""
+    roughness: Array
+    """[H, W] float32 perceptual roughness r (alpha = r**2), in [0, 1]."""
+    metallic: Array
+    """[H, W] float32, in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a predictor says about a photograph: the prior of the fit."""
+
+    materials: Materials
+    normal: Array
+    """[H, W, 3] float32 unit, camera frame (+X right, +Y up, +Z to the viewer)."""
+    depth: Array
+    """[H, W] float32 planar depth along -Z, > 0, scene units; 0 where there is no surface."""
+    predictor: str = "unknown"
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles of the scene: the depth surface, and the planes that continue it beyond what the picture shows."""
+
+    vertices: Array
+    """[V, 3] float32, camera frame, scene units."""
+    faces: Array
+    """[F, 3] int32, counter-clockwise seen from the camera."""
+    normals: Array
+    """[V, 3] float32 unit shading normals."""
+    uv: Array
+    """[V, 2] float32 in [0, 1]: u to the right, v DOWN; the centre of pixel (row i, column j) is ((j+.5)/W, (i+.5)/H)."""
+    face_pixel: Array
+    """[F] int32 row-major index of the pixel whose surface (or nearest surface) the face carries."""
+    face_plane: Array
+    """[F] int16: -1 for the depth surface, k >= 0 for the continuation of plane k."""
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A mesh and the planes found in it."""
+
+    mesh: Mesh
+    plane_label: Array
+    """[H, W] int8: plane k that the pixel lies on, -1 for none. A continued plane carries the mean material of its pixels."""
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """What happened, stage by stage, and how good the result is; the content of report.json."""
+
+    stages: tuple[dict[str, Any], ...] = ()
+    """One dict a stage: name, steps, seconds, losses (first, last, curve)."""
+    metrics: dict[str, float] = field(default_factory=dict)
+    """rerender_psnr_path, rerender_ssim_path, total_seconds, peak_rss_mb, prior_l1_albedo, ..."""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A photograph, decomposed: everything a scene package holds."""
+
+    camera: Camera
+    photo: Photo
+    prior: Prediction
+    materials: Materials
+    normal: Array
+    """[H, W, 3] float32 unit, camera frame."""
+    depth: Array
+    """[H, W] float32 planar, scene units, 0 = none."""
+    geometry: Geometry
+    envmap: Array
+    """[h, 2h, 3] float32 linear radiance, >= 0; centre column looks along -Z, columns to the right turn towards +X, top row is +Y."""
+    rerender: Array
+    """[H, W, 3] float32 linear: the path-traced re-rendering."""
+    report: FitReport = FitReport()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    """Tool version, predictor, weights hash, options, seed."""
