@@ -1,0 +1,152 @@
+"""How close two pictures or two environment maps are: the figures of the report and of the benchmarks.
+
+Images go in as linear Rec.709 and are compared as a viewer sees them: sRGB-encoded and clipped to [0, 1], unless the
+name of the function says otherwise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError
+from materialist.types import Array
+
+
+def mse(a: Array, b: Array, *, mask: Array | None = None) -> float:
+    """Mean squared error of linear images a, b [H, W, 3] after sRGB encoding and clipping, in [0, 1].
+
+    `mask` [H, W] bool restricts it to some pixels. Raises InputError when the shapes differ or no pixel is left.
+    """
+    return _mean_square(linear_to_srgb(_checked(a, b)), linear_to_srgb(b), mask)
+
+
+def mse_linear(a: Array, b: Array, *, mask: Array | None = None) -> float:
+    """Mean squared error of [H, W, 3] arrays as they are: linear, not clipped (the paper's MSE of envmaps)."""
+    return _mean_square(_checked(a, b), np.asarray(b, np.float32), mask)
+
+
+def psnr(a: Array, b: Array, *, mask: Array | None = None) -> float:
+    """Peak signal-to-noise ratio in dB of linear images [H, W, 3], on their sRGB encoding in [0, 1]; inf when equal."""
+    error = mse(a, b, mask=mask)
+    return float("inf") if error == 0 else float(-10 * np.log10(error))
+
+
+def ssim(a: Array, b: Array) -> float:
+    """Structural similarity of linear images [H, W, 3] on their sRGB encoding; 1 when equal.
+
+    Wang et al. 2004 as published: Gaussian window, sigma 1.5 (11 x 11), mean over pixels and channels. Images smaller
+    than the window are compared through the largest odd window that fits; below 3 x 3 pixels raises InputError.
+    """
+    from skimage.metrics import structural_similarity
+
+    a, b = linear_to_srgb(_checked(a, b)), linear_to_srgb(b)
+    smallest = min(a.shape[:2])
+    if smallest < 3:
+        raise InputError(f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}.")
+    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    if smallest < 11:
+        options = {"win_size": smallest - (smallest + 1) % 2, "use_sample_covariance": False}
+    return float(
+        structural_similarity(a.astype(np.float64), b.astype(np.float64), data_range=1, channel_axis=-1, **options)
+    )
+
+
+def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
+    """Real spherical harmonic coefficients [(degree + 1)**2, 3] float64 of an envmap [h, 2h, 3] (linear radiance).
+
+    Orthonormal basis about +Y, ordered (l, m) = (0,0), (1,-1), (1,0), (1,1), ...; every texel is weighted with its
+    exact solid angle, so a constant map L has the single coefficient L sqrt(4 pi).
+    """
+    from scipy.special import factorial, lpmv
+
+    envmap = np.asarray(envmap, np.float64)
+    if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
+        raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
+    h, w = envmap.shape[:2]
+    edges = np.cos(np.linspace(0, np.pi, h + 1))  # [h + 1] cosine of the inclination at row borders
+    weight = (edges[:-1] - edges[1:]) * (2 * np.pi / w)  # [h] steradian per texel
+    cos_theta = np.cos((np.arange(h) + 0.5) * np.pi / h)  # [h]
+    phi = ((np.arange(w) + 0.5) / w - 0.5) * 2 * np.pi  # [w] azimuth from -Z towards +X
+    # The basis is a product of a row and a column function: sum the columns once per order m.
+    rows = [np.einsum("hwc,w->hc", envmap, np.cos(m * phi)) for m in range(degree + 1)]
+    rows_sin = [np.einsum("hwc,w->hc", envmap, np.sin(m * phi)) for m in range(degree + 1)]
+    coefficients = []
+    for l in range(degree + 1):  # noqa: E741 (l and m are the names in the literature)
+        for m in range(-l, l + 1):
+            k = abs(m)
+            norm = np.sqrt((2 * l + 1) / (4 * np.pi) * factorial(l - k) / factorial(l + k))
+            legendre = norm * (np.sqrt(2) if k else 1) * lpmv(k, l, cos_theta)  # [h]
+            coefficients.append((legendre * weight) @ (rows_sin[k] if m < 0 else rows[k]))
+    return np.stack(coefficients)
+
+
+def sh_error(a: Array, b: Array, degree: int = 3) -> float:
+    """RMS over RGB of the Euclidean distance of the SH coefficients of two envmaps (sizes may differ)."""
+    return _rms_norm(sh_coefficients(a, degree) - sh_coefficients(b, degree))
+
+
+def sh_error_relative(estimate: Array, truth: Array, degree: int = 3) -> float:
+    """`sh_error` divided by the same norm of the true envmap: 0 is perfect, 1 is as bad as darkness."""
+    norm = _rms_norm(sh_coefficients(truth, degree))
+    error = sh_error(estimate, truth, degree)
+    return error / norm if norm > 0 else (0.0 if error == 0 else float("inf"))
+
+
+def envmap_metrics(estimate: Array, truth: Array) -> dict[str, float]:
+    """The paper's envmap figures (table "Quantitative evaluation of envmap optimization").
+
+    SSIM and PSNR are on the sRGB-encoded, [0, 1]-clipped maps as they are: no exposure is fitted, because the photo
+    fixes the absolute scale of the light. MSE is on linear radiance without clipping (small suns dominate it), SH
+    error as in `sh_error`. An estimate of another size is first resampled to the size of the truth.
+    """
+    estimate = resample_envmap(estimate, truth.shape[0])
+    return {
+        "envmap_ssim": ssim(estimate, truth),
+        "envmap_psnr": psnr(estimate, truth),
+        "envmap_mse": mse_linear(estimate, truth),
+        "sh_error": sh_error(estimate, truth),
+        "sh_error_relative": sh_error_relative(estimate, truth),
+    }
+
+
+def resample_envmap(envmap: Array, height: int) -> Array:
+    """Resample an envmap [h, 2h, 3] to [height, 2 height, 3] float32: area means down, wrapping bilinear up."""
+    import cv2
+
+    envmap = np.ascontiguousarray(envmap, np.float32)
+    h, w = envmap.shape[:2]
+    if h == height:
+        return envmap
+    if height < h:
+        return cv2.resize(envmap, (2 * height, height), interpolation=cv2.INTER_AREA)
+    pad = 1
+    wrapped = cv2.copyMakeBorder(envmap, 0, 0, pad, pad, cv2.BORDER_WRAP)
+    x = (np.arange(2 * height) + 0.5) * w / (2 * height) - 0.5 + pad
+    y = (np.arange(height) + 0.5) * h / height - 0.5
+    grid_x, grid_y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
+    return cv2.remap(wrapped, grid_x, grid_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _rms_norm(coefficients: Array) -> float:
+    """RMS over RGB of the Euclidean norm of coefficients [n, 3]."""
+    return float(np.sqrt(np.mean(np.sum(coefficients**2, axis=0))))
+
+
+def _mean_square(a: Array, b: Array, mask: Array | None) -> float:
+    """Mean of (a - b)**2 over pixels (of mask [H, W], if given) and channels, in double precision."""
+    square = (a.astype(np.float64) - b) ** 2
+    if mask is not None:
+        if mask.shape != a.shape[:2]:
+            raise InputError(f"The mask is {mask.shape}, but the images are {a.shape[:2]}.")
+        square = square[mask.astype(bool)]
+        if square.size == 0:
+            raise InputError("The mask selects no pixel, so there is nothing to compare.")
+    return float(square.mean())
+
+
+def _checked(a: Array, b: Array) -> Array:
+    """Array a as float32, after checking that b has its shape."""
+    if np.shape(a) != np.shape(b):
+        raise InputError(f"Two images of one size are compared, but these are {np.shape(a)} and {np.shape(b)}.")
+    return np.asarray(a, np.float32)

@@ -1,0 +1,145 @@
+"""Metrics against closed forms."""
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist.color import srgb_to_linear
+from materialist.errors import InputError
+
+H = 64
+
+
+def directions(h: int) -> np.ndarray:
+    """[h, 2h, 3] unit directions of envmap texel centres, written out from the convention."""
+    theta = (np.arange(h) + 0.5) / h * np.pi
+    phi = ((np.arange(2 * h) + 0.5) / (2 * h) - 0.5) * 2 * np.pi
+    theta, phi = np.meshgrid(theta, phi, indexing="ij")
+    return np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
+
+
+def lobe(axis: np.ndarray, sharpness: float = 6.0) -> np.ndarray:
+    """[h, 2h, 3] smooth lobe about a unit axis, one colour."""
+    value = np.exp(sharpness * (directions(H) @ axis - 1))
+    return np.repeat(value[..., None], 3, axis=2) * [1.0, 0.5, 0.25]
+
+
+def test_psnr_of_a_known_offset_on_the_srgb_encoding():
+    a = np.full((8, 8, 3), srgb_to_linear(0.5), np.float32)
+    b = np.full((8, 8, 3), srgb_to_linear(0.6), np.float32)
+    assert metrics.psnr(a, b) == pytest.approx(20.0, abs=1e-3)
+    assert metrics.mse(a, b) == pytest.approx(0.01, rel=1e-4)
+    assert metrics.psnr(a, a) == float("inf")
+
+
+def test_values_above_one_are_clipped_in_psnr_but_not_in_linear_mse():
+    a, b = np.full((4, 4, 3), 2.0), np.full((4, 4, 3), 7.0)
+    assert metrics.psnr(a, b) == float("inf")
+    assert metrics.mse_linear(a, b) == pytest.approx(25.0)
+
+
+def test_mask_restricts_the_mean():
+    a = np.zeros((4, 4, 3), np.float32)
+    b = a.copy()
+    b[0, 0] = 1
+    mask = np.ones((4, 4), bool)
+    mask[0, 0] = False
+    assert metrics.mse(a, b) == pytest.approx(1 / 16)
+    assert metrics.mse(a, b, mask=mask) == 0
+    with pytest.raises(InputError, match="no pixel"):
+        metrics.mse(a, b, mask=np.zeros((4, 4), bool))
+
+
+def test_ssim_is_one_for_equal_pictures_and_falls_with_structure_lost():
+    rng = np.random.default_rng(0)
+    picture = rng.random((32, 40, 3)).astype(np.float32)
+    assert metrics.ssim(picture, picture) == pytest.approx(1)
+    assert metrics.ssim(picture, np.full_like(picture, picture.mean())) < 0.1
+    assert metrics.ssim(picture[:5, :7], picture[:5, :7]) == pytest.approx(1)
+    # Two flat pictures have no variance: SSIM is then its luminance term alone.
+    x, y, c1 = 0.25, 0.75, 0.01**2
+    flat = metrics.ssim(np.full((16, 16, 3), srgb_to_linear(x)), np.full((16, 16, 3), srgb_to_linear(y)))
+    assert flat == pytest.approx((2 * x * y + c1) / (x * x + y * y + c1), abs=1e-4)
+
+
+def test_shapes_must_agree():
+    with pytest.raises(InputError, match=r"\(4, 4, 3\) and \(4, 5, 3\)"):
+        metrics.psnr(np.zeros((4, 4, 3)), np.zeros((4, 5, 3)))
+    with pytest.raises(InputError, match="h, 2h, 3"):
+        metrics.sh_coefficients(np.zeros((4, 4, 3)))
+
+
+def test_constant_map_has_one_coefficient():
+    coefficients = metrics.sh_coefficients(np.full((H, 2 * H, 3), 0.7))
+    assert coefficients.shape == (16, 3)
+    assert np.allclose(coefficients[0], 0.7 * np.sqrt(4 * np.pi), rtol=1e-9)
+    assert np.abs(coefficients[1:]).max() < 1e-3
+
+
+@pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0, -1), (1, 0, 0), (0.48, -0.6, 0.64)])
+def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
+    """E(d) = d . a has only degree 1 with norm |a| sqrt(4 pi / 3)."""
+    value = directions(H) @ np.asarray(axis, float)
+    coefficients = metrics.sh_coefficients(np.repeat(value[..., None], 3, 2))[:, 0]
+    assert np.linalg.norm(coefficients[1:4]) == pytest.approx(np.sqrt(4 * np.pi / 3), rel=1e-3)
+    assert np.abs(np.delete(coefficients, [1, 2, 3])).max() < 2e-3
+
+
+def test_basis_is_orthonormal_up_to_degree_three():
+    """Projecting a map made of one basis function (from its Cartesian form) finds that function and no other."""
+    x, y, _ = np.moveaxis(directions(H), -1, 0)
+    third = np.sqrt(7 / (16 * np.pi)) * y * (5 * y**2 - 3)  # Y_30 about +Y
+    second = np.sqrt(15 / (4 * np.pi)) * x * y  # |Y_2,-1| about +Y
+    for value, index in ((third, 12), (second, 5)):
+        c = metrics.sh_coefficients(np.repeat(value[..., None], 3, 2))[:, 0]
+        assert abs(c[index]) == pytest.approx(1, abs=2e-3)
+        assert np.abs(np.delete(c, index)).max() < 3e-3
+
+
+def test_a_tiny_lamp_has_the_coefficients_of_a_point():
+    """A delta of power P has c_lm = P Y_lm(d): by the addition theorem degree l has norm P sqrt((2l+1)/4 pi)."""
+    h = 128
+    envmap = np.zeros((h, 2 * h, 3))
+    row, column = 40, 30
+    envmap[row, column] = 1000.0
+    edges = np.cos(np.array([row, row + 1]) * np.pi / h)
+    power = 1000.0 * (edges[0] - edges[1]) * np.pi / h
+    c = metrics.sh_coefficients(envmap)[:, 0]
+    for degree in range(4):
+        norm = np.linalg.norm(c[degree**2 : (degree + 1) ** 2])
+        assert norm == pytest.approx(power * np.sqrt((2 * degree + 1) / (4 * np.pi)), rel=1e-3)
+
+
+def test_energy_per_degree_does_not_change_with_rotation():
+    a = metrics.sh_coefficients(lobe(np.array([0.0, 1.0, 0.0])))
+    b = metrics.sh_coefficients(lobe(np.array([0.48, 0.6, 0.64])))
+    for degree in range(4):
+        band = slice(degree**2, (degree + 1) ** 2)
+        assert np.allclose(np.linalg.norm(a[band], axis=0), np.linalg.norm(b[band], axis=0), rtol=2e-3)
+
+
+def test_sh_error_of_constant_maps_is_the_difference_times_root_four_pi():
+    a, b = np.full((H, 2 * H, 3), 1.0), np.full((16, 32, 3), 3.0)
+    assert metrics.sh_error(a, b) == pytest.approx(2 * np.sqrt(4 * np.pi), rel=1e-4)
+    assert metrics.sh_error_relative(b, a) == pytest.approx(2, rel=1e-4)
+    red = a.copy()
+    red[..., 0] = 3
+    assert metrics.sh_error(a, red) == pytest.approx(2 * np.sqrt(4 * np.pi / 3), rel=1e-4)
+
+
+def test_resampled_envmap_keeps_its_harmonics_and_wraps():
+    envmap = lobe(np.array([0.0, 0.0, 1.0]))  # behind the camera: across the seam of the map
+    for height in (16, 32, 100, 128):
+        small = metrics.resample_envmap(envmap, height)
+        assert small.shape == (height, 2 * height, 3)
+        assert metrics.sh_error_relative(small, envmap) < 0.02
+    up = metrics.resample_envmap(envmap, 128)
+    assert np.abs(up[:, 0] - up[:, -1]).max() < 1e-5
+
+
+def test_envmap_metrics_of_the_truth_are_perfect():
+    envmap = lobe(np.array([0.0, 1.0, 0.0]))
+    figures = metrics.envmap_metrics(envmap, envmap)
+    assert figures["envmap_ssim"] == pytest.approx(1)
+    assert figures["envmap_psnr"] == float("inf")
+    assert max(figures["envmap_mse"], figures["sh_error"], figures["sh_error_relative"]) < 1e-6
