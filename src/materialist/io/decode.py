@@ -1,0 +1,293 @@
+"""Image files of any common kind to linear Rec.709 at native size, upright."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from materialist.color import srgb_to_linear
+from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.io.exr import read_exr
+from materialist.io.icc import matrix_profile
+from materialist.types import Array
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+MAX_PIXELS = 200_000_000
+"""Largest photo accepted, pixels: the largest phone sensors; 2.4 GB as float32."""
+MIN_SIDE = 8
+"""Shortest side accepted, pixels."""
+MAX_ASPECT = 8
+"""Longest shape accepted, long side over short side."""
+
+RAW_SUFFIXES = frozenset(
+    ".3fr .ari .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf .raw "
+    ".rw2 .rwl .sr2 .srf .srw .x3f".split()
+)
+"""File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
+
+FORMATS = "PNG, JPEG, HEIC, TIFF, WEBP, EXR, HDR or camera RAW"
+
+
+@dataclass
+class Decoded:
+    """A decoded file."""
+
+    linear: Array
+    """[H, W, 3] float32 linear Rec.709, upright; display files in [0, 1], scene-linear ones (EXR, HDR) as stored."""
+    scene_linear: bool = False
+    """True for files that hold light rather than display values: EXR, HDR, float TIFF."""
+    tags: dict[str, Any] = field(default_factory=dict)
+    """EXIF by name."""
+    warnings: list[str] = field(default_factory=list)
+
+
+def decode(path: Path) -> Decoded:
+    """Read any supported image file. Raises InputError, or SetupError when camera RAW support is not installed."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(32)
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from error
+    try:
+        if path.suffix.lower() in RAW_SUFFIXES:
+            return _raw(path)
+        if head.startswith(b"\x76\x2f\x31\x01"):
+            return _exr(path)
+        if head.startswith((b"#?RADIANCE", b"#?RGBE")):
+            return _hdr(path)
+        return _picture(path)
+    except MaterialistError:
+        raise
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
+        raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
+
+
+def check_size(width: int, height: int, name: object) -> None:
+    """Refuse photos that are too small, too large or too long, before their pixels are decoded."""
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{name} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the limit is "
+            f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
+        )
+    if min(width, height) < MIN_SIDE:
+        raise InputError(f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed.")
+    if max(width, height) > MAX_ASPECT * min(width, height):
+        raise InputError(
+            f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to the part of interest."
+        )
+
+
+def _picture(path: Path) -> Decoded:
+    """Everything Pillow opens: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
+    from PIL import Image, UnidentifiedImageError
+    from pillow_heif import register_heif_opener
+
+    register_heif_opener()
+    with _pixel_limit_lifted():
+        try:
+            image = Image.open(path)
+        except UnidentifiedImageError as error:
+            raise InputError(f"{path} is not an image this program can read; give it a {FORMATS} file.") from error
+        with image:
+            check_size(*image.size, path)
+            image.load()  # finds truncation, also for files whose pixels OpenCV reads below
+            warnings = []
+            if getattr(image, "n_frames", 1) > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
+                warnings.append(f"The file holds {image.n_frames} pictures; the first is used.")
+            tags = _exif(image)
+            if _is_deep(image, path):
+                linear, scene_linear = _deep(image, path, warnings)
+            else:
+                linear, scene_linear = _shallow(image, warnings), False
+    return Decoded(_upright(linear, int(tags.get("Orientation", 1) or 1)), scene_linear, tags, warnings)
+
+
+def _is_deep(image: Image.Image, path: Path) -> bool:
+    """Whether the file has more than 8 bits a channel (Pillow cuts those to 8 when they are RGB)."""
+    if image.format == "PNG":
+        return path.open("rb").read(25)[24] == 16
+    if image.format == "TIFF":
+        return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
+    return image.mode in ("I", "F") or image.mode.startswith("I;16")
+
+
+def _shallow(image: Image.Image, warnings: list[str]) -> Array:
+    """8 bits a channel, any Pillow mode, to [H, W, 3] float32 linear."""
+    alpha = None
+    if image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info:
+        image_rgba = image.convert("RGBA")
+        alpha = np.asarray(image_rgba)[..., 3].astype(np.float32)[..., None] / 255
+        if image.mode not in ("L", "LA", "La"):
+            image_rgba.info.update(image.info)
+            image = image_rgba
+    profile = image.info.get("icc_profile")
+    matrix = matrix_profile(profile) if profile else None
+    if matrix is not None and image.mode not in ("CMYK", "L", "LA", "1"):
+        rgb = np.asarray(image.convert("RGB"))
+        linear = _srgb(rgb) if matrix.is_srgb else matrix.linear(rgb, 256)
+    else:
+        linear = _srgb(np.asarray(_through_lcms(image, profile, warnings)))
+    return linear if alpha is None else _over_white(linear, alpha, warnings)
+
+
+def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]) -> Image.Image:
+    """An 8-bit sRGB image, by the embedded profile where there is one that fits, else by Pillow's own conversion."""
+    import io
+
+    from PIL import ImageCms
+
+    if profile and matrix_profile(profile) is None:
+        try:
+            source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
+            base = {"GRAY": "L", "RGB ": "RGB", "CMYK": "CMYK"}[source.profile.xcolor_space]
+            flat = image if image.mode == base else image.convert(base)
+            return ImageCms.profileToProfile(flat, source, ImageCms.createProfile("sRGB"), outputMode="RGB")  # type: ignore[return-value]
+        except (ImageCms.PyCMSError, KeyError, OSError, ValueError):
+            warnings.append("The embedded colour profile cannot be used; the photo is taken as sRGB.")
+    if image.mode == "CMYK":
+        warnings.append("CMYK without a usable profile: colours are approximate.")
+    return image.convert("RGB")
+
+
+def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, bool]:
+    """16-bit integers and floats, which Pillow would cut to 8 bits, through OpenCV; (linear, scene_linear)."""
+    import cv2
+
+    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise InputError(f"{path} has an unusual pixel layout; save it as 8- or 16-bit RGB.")
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    grey, alpha = pixels.shape[2] <= 2, None
+    if pixels.shape[2] in (2, 4):
+        scale = np.iinfo(pixels.dtype).max if pixels.dtype.kind == "u" else 1
+        alpha = pixels[..., -1:].astype(np.float32) / np.float32(scale)
+    colour = np.repeat(pixels[..., :1], 3, -1) if grey else pixels[..., 2::-1]
+    if pixels.dtype.kind == "f":
+        linear, scene_linear = np.ascontiguousarray(colour, np.float32), True
+    elif pixels.dtype in (np.uint8, np.uint16):
+        levels, scene_linear = np.iinfo(pixels.dtype).max + 1, False
+        matrix = matrix_profile(image.info.get("icc_profile") or b"")
+        linear = _srgb(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour, levels)
+    else:
+        raise InputError(f"{path} holds {pixels.dtype} pixels; save it as 8- or 16-bit RGB.")
+    return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
+
+
+def _exr(path: Path) -> Decoded:
+    """OpenEXR; alpha is premultiplied there."""
+    import OpenEXR
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        low, high = file.header()["dataWindow"]
+    check_size(int(high[0] - low[0] + 1), int(high[1] - low[1] + 1), path)
+    pixels, warnings = read_exr(path), []
+    if pixels.ndim == 2:
+        pixels = np.repeat(pixels[..., None], 3, -1)
+    if pixels.shape[-1] == 4:
+        if np.any(pixels[..., 3] < 1):
+            warnings.append("Transparent parts are laid over white.")
+        pixels = pixels[..., :3] + np.clip(1 - pixels[..., 3:], 0, 1)
+    return Decoded(np.ascontiguousarray(pixels), True, {}, warnings)
+
+
+def _hdr(path: Path) -> Decoded:
+    """Radiance RGBE."""
+    import cv2
+
+    source = path.read_bytes()
+    size = re.search(rb"\n[-+]Y (\d+) [-+]X (\d+)\n", source[:65536])
+    if size is None:
+        raise InputError(f"{path} has no size in its Radiance header; export it again.")
+    check_size(int(size[2]), int(size[1]), path)
+    pixels = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.dtype != np.float32:
+        raise InputError(f"{path} is damaged or truncated; export it again.")
+    return Decoded(np.ascontiguousarray(pixels[..., ::-1]), True)
+
+
+def _raw(path: Path) -> Decoded:
+    """Camera RAW: demosaiced with the camera's white balance, linear Rec.709, no automatic brightening."""
+    try:
+        import rawpy
+    except ImportError as error:
+        raise SetupError(f"Camera RAW needs one more package to read {path.name}: pip install rawpy") from error
+    try:
+        with rawpy.imread(str(path)) as raw:
+            check_size(raw.sizes.width, raw.sizes.height, path)
+            pixels = raw.postprocess(gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+    except rawpy.LibRawError as error:
+        raise InputError(f"{path} is not a RAW file this program can read ({error}); export it as TIFF.") from error
+    return Decoded(pixels.astype(np.float32) / np.float32(65535), False, _raw_tags(path))
+
+
+def _raw_tags(path: Path) -> dict[str, Any]:
+    """EXIF of a RAW file; most are TIFF inside, the others give none."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            return _exif(image)
+    except Exception:  # no EXIF is no error: the field of view then falls back
+        return {}
+
+
+def _exif(image: Image.Image) -> dict[str, Any]:
+    """EXIF tags by name, of the main and the Exif directory."""
+    from PIL import ExifTags
+
+    try:
+        exif = image.getexif()
+        tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+    except Exception:  # damaged EXIF does not make a photo unreadable
+        return {}
+    return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}
+
+
+def _srgb(pixels: Array) -> Array:
+    """[...] uint8 or uint16 sRGB to float32 linear, by table: exact, and no copy in between."""
+    levels = np.iinfo(pixels.dtype).max + 1
+    return srgb_to_linear(np.arange(levels, dtype=np.float32) / np.float32(levels - 1))[pixels]
+
+
+def _over_white(linear: Array, alpha: Array, warnings: list[str]) -> Array:
+    """Lay [H, W, 3] with straight [H, W, 1] alpha over white, in linear light."""
+    if bool(np.all(alpha >= 1)):
+        return linear
+    warnings.append("Transparent parts are laid over white.")
+    return linear * alpha + (1 - alpha)
+
+
+def _upright(pixels: Array, orientation: int) -> Array:
+    """Undo an EXIF orientation (1 .. 8)."""
+    turned = {
+        2: lambda p: p[:, ::-1],
+        3: lambda p: p[::-1, ::-1],
+        4: lambda p: p[::-1],
+        5: lambda p: p.swapaxes(0, 1),
+        6: lambda p: p.swapaxes(0, 1)[:, ::-1],
+        7: lambda p: p.swapaxes(0, 1)[::-1, ::-1],
+        8: lambda p: p.swapaxes(0, 1)[::-1],
+    }
+    return np.ascontiguousarray(turned[orientation](pixels)) if orientation in turned else pixels
+
+
+@contextmanager
+def _pixel_limit_lifted() -> Iterator[None]:
+    """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
+    from PIL import Image
+
+    before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        yield
+    finally:
+        Image.MAX_IMAGE_PIXELS = before

@@ -1,0 +1,59 @@
+"""From EXIF tags to the field of view (derivation: docs/inputs.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+FILM_WIDTH = 36.0
+"""Long side of a 35 mm film frame, millimetres."""
+
+_UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
+"""Millimetres in a FocalPlaneResolutionUnit: inch, centimetre, millimetre, micrometre."""
+
+
+def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | None:
+    """Horizontal field of view, degrees, of a picture of width x height pixels (already turned upright), or None.
+
+    `tags` are EXIF names and values. FocalLengthIn35mmFilm comes first: the long side of the picture is taken as the
+    36 mm of a film frame. Without it, FocalLength with FocalPlaneXResolution gives the focal length in pixels.
+    Values that lead outside (1, 170) degrees are not believed.
+    """
+    focal = _from_film(tags, width, height) or _from_focal_plane(tags, width, height)
+    if not focal:
+        return None
+    fov = math.degrees(2 * math.atan(0.5 * width / focal))
+    return fov if 1 < fov < 170 else None
+
+
+def _from_film(tags: Mapping[str, Any], width: int, height: int) -> float | None:
+    """Focal length in pixels from the 35 mm equivalent."""
+    film = _number(tags.get("FocalLengthIn35mmFilm"))
+    return film / FILM_WIDTH * max(width, height) if film else None
+
+
+def _from_focal_plane(tags: Mapping[str, Any], width: int, height: int) -> float | None:
+    """Focal length in pixels from the real focal length and the density of pixels on the sensor."""
+    focal_mm = _number(tags.get("FocalLength"))
+    density = _number(tags.get("FocalPlaneXResolution"))
+    unit = _UNIT_MM.get(int(_number(tags.get("FocalPlaneResolutionUnit")) or 2))
+    if not (focal_mm and density and unit):
+        return None
+    # The density belongs to the picture as recorded; one that was scaled since carries the recorded size in EXIF.
+    # Long sides are compared because the picture may have been turned upright.
+    sides = [_number(tags.get(name)) for name in ("ExifImageWidth", "ExifImageHeight")]
+    recorded = max((side for side in sides if side), default=0.0) or max(width, height)
+    sensor_mm = recorded / density * unit
+    if not 1 < sensor_mm < 100:  # no camera has such a sensor: the tags do not mean what they say
+        return None
+    return focal_mm * density / unit * max(width, height) / recorded
+
+
+def _number(value: Any) -> float | None:
+    """A positive finite float from an EXIF value (rationals may be 0/0), or None."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, ZeroDivisionError):
+        return None
+    return number if math.isfinite(number) and number > 0 else None

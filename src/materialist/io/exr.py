@@ -1,0 +1,68 @@
+"""OpenEXR files, through the reference library: float32 survives a round trip bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import InputError, OutputError
+from materialist.types import Array
+
+_COLOUR = ("RGB", "RGBA", "rgb", "rgba")
+_GREY = ("Y", "V", "L", "Z", "y", "depth")
+
+
+def read_exr(path: str | Path) -> Array:
+    """The picture in an EXR: [H, W, C] float32 for colour channels, [H, W] float32 for a single one.
+
+    Half and float pixels are both returned as float32; values are as stored (linear, unclipped, NaN kept).
+    Raises InputError when the file is missing, is not an EXR, is damaged, or holds no picture we know how to read.
+    """
+    import OpenEXR
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"There is no EXR file at {path}.")
+    try:
+        with OpenEXR.File(str(path)) as file:
+            channels = {name: channel.pixels for name, channel in file.channels().items()}
+    except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
+        raise InputError(f"{path} is not a readable EXR file (truncated or damaged): {error}.") from error
+    array = _pick(channels, path)
+    if array.dtype not in (np.float16, np.float32):
+        raise InputError(f"{path} holds {array.dtype} pixels; save it as half or float.")
+    return np.ascontiguousarray(array, np.float32)
+
+
+def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
+    """Write [H, W] (channel Y), [H, W, 3] (RGB) or [H, W, 4] (RGBA) as float32, or as float16 with `half`.
+
+    Raises InputError for another shape, OutputError when the file cannot be written.
+    """
+    import OpenEXR
+
+    array = np.asarray(array)
+    names = {2: "Y"}.get(array.ndim) or {(3, 3): "RGB", (3, 4): "RGBA"}.get((array.ndim, array.shape[-1]))
+    if names is None:
+        raise InputError(f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}.")
+    pixels = np.ascontiguousarray(array, np.float16 if half else np.float32)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    try:
+        with OpenEXR.File(header, {names: pixels}) as file:
+            file.write(str(path))
+    except Exception as error:  # see read_exr
+        raise OutputError(f"{path} cannot be written: {error}") from error
+
+
+def _pick(channels: dict[str, Array], path: Path) -> Array:
+    """The picture among the channels: plain RGB(A), then grey, then the first layer that ends in RGB(A)."""
+    for name in (*_COLOUR, *_GREY):
+        if name in channels:
+            return channels[name]
+    for name in sorted(channels):
+        if name.rsplit(".", 1)[-1] in _COLOUR:
+            return channels[name]
+    if len(channels) == 1:
+        return next(iter(channels.values()))
+    raise InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")

@@ -1,0 +1,106 @@
+"""Pictures out (sRGB PNG, linear EXR), and maps and masks in."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError, OutputError
+from materialist.io.exr import read_exr, write_exr
+from materialist.types import Array
+
+
+def write_png(path: str | Path, linear: Array) -> None:
+    """Write linear RGB [H, W, 3] (or grey [H, W]), clipped to [0, 1], as an 8-bit sRGB PNG."""
+    write_png_bytes(path, np.round(linear_to_srgb(linear) * 255).astype(np.uint8))
+
+
+def write_png_bytes(path: str | Path, pixels: Array) -> None:
+    """Write [H, W, 3] or [H, W] uint8 as they are. Raises OutputError when the file cannot be written."""
+    from PIL import Image
+
+    try:
+        Image.fromarray(pixels).save(path, format="PNG")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None:
+    """Write linear RGB [H, W, 3] to PATH.png (sRGB) or PATH.exr (linear float32), whole or not at all.
+
+    Raises OutputError when the file exists and `force` is not given, or cannot be written.
+    """
+    path = Path(path)
+    ensure_image_writable(path, force=force)
+    temporary = path.with_name(f".partial-{os.getpid()}{path.suffix.lower()}")
+    try:
+        (write_exr if path.suffix.lower() == ".exr" else write_png)(temporary, linear)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
+    """Check, before hours of work, that write_image will accept PATH; raises OutputError or InputError."""
+    path = Path(path)
+    if path.suffix.lower() not in (".png", ".exr"):
+        raise InputError(f"The output {path} must end in .png (for looking) or .exr (linear, for further work).")
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists; give --force to replace it, or another name.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.with_name(f".partial-{os.getpid()}.probe")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def read_map(path: str | Path) -> Array:
+    """A data map, [H, W] or [H, W, C] float32: EXR as stored; PNG and friends scaled to [0, 1], never colour-decoded.
+
+    An 8-bit albedo that another tool saved sRGB-encoded is for the caller to decode: the file does not say.
+    Alpha is dropped. Raises InputError when the file is missing or unreadable.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".exr":
+        array = read_exr(path)
+        return array[..., :3] if array.ndim == 3 else array
+    import cv2
+
+    if not path.is_file():
+        raise InputError(f"There is no map at {path}.")
+    array = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
+    if array is None:
+        raise InputError(f"{path} is not a readable image (use EXR, or 8- or 16-bit PNG).")
+    if array.ndim == 3:
+        array = array[..., 2::-1] if array.shape[2] >= 3 else array[..., 0]
+    scale = np.iinfo(array.dtype).max if array.dtype.kind in "ui" else 1
+    return np.ascontiguousarray(array, np.float32) / np.float32(scale)
+
+
+def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None) -> Array:
+    """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside.
+
+    The file may have the working size `shape`, or the photo's `native` (H0, W0), or any size of that aspect ratio;
+    it is area-averaged to `shape`. Raises InputError for another aspect ratio or an empty mask.
+    """
+    import cv2
+
+    mask = read_map(path)
+    mask = mask.max(-1) if mask.ndim == 3 else mask
+    if mask.shape != shape:
+        sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
+        # A pixel of slack on the shorter side: working sizes are rounded.
+        if abs(mask.shape[1] / mask.shape[0] - shape[1] / shape[0]) > 1.5 * shape[1] / shape[0] / min(shape):
+            raise InputError(f"The mask {path} is {mask.shape[1]} x {mask.shape[0]} pixels, the photo {sizes}.")
+        mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_AREA)
+    inside = mask > 0.5
+    if not inside.any():
+        raise InputError(f"The mask {path} is empty: no pixel is brighter than half.")
+    return inside

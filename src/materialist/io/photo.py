@@ -1,0 +1,118 @@
+"""A photograph from a file: decoded, upright, linear, at working size, with its camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.io.decode import MIN_SIDE, Decoded, decode
+from materialist.io.examples import PREFIX, example_path
+from materialist.io.exif import horizontal_fov
+from materialist.types import Array, Camera, Photo
+
+DEFAULT_FOV = 35.0
+"""Horizontal field of view, degrees, when nothing better is known (the paper's)."""
+HDR_CLIP = 10.0
+"""Upper bound of HDR input (paper, appendix "Handling HDR Images")."""
+
+
+def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None) -> Photo:
+    """Read PATH (or `example:NAME`) as a Photo whose longer side is `size` pixels, or fewer where the file has fewer.
+
+    `fov` is the horizontal field of view in degrees, in (1, 170); None or "auto" takes it from EXIF, else 35.
+    Display files (PNG, JPEG, ...) give values in [0, 1]; scene-linear ones (EXR, HDR, float TIFF) are clipped to
+    [0, 10] (paper, appendix "Handling HDR Images"). Shrinking is an area average in linear light.
+
+    Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
+    damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
+    """
+    angle = _option_fov(fov)
+    if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= 8192:
+        raise InputError(f"The working size must be a whole number of pixels from {MIN_SIDE} to 8192, not {size!r}.")
+    name = str(path)
+    file = example_path(name) if name.startswith(PREFIX) else Path(path)
+    decoded = decode_photo(file)
+    original = decoded.linear
+    height, width = original.shape[:2]
+    linear = _working(original, size)
+    warnings = [*decoded.warnings, *_remarks(decoded, width, height)]
+    hdr = decoded.scene_linear and float(original.max()) > 1
+    if float(linear.max()) > HDR_CLIP:
+        linear = np.minimum(linear, np.float32(HDR_CLIP))
+    _require_content(linear, name)
+    from_exif = horizontal_fov(decoded.tags, width, height)
+    source = "option" if angle else "exif" if from_exif else "default"
+    camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
+    return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings))
+
+
+def decode_photo(file: Path) -> Decoded:
+    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise."""
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; give one photo in it.")
+    if not file.exists():
+        raise InputError(f"There is no photo at {file}.")
+    if file.is_file() and file.stat().st_size == 0:
+        raise InputError(f"{file} is empty (0 bytes); copy it again.")
+    decoded = decode(file)
+    pixels = decoded.linear
+    if decoded.scene_linear:
+        broken = ~np.isfinite(pixels).all(-1)
+        if broken.any():
+            row, column = np.argwhere(broken)[0]
+            raise InputError(
+                f"{file} has {int(broken.sum())} pixels that are NaN or infinite (first at column {column}, "
+                f"row {row}); repair them in the program that wrote it."
+            )
+        if (pixels < 0).any():
+            decoded.warnings.append("Negative values are set to 0.")
+            decoded.linear = np.maximum(pixels, 0)
+    return decoded
+
+
+def _option_fov(fov: float | str | None) -> float | None:
+    """The --fov option as degrees, or None for automatic."""
+    if fov is None or fov == "auto":
+        return None
+    try:
+        angle = float(fov)
+    except ValueError:
+        angle = float("nan")
+    if not 1 < angle < 170:
+        raise InputError(f"The field of view must be between 1 and 170 degrees (or auto), not {fov}.")
+    return angle
+
+
+def _working(original: Array, size: int) -> Array:
+    """[H, W, 3] with the longer side at most `size`: area average of linear light, never an enlargement."""
+    import cv2
+
+    height, width = original.shape[:2]
+    scale = size / max(height, width)
+    if scale >= 1:
+        return original
+    target = (max(MIN_SIDE, round(width * scale)), max(MIN_SIDE, round(height * scale)))
+    return np.asarray(cv2.resize(original, target, interpolation=cv2.INTER_AREA))
+
+
+def _remarks(decoded: Decoded, width: int, height: int) -> list[str]:
+    """What the user should know about this photo."""
+    remarks = []
+    if width == 2 * height:
+        remarks.append(
+            "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
+        )
+    if decoded.scene_linear and float(decoded.linear.max()) > HDR_CLIP:
+        remarks.append(f"HDR values above {HDR_CLIP:g} are clipped at working size.")
+    return remarks
+
+
+def _require_content(linear: Array, name: str) -> None:
+    """Refuse a picture with nothing to fit."""
+    low, high = float(linear.min()), float(linear.max())
+    if high <= 1e-4:
+        raise InputError(f"{name} is entirely black; there is no light in it to explain.")
+    if np.ptp(linear.reshape(-1, 3), axis=0).max() <= 1e-3 * high or high - low <= 1e-4:
+        raise InputError(f"{name} is one flat colour; there is nothing in it to explain.")
