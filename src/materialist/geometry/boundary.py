@@ -1,0 +1,242 @@
+"""Depth map to triangle mesh with duplicated boundaries (paper, Mesh Reconstruction).
+
+Every pixel with a surface is one quad whose vertices sit at the pixel's corners. Where surfaces part, a corner holds
+one vertex per surface (the paper's duplication), and the farther surface is continued under the nearer one by a pixel,
+so that no ray through the picture passes between them. See docs/geometry.md for why corners and not centres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.geometry.cuts import Cuts, find_cuts
+from materialist.types import Array, Camera, Mesh
+
+EXTRAPOLATION = 2.0
+"""Inverse depth at a pixel's corner stays within this factor of the pixel's own."""
+BEHIND = 1e-3
+"""A continued background lies at least this fraction of the depth behind the foreground that hides it."""
+LEAST_FACING = 0.02
+"""Shading normals keep n . v of at least this (89 degrees), so that every visible point can be shaded."""
+
+# Corner slots of a pixel, and pixel slots around a grid corner, in reading order.
+TOP_LEFT, TOP_RIGHT, BOTTOM_LEFT, BOTTOM_RIGHT = range(4)
+QUAD = np.array([[TOP_LEFT, BOTTOM_LEFT, BOTTOM_RIGHT], [TOP_LEFT, BOTTOM_RIGHT, TOP_RIGHT]])
+"""[2, 3] the two triangles of a pixel, counter-clockwise seen from the camera."""
+
+
+def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0) -> Mesh:
+    """Turn a depth map into a mesh with clean occlusion boundaries.
+
+    depth: [H, W] planar depth along -Z, scene units; 0 where there is no surface (left open).
+    normal: [H, W, 3] unit, camera frame; becomes the vertices' shading normals.
+    tau: grazing angle in degrees, in (0, 90), below which a step in depth is an occlusion boundary (paper: 6).
+
+    Faces come row-major by pixel, two for each pixel with a surface, then the continued background ("tucks"), which the
+    camera never sees. `uv` is the screen position, except on tucks, where it is the centre of the pixel they continue.
+    Raises InputError for wrong shapes, NaN, negative depth, no surface at all, or tau out of range.
+    """
+    depth, normal = check_maps(depth, normal, camera)
+    if not 0 < tau < 90:
+        raise InputError(f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6).")
+    cuts = find_cuts(depth, camera, tau)
+    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)  # [H, W] 1 / scene unit
+    vertex = corner_vertices(depth > 0, cuts)  # [H, W, 4] vertex of each pixel's corners, -1 without surface
+    reach = corner_inverse_depth(inverse, cuts)  # [H, W, 4] 1 / scene unit
+    return _assemble(inverse, normal, camera, cuts, vertex, reach)
+
+
+def check_maps(depth: Array, normal: Array, camera: Camera) -> tuple[Array, Array]:
+    """Validate depth [H, W] (scene units) and normal [H, W, 3]: float64 and float32 copies, or InputError."""
+    depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float32)
+    size = (camera.height, camera.width)
+    if depth.shape != size:
+        raise InputError(
+            f"The depth map is {depth.shape} but the camera is {size} (rows, columns); make them the same."
+        )
+    if normal.shape != (*size, 3):
+        raise InputError(f"The normal map is {normal.shape} but the camera needs {(*size, 3)}; make them the same.")
+    if not np.isfinite(depth).all():
+        bad = np.count_nonzero(~np.isfinite(depth))
+        raise InputError(f"The depth map has {bad} NaN or infinite values; set them to 0 (no surface).")
+    if depth.min() < 0:
+        raise InputError(f"The depth map goes down to {depth.min():g}; depth must be >= 0, with 0 for no surface.")
+    if not depth.any():
+        raise InputError("The depth map is 0 everywhere, so there is no surface to build; check the depth prediction.")
+    if not np.isfinite(normal[depth > 0]).all():
+        raise InputError("The normal map has NaN or infinite values on the surface; replace them by unit vectors.")
+    return depth, normal
+
+
+def corner_vertices(surface: Array, cuts: Cuts) -> Array:
+    """[H, W, 4] int64 vertex index at each corner of each pixel, numbered by grid corner, -1 where there is no surface.
+
+    Around a grid corner the up to four pixels fall into connected components under the links between them; each
+    component has its own vertex. surface: [H, W] bool.
+    """
+    height, width = surface.shape
+    pixels = np.zeros((height + 1, width + 1, 4), bool)  # which of the corner's four pixels have a surface
+    pixels[1:, 1:, TOP_LEFT], pixels[1:, :-1, TOP_RIGHT] = surface, surface
+    pixels[:-1, 1:, BOTTOM_LEFT], pixels[:-1, :-1, BOTTOM_RIGHT] = surface, surface
+    links = np.zeros((height + 1, width + 1), np.uint8)  # four bits: top, bottom, left, right pair
+    links[1:, 1:-1] |= cuts.link_x.astype(np.uint8)
+    links[:-1, 1:-1] |= cuts.link_x.astype(np.uint8) << 1
+    links[1:-1, 1:] |= cuts.link_y.astype(np.uint8) << 2
+    links[1:-1, :-1] |= cuts.link_y.astype(np.uint8) << 3
+    component = _component_table()[links]  # [H+1, W+1, 4] smallest slot of each slot's component
+    leads = pixels & (component == np.arange(4))
+    number = (np.cumsum(leads) - 1).reshape(leads.shape)
+    index = np.where(pixels, np.take_along_axis(number, component, -1), -1)
+    corners = (
+        index[:-1, :-1, BOTTOM_RIGHT],
+        index[:-1, 1:, BOTTOM_LEFT],
+        index[1:, :-1, TOP_RIGHT],
+        index[1:, 1:, TOP_LEFT],
+    )
+    return np.stack(corners, -1)
+
+
+def _component_table() -> Array:
+    """[16, 4] int64: for each pattern of links around a corner, the smallest slot connected to each slot."""
+    pairs = ((TOP_LEFT, TOP_RIGHT), (BOTTOM_LEFT, BOTTOM_RIGHT), (TOP_LEFT, BOTTOM_LEFT), (TOP_RIGHT, BOTTOM_RIGHT))
+    table = np.tile(np.arange(4), (16, 1))
+    for pattern in range(16):
+        for _ in range(3):  # the longest chain has three links
+            for bit, (a, b) in enumerate(pairs):
+                if pattern >> bit & 1:
+                    table[pattern, [a, b]] = table[pattern, [a, b]].min()
+    return table
+
+
+def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
+    """[H, W, 4] inverse depth at the corners of each pixel, extrapolated from its centre with its own gradient.
+
+    inverse: [H, W] 1 / scene unit. The gradient is the mean of the steps to linked neighbours (exact on planes), and
+    the result stays within a factor `EXTRAPOLATION` of the centre's value.
+    """
+    half_x = _half_step(inverse, cuts.link_x)  # [H, W] change over half a pixel to the right
+    half_y = _half_step(inverse.T, cuts.link_y.T).T  # [H, W] ... downwards
+    corners = np.stack([-half_x - half_y, half_x - half_y, half_y - half_x, half_x + half_y], -1) + inverse[..., None]
+    return np.clip(corners, inverse[..., None] / EXTRAPOLATION, inverse[..., None] * EXTRAPOLATION)
+
+
+def _half_step(inverse: Array, link: Array) -> Array:
+    """[H, W] half the mean step to the linked horizontal neighbours; 0 without any."""
+    step = np.where(link, np.diff(inverse, axis=1), 0)
+    total, count = np.zeros_like(inverse), np.zeros_like(inverse)
+    total[:, :-1] += step
+    total[:, 1:] += step
+    count[:, :-1] += link
+    count[:, 1:] += link
+    return 0.5 * total / np.maximum(count, 1)
+
+
+def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex: Array, reach: Array) -> Mesh:
+    """Front faces and tucks as one Mesh; arrays as in `depth_to_mesh`."""
+    height, width = inverse.shape
+    surface = inverse > 0
+    ids = vertex[surface]  # [P, 4] for the P pixels with a surface
+    count = int(ids.max()) + 1
+    weight = np.bincount(ids.ravel(), minlength=count)  # [V] pixels that meet in each vertex
+    mean_inverse = np.bincount(ids.ravel(), reach[surface].ravel(), count) / weight  # [V]
+    screen = np.empty((count, 2), np.int64)  # [V, 2] column and row of the grid corner
+    rows, columns = np.nonzero(surface)
+    for slot in range(4):
+        screen[ids[:, slot], 0] = columns + slot % 2
+        screen[ids[:, slot], 1] = rows + slot // 2
+    points = _unproject_corners(screen, mean_inverse, camera)  # [V, 3]
+    normals = np.stack([np.bincount(ids.ravel(), np.repeat(normal[surface][:, k], 4), count) for k in range(3)], -1)
+    faces = ids[:, QUAD].reshape(-1, 3)  # [2P, 3]
+    pixel = np.repeat(rows * width + columns, 2)
+
+    tuck_screen, tuck_inverse, back = _tucks(surface, cuts, vertex, reach, mean_inverse)  # [T, 4, 2], [T, 4], [T]
+    tuck_points = _unproject_corners(tuck_screen.reshape(-1, 2), tuck_inverse.ravel(), camera)
+    tuck_normals = np.repeat(normal.reshape(-1, 3)[back], 4, axis=0)
+    tuck_uv = np.repeat(np.stack([(back % width + 0.5) / width, (back // width + 0.5) / height], -1), 4, axis=0)
+    tuck_faces = (count + np.arange(len(back))[:, None, None] * 4 + QUAD).reshape(-1, 3)
+    points = np.concatenate([points, tuck_points])
+    return Mesh(
+        vertices=points.astype(np.float32),
+        faces=np.concatenate([faces, tuck_faces]).astype(np.int32),
+        normals=face_camera(np.concatenate([normals, tuck_normals]), points),
+        uv=np.concatenate([screen / (width, height), tuck_uv]).astype(np.float32),
+        face_pixel=np.concatenate([pixel, np.repeat(back, 2)]).astype(np.int32),
+        face_plane=np.full(len(faces) + len(tuck_faces), -1, np.int16),
+    )
+
+
+def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse: Array) -> tuple[Array, Array, Array]:
+    """Continue the farther surface of every cut pair under the nearer pixel, over the whole of that pixel.
+
+    Returns screen corners [T, 4, 2] (column, row), inverse depth there [T, 4], and the row-major background pixel [T].
+    On the shared edge a tuck takes the background's own vertices, so that the two join without a seam.
+    """
+    width = surface.shape[1]
+    front, back, offset = _cut_pairs(reach.mean(-1), cuts)
+    flat_vertex, flat_reach = vertex.reshape(-1, 4), reach.reshape(-1, 4)
+    corner = np.arange(4)
+    # Corner c of the front pixel lies at this corner of the back pixel when it is shared, else beyond it.
+    column = corner % 2 + offset[:, :1]  # [T, 4] 0 or 1 inside the back pixel
+    row = corner // 2 + offset[:, 1:]
+    shared = (column >= 0) & (column <= 1) & (row >= 0) & (row <= 1)  # [T, 4]
+    slot = np.where(shared, 2 * np.clip(row, 0, 1) + np.clip(column, 0, 1), 0)
+    joint = np.take_along_axis(flat_vertex[back], slot, 1)  # [T, 4] background vertex at shared corners
+    # Beyond the back pixel its corner values go on linearly: in x the far side is 2 * near - opposite, and so in y.
+    grid = flat_reach[back].reshape(-1, 2, 2)
+    slope_x = (grid[:, :, 1] - grid[:, :, 0]).mean(1, keepdims=True)  # [T, 1] per pixel
+    slope_y = (grid[:, 1] - grid[:, 0]).mean(1, keepdims=True)
+    centre = grid.mean((1, 2))[:, None]
+    beyond = centre + slope_x * (column - 0.5) + slope_y * (row - 0.5)
+    beyond = np.clip(beyond, centre / EXTRAPOLATION, centre * EXTRAPOLATION)
+    inverse = np.where(shared, mean_inverse[joint], beyond)
+    front_vertex = flat_vertex[front]  # [T, 4]
+    tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
+    limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - BEHIND)
+    inverse = np.minimum(inverse, limit)
+    torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
+    screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
+    return screen[torn], inverse[torn], back[torn]
+
+
+def _cut_pairs(inverse: Array, cuts: Cuts) -> tuple[Array, Array, Array]:
+    """Row-major nearer and farther pixel [T] of every cut pair, and the step from farther to nearer [T, 2] (x, y)."""
+    height, width = inverse.shape
+    index = np.arange(height * width).reshape(height, width)
+    flat = inverse.ravel()
+    ends = [
+        (index[:, :-1][cuts.cut_x], index[:, 1:][cuts.cut_x], (1, 0)),
+        (index[:-1][cuts.cut_y], index[1:][cuts.cut_y], (0, 1)),
+    ]
+    front, back, offset = [], [], []
+    for first, second, step in ends:
+        second_nearer = flat[second] > flat[first]
+        front.append(np.where(second_nearer, second, first))
+        back.append(np.where(second_nearer, first, second))
+        offset.append(np.where(second_nearer[:, None], 1, -1) * np.array(step))
+    return np.concatenate(front), np.concatenate(back), np.concatenate(offset)
+
+
+def _unproject_corners(screen: Array, inverse: Array, camera: Camera) -> Array:
+    """[N, 3] float64 points at screen positions [N, 2] (pixels) with inverse depth [N]."""
+    x = (screen[:, 0] - camera.width / 2) / camera.focal
+    y = (camera.height / 2 - screen[:, 1]) / camera.focal
+    return np.stack([x, y, -np.ones(len(screen))], -1) / inverse[:, None]
+
+
+def face_camera(normals: Array, points: Array) -> Array:
+    """[N, 3] float32 unit normals, turned by the least amount that lets them face the camera at the origin.
+
+    Zero-length normals become the view direction. points: [N, 3] scene units.
+    """
+    view = -points / np.maximum(np.linalg.norm(points, axis=-1, keepdims=True), 1e-300)
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    unit = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), view)
+    facing = (unit * view).sum(-1, keepdims=True)
+    aside = unit - facing * view
+    aside_length = np.linalg.norm(aside, axis=-1, keepdims=True)
+    turned = LEAST_FACING * view + np.sqrt(1 - LEAST_FACING**2) * aside / np.maximum(aside_length, 1e-6)
+    # A normal that points straight away has no nearest turn; it is taken as flipped.
+    turned = np.where(aside_length > 1e-6, turned, view)
+    unit = np.where(facing < LEAST_FACING, turned, unit)
+    return (unit / np.linalg.norm(unit, axis=-1, keepdims=True)).astype(np.float32)

@@ -1,0 +1,121 @@
+"""Occlusion cuts: which neighbouring pixels of a depth map lie on different surfaces (paper, Mesh Reconstruction)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.camera import unproject
+from materialist.types import Array, Camera
+
+SUPPORT_PIXELS = 3
+"""A slope counts as the surface's own only if it holds over this many pixels beside the pair."""
+SUPPORT_FACTOR = 4.0
+"""A step is a cut only if it exceeds the surface's own slope by this factor. 4 clears the steepest smooth case, the
+rim of a sphere, whose last step is at most 1 / (2 - sqrt(3)) = 3.73 times the smallest of the three before it."""
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """Links between 4-neighbours: a pair is linked, cut (two surfaces, one behind the other), or has no surface."""
+
+    link_x: Array
+    """[H, W-1] bool: pixel (i, j) and (i, j+1) lie on one surface."""
+    link_y: Array
+    """[H-1, W] bool: pixel (i, j) and (i+1, j) lie on one surface."""
+    cut_x: Array
+    """[H, W-1] bool: both have a surface, and an occlusion boundary runs between them."""
+    cut_y: Array
+    """[H-1, W] bool: likewise for vertical pairs."""
+
+
+def find_cuts(depth: Array, camera: Camera, tau: float) -> Cuts:
+    """Cut the pixel grid at occlusion boundaries.
+
+    A pair of 4-neighbours is cut when all of these hold:
+
+    1. it is a leg of a triangle of the pixel-centre grid with arcsin(n . v) < tau (the paper's criterion);
+    2. the leg itself is grazing: it makes an angle below sqrt(2) tau with the view ray. A triangle's plane is at least
+       as grazing as any of its edges, and its steeper leg is at most about sqrt(2) times less so: every grazing
+       triangle is cut, and only across its slope, not along the boundary;
+    3. its step in inverse depth exceeds `SUPPORT_FACTOR` times the slope that either side shows over `SUPPORT_PIXELS`
+       pixels. Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut.
+
+    depth: [H, W] planar scene units, 0 = no surface. tau: degrees. The arrays in the result are described there.
+    """
+    surface = depth > 0  # [H, W]
+    points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
+    inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
+    grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
+    steep_x = _exceeds_support(inverse, surface)
+    steep_y = _exceeds_support(inverse.T, surface.T).T
+    pair_x = surface[:, :-1] & surface[:, 1:]
+    pair_y = surface[:-1] & surface[1:]
+    cut_x, cut_y = pair_x & grazing_x & steep_x, pair_y & grazing_y & steep_y
+    return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
+
+
+def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:
+    """Conditions 1 and 2 for horizontal [H, W-1] and vertical [H-1, W] pairs; tau in radians."""
+    height, width = surface.shape
+    angle_x = _edge_angle(points[:, :-1], points[:, 1:])  # [H, W-1] radians
+    angle_y = _edge_angle(points[:-1], points[1:])  # [H-1, W] radians
+    near_x = np.zeros((height, width - 1), bool)  # leg of a grazing triangle
+    near_y = np.zeros((height - 1, width), bool)
+    # Both diagonals of every 2x2 block, so that the result does not depend on how the block is split.
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        corner = _block(points, row, column)  # the right-angled vertex; [H-1, W-1, 3]
+        along_x, along_y = _block(points, row, 1 - column), _block(points, 1 - row, column)
+        whole = _block(surface, row, column) & _block(surface, row, 1 - column) & _block(surface, 1 - row, column)
+        grazing = whole & (_triangle_angle(corner, along_x, along_y) < tau)  # [H-1, W-1]
+        near_x[row : row + height - 1] |= grazing
+        near_y[:, column : column + width - 1] |= grazing
+    # A pair below tau by itself is cut even where a thin structure leaves no whole triangle.
+    wide = np.sqrt(2) * tau
+    return (angle_x < tau) | (near_x & (angle_x < wide)), (angle_y < tau) | (near_y & (angle_y < wide))
+
+
+def _block(grid: Array, row: int, column: int) -> Array:
+    """One corner of every 2x2 block of [H, W, ...]: [H-1, W-1, ...]."""
+    return grid[row : grid.shape[0] - 1 + row, column : grid.shape[1] - 1 + column]
+
+
+def _triangle_angle(a: Array, b: Array, c: Array) -> Array:
+    """arcsin |n . v| [...] in radians of triangles [..., 3], v the direction from the centroid to the camera."""
+    normal = np.cross(b - a, c - a)
+    centroid = a + b + c
+    length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(centroid, axis=-1)
+    sine = np.abs((normal * centroid).sum(-1)) / np.maximum(length, 1e-300)
+    return np.arcsin(np.minimum(sine, 1))
+
+
+def _edge_angle(a: Array, b: Array) -> Array:
+    """Angle [...] in radians, [0, pi/2], between the segment a-b [..., 3] and the view ray through its middle."""
+    edge, view = b - a, a + b
+    cross = np.linalg.norm(np.cross(edge, view), axis=-1)
+    return np.arctan2(cross, np.abs((edge * view).sum(-1)))
+
+
+def _exceeds_support(inverse: Array, surface: Array) -> Array:
+    """Condition 3 for horizontal pairs: [H, W-1] bool, from inverse depth [H, W] and its validity [H, W]."""
+    width = inverse.shape[1]
+    pair = surface[:, :-1] & surface[:, 1:]  # [H, W-1]
+    step = np.where(pair, inverse[:, 1:] - inverse[:, :-1], 0.0)  # [H, W-1] 1 / (scene unit pixel)
+    best = np.zeros_like(step)
+    for side in (-1, 1):
+        slope = np.full_like(step, np.inf)
+        held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
+        for reach in range(1, SUPPORT_PIXELS + 1):
+            if reach >= width - 1:
+                break
+            here, there = (slice(reach, None), slice(None, -reach))[::side]
+            reached = np.zeros(step.shape, bool)
+            reached[:, here] = pair[:, there]
+            held &= reached
+            beside = np.zeros_like(step)  # slope at this reach, counted along the pair's own sign
+            beside[:, here] = np.sign(step[:, here]) * step[:, there]
+            slope = np.where(held, np.minimum(slope, beside), slope)
+        slope[~np.isfinite(slope)] = 0
+        best = np.maximum(best, slope)
+    return np.abs(step) > SUPPORT_FACTOR * best
