@@ -1,0 +1,209 @@
+"""The predictor `maps:DIR`: maps that another tool has written (docs/predictors.md)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import srgb_to_linear
+from materialist.errors import InputError
+from materialist.predict import resample
+from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS
+from materialist.predict.normals import normals_from_depth
+from materialist.types import Array, Materials, Photo, Prediction
+
+SLIGHT = 0.1
+"""How far outside its range a value may be and still be clipped with a warning."""
+WILD_FRACTION = 0.01
+"""Above this fraction of pixels further outside, the map is in another unit and refused."""
+
+
+class MapsPredictor:
+    """Reads albedo, roughness, metallic, normal and depth as .exr or .png from a folder."""
+
+    def __init__(self, folder: str | Path):
+        if not str(folder):
+            raise InputError("maps: needs a folder, as in --predictor maps:my_maps.")
+        self.folder = Path(folder)
+        if not self.folder.is_dir():
+            raise InputError(f"There is no folder {self.folder} to read maps from.")
+
+    @property
+    def name(self) -> str:
+        """'maps:DIR'."""
+        return f"maps:{self.folder}"
+
+    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
+        """The maps at the working size of the photo; `seed` changes nothing.
+
+        A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal comes from depth;
+        both, and every resampling and clipping, are told in `warnings`. Raises InputError when albedo or depth is
+        missing, a map has another aspect ratio than the photo, or its values cannot be meant.
+        """
+        size = photo.linear.shape[:2]
+        warnings: list[str] = []
+        depth = self._fitted("depth", size, warnings)
+        albedo = self._fitted("albedo", size, warnings)
+        normal = self._fitted("normal", size, warnings, optional=True)
+        materials = Materials(
+            albedo=albedo,
+            roughness=self._scalar("roughness", NEUTRAL_ROUGHNESS, size, warnings),
+            metallic=self._scalar("metallic", NEUTRAL_METALLIC, size, warnings),
+        )
+        from_depth = normals_from_depth(depth, photo.camera, radius=2)
+        if normal is None:
+            normal = from_depth
+            warnings.append("There is no normal map: the normals were derived from depth.")
+        else:
+            empty = np.linalg.norm(normal, axis=-1) < 0.5
+            normal = np.where(empty[..., None], from_depth, normal)
+        return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))
+
+    def _scalar(self, name: str, neutral: float, size: tuple[int, int], warnings: list[str]) -> Array:
+        """Roughness or metallic [H, W], or its neutral value where there is no file."""
+        found = self._fitted(name, size, warnings, optional=True)
+        if found is not None:
+            return found
+        warnings.append(f"There is no {name} map: the neutral {name} {neutral} was used everywhere.")
+        return np.full(size, neutral, np.float32)
+
+    def _fitted(self, name: str, size: tuple[int, int], warnings: list[str], optional: bool = False) -> Array | None:
+        """One map, read, checked and brought to the photo's size [H, W]; None when it is missing and optional."""
+        path = self._find(name)
+        if path is None:
+            if optional:
+                return None
+            raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
+        values = _CHECKS[name](read_map(path, name), path, warnings)
+        if values.shape[:2] != size:
+            _check_aspect(values, size, path)
+            warnings.append(
+                f"{path.name} is {values.shape[1]}x{values.shape[0]} and was resampled to {size[1]}x{size[0]}."
+            )
+            values = {"normal": resample.normals, "depth": resample.depth}.get(name, resample.values)(values, size)
+        return values
+
+    def _find(self, name: str) -> Path | None:
+        """DIR/name.exr, else DIR/name.png, else None."""
+        return next((p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None)
+
+
+def read_map(path: Path, name: str) -> Array:
+    """The linear values in a map file, float32: [H, W, 3] for albedo and normal, [H, W] for the others.
+
+    EXR values are as stored. PNG (8 or 16 bit) is brought to [0, 1]; albedo is then sRGB-decoded and normal is
+    2 v - 1. Raises InputError for a damaged file or the wrong number of channels.
+    """
+    if path.suffix == ".exr":
+        from materialist.io.exr import read_exr
+
+        values = read_exr(path)
+    else:
+        values = _read_png(path)
+        values = srgb_to_linear(values) if name == "albedo" else 2 * values - 1 if name == "normal" else values
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if name in ("albedo", "normal"):
+        if values.ndim == 2 and name == "albedo":
+            values = np.repeat(values[..., None], 3, -1)
+        if values.ndim != 3 or values.shape[2] < 3:
+            raise InputError(f"{path} has one channel, but a {name} map needs three.")
+        return np.ascontiguousarray(values[..., :3])
+    if values.ndim == 3:
+        if np.nanmax(np.ptp(values[..., :3], axis=-1)) > 0.01 * max(1.0, float(np.nanmax(np.abs(values[..., :3])))):
+            raise InputError(f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey.")
+        values = values[..., 0]
+    return np.ascontiguousarray(values)
+
+
+def _read_png(path: Path) -> Array:
+    """[H, W] or [H, W, 3] float32 in [0, 1] of an 8- or 16-bit PNG, alpha dropped."""
+    import cv2
+
+    pixels = (
+        cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
+    )
+    if pixels is None:
+        raise InputError(f"{path} is not a readable PNG file; write the map again.")
+    values = pixels.astype(np.float32) / np.iinfo(pixels.dtype).max
+    return values if values.ndim == 2 else np.ascontiguousarray(values[..., 2::-1])  # OpenCV reads BGR(A)
+
+
+def _check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:
+    """Raises InputError unless the map has the photo's aspect ratio, up to rounding of the smaller one."""
+    (h, w), (height, width) = values.shape[:2], size
+    slack = 1.5 * max(1.0, height / h, width / w)
+    if abs(w * height / h - width) > slack and abs(h * width / w - height) > slack:
+        raise InputError(
+            f"{path} is {w}x{h} and the photo is {width}x{height}: give maps of the photo's aspect ratio (no cropping)."
+        )
+
+
+def _check_finite(values: Array, path: Path) -> None:
+    """Raises InputError when there are NaN or infinite values."""
+    bad = ~np.isfinite(values)
+    if bad.any():
+        raise InputError(
+            f"{path} has {int(bad.sum())} NaN or infinite values; replace them (depth 0 means no surface)."
+        )
+
+
+def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
+    """Albedo, roughness, metallic: in [0, 1], slight excess clipped, anything else refused."""
+    _check_finite(values, path)
+    wild = (values < -SLIGHT) | (values > 1 + SLIGHT)
+    if wild.mean() > WILD_FRACTION:
+        raise InputError(
+            f"{path} has values from {values.min():.4g} to {values.max():.4g}; this map must be in [0, 1] "
+            "(divide by 255 or 65535 if it was written as integers)."
+        )
+    if values.min() < -1e-3 or values.max() > 1 + 1e-3:
+        warnings.append(f"{path.name} reaches from {values.min():.3f} to {values.max():.3f}: clipped to [0, 1].")
+    return np.clip(values, 0, 1)
+
+
+def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
+    """Depth: positive, 0 for no surface; infinite is taken as no surface."""
+    if np.isposinf(values).any():
+        warnings.append(f"{path.name} has infinite depths: taken as sky (no surface).")
+        values = np.where(np.isposinf(values), 0, values)
+    _check_finite(values, path)
+    negative = values < 0
+    if negative.mean() > WILD_FRACTION:
+        raise InputError(
+            f"{path} has negative depths (down to {values.min():.4g}); depth is a positive distance along -Z."
+        )
+    if negative.any():
+        warnings.append(f"{path.name} has {int(negative.sum())} negative depths: taken as no surface.")
+    values = np.maximum(values, 0)
+    if not (values > 0).any():
+        raise InputError(f"{path} is 0 everywhere, so there is no surface to reconstruct; depth must be positive.")
+    if path.suffix == ".png" and np.unique(values).size <= 256:
+        warnings.append(f"{path.name} has only {np.unique(values).size} depth steps; 16-bit PNG or EXR is smoother.")
+    return values
+
+
+def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
+    """Normals: unit vectors facing the viewer; a zero vector means unknown."""
+    _check_finite(values, path)
+    length = np.linalg.norm(values, axis=-1)
+    known = length > 0.2
+    if path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SLIGHT:
+        raise InputError(f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR.")
+    if (np.abs(length[known] - 1) > SLIGHT).mean() > 0.05 if known.any() else True:
+        raise InputError(f"{path} does not hold unit vectors (median length {np.median(length):.3g}).")
+    if (values[known][:, 2] < 0).mean() > 0.5:
+        raise InputError(f"{path} points away from the viewer; normals are in the camera frame with +Z to the viewer.")
+    if (np.abs(length[known] - 1) > 0.02).any():
+        warnings.append(f"{path.name} was normalised to unit length.")
+    return np.where(known[..., None], values / np.maximum(length, 1e-6)[..., None], 0).astype(np.float32)
+
+
+_CHECKS = {
+    "albedo": _unit_range,
+    "roughness": _unit_range,
+    "metallic": _unit_range,
+    "depth": _depth_range,
+    "normal": _unit_normals,
+}

@@ -1,0 +1,201 @@
+"""The predictor maps:DIR: what it reads, what it mends, and what it refuses."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError, SetupError
+from materialist.io.exr import write_exr
+from materialist.predict import get_predictor
+from materialist.types import Camera, Photo
+
+H, W = 20, 32
+SHARED = Path(__file__).parents[3] / "shared" / "data" / "official_indoor"
+
+
+def photo(height: int = H, width: int = W) -> Photo:
+    linear = np.full((height, width, 3), 0.3, np.float32)
+    return Photo(linear=linear, camera=Camera(width, height, 40.0), original=linear)
+
+
+def good_maps(height: int = H, width: int = W) -> dict[str, np.ndarray]:
+    """Distinct, non-symmetric maps of the right kind."""
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    normal = rng.normal(size=(height, width, 3)) * [0.3, 0.3, 0.1] + [0, 0, 1]
+    return {
+        "albedo": rng.random((height, width, 3)).astype(np.float32),
+        "roughness": (x / width).astype(np.float32),
+        "metallic": (y / height).astype(np.float32),
+        "normal": (normal / np.linalg.norm(normal, axis=-1, keepdims=True)).astype(np.float32),
+        "depth": (2 + x / width + y / height).astype(np.float32),
+    }
+
+
+def write(folder: Path, **maps: np.ndarray) -> str:
+    for name, values in maps.items():
+        write_exr(folder / f"{name}.exr", values)
+    return f"maps:{folder}"
+
+
+def test_exr_maps_come_back_bit_for_bit(tmp_path):
+    maps = good_maps()
+    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    assert prediction.warnings == () and prediction.predictor.startswith("maps:")
+    for name in ("albedo", "roughness", "metallic"):
+        assert np.array_equal(getattr(prediction.materials, name), maps[name])
+    assert np.array_equal(prediction.depth, maps["depth"])
+    assert np.allclose(prediction.normal, maps["normal"], atol=1e-6)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_png_maps_are_decoded_by_their_meaning(tmp_path, dtype):
+    maps, top = good_maps(), np.iinfo(dtype).max
+    maps["depth"] /= maps["depth"].max()
+    encoded = maps | {"albedo": linear_to_srgb(maps["albedo"]), "normal": maps["normal"] * 0.5 + 0.5}
+    for name, values in encoded.items():
+        pixels = np.round(values * top).astype(dtype)
+        cv2.imwrite(str(tmp_path / f"{name}.png"), pixels[..., ::-1] if pixels.ndim == 3 else pixels)
+    prediction = get_predictor(f"maps:{tmp_path}").predict(photo())
+    close = 1.5 / top
+    assert np.allclose(linear_to_srgb(prediction.materials.albedo), encoded["albedo"], atol=close)
+    assert np.allclose(prediction.materials.roughness, maps["roughness"], atol=close)
+    assert np.allclose(prediction.materials.metallic, maps["metallic"], atol=close)
+    assert np.allclose(prediction.depth, maps["depth"], atol=close)
+    assert np.allclose(prediction.normal, maps["normal"], atol=4 * close)
+    assert any("depth steps" in w for w in prediction.warnings) == (dtype == np.uint8)
+
+
+def test_an_exr_wins_over_a_png(tmp_path):
+    maps = good_maps()
+    cv2.imwrite(str(tmp_path / "roughness.png"), np.zeros((H, W), np.uint8))
+    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    assert np.array_equal(prediction.materials.roughness, maps["roughness"])
+
+
+def test_missing_maps_are_neutral_and_told(tmp_path):
+    maps = good_maps()
+    spec = write(tmp_path, albedo=maps["albedo"], depth=np.full((H, W), 2.0, np.float32))
+    prediction = get_predictor(spec).predict(photo())
+    assert (prediction.materials.roughness == 0.5).all()
+    assert np.allclose(prediction.materials.metallic, 0.1)
+    assert np.allclose(prediction.normal, [0, 0, 1], atol=1e-4)
+    assert [w for w in prediction.warnings if "roughness" in w] and [w for w in prediction.warnings if "metallic" in w]
+    assert [w for w in prediction.warnings if "normal" in w]
+
+
+@pytest.mark.parametrize("name", ["albedo", "depth"])
+def test_albedo_and_depth_are_needed(tmp_path, name):
+    maps = good_maps()
+    del maps[name]
+    with pytest.raises(InputError, match=f"{name}.exr"):
+        get_predictor(write(tmp_path, **maps)).predict(photo())
+
+
+def test_maps_of_other_sizes_are_resampled_and_told(tmp_path):
+    spec = write(tmp_path, **good_maps(2 * H, 2 * W))
+    prediction = get_predictor(spec).predict(photo())
+    assert prediction.materials.albedo.shape == (H, W, 3)
+    assert prediction.depth.shape == prediction.materials.roughness.shape == (H, W)
+    assert np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
+    assert sum("resampled" in w for w in prediction.warnings) == 5
+    mean = good_maps(2 * H, 2 * W)["albedo"].reshape(H, 2, W, 2, 3).mean((1, 3))
+    assert np.allclose(prediction.materials.albedo, mean, atol=1e-5)
+
+
+def test_resampled_depth_makes_no_surface_between_near_and_far(tmp_path):
+    maps = good_maps(2 * H, 2 * W)
+    depth = np.full((2 * H, 2 * W), 10.0, np.float32)
+    depth[7:23, 9:31] = 2.0
+    depth[:5] = 0
+    prediction = get_predictor(write(tmp_path, **(maps | {"depth": depth}))).predict(photo())
+    assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
+    prediction = get_predictor(f"maps:{tmp_path}").predict(photo(3 * H, 3 * W))
+    assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
+
+
+def test_another_aspect_ratio_is_refused_with_both_sizes(tmp_path):
+    maps = good_maps() | {"metallic": np.zeros((W, W), np.float32)}
+    with pytest.raises(InputError, match=r"32x32 and the photo is 32x20"):
+        get_predictor(write(tmp_path, **maps)).predict(photo())
+
+
+@pytest.mark.parametrize(("w", "h", "scale"), [(512, 341, 4), (300, 199, 3), (97, 65, 2)])
+def test_rounded_sizes_count_as_the_same_aspect(tmp_path, w, h, scale):
+    small = (round(h / scale), round(w / scale))
+    prediction = get_predictor(write(tmp_path, **good_maps(*small))).predict(photo(h, w))
+    assert prediction.depth.shape == (h, w)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("albedo", lambda v: v * 255, "divide by 255"),
+        ("roughness", lambda v: v + np.nan, "NaN"),
+        ("metallic", lambda v: v - 1, r"in \[0, 1\]"),
+        ("depth", lambda v: -v, "negative depths"),
+        ("depth", lambda v: v * 0, "0 everywhere"),
+        ("normal", lambda v: v * 0.5 + 0.5, "encoded normals"),
+        ("normal", lambda v: v * 3, "unit vectors"),
+        ("normal", lambda v: v * [1, 1, -1], "points away"),
+        ("normal", lambda v: v[..., 0], "one channel"),
+        ("depth", lambda v: np.stack([v, 2 * v, v], -1), "one value a pixel"),
+    ],
+)
+def test_values_that_cannot_be_meant_are_refused(tmp_path, name, change, message):
+    maps = good_maps()
+    maps[name] = change(maps[name])
+    with pytest.raises(InputError, match=message):
+        get_predictor(write(tmp_path, **maps)).predict(photo())
+
+
+def test_slight_excess_is_clipped_and_told(tmp_path):
+    maps = good_maps()
+    maps["albedo"] = maps["albedo"] * 1.05
+    maps["depth"][0, 0] = np.inf
+    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    assert prediction.materials.albedo.max() == 1
+    assert prediction.depth[0, 0] == 0
+    assert len(prediction.warnings) == 2
+
+
+def test_unknown_normals_come_from_depth(tmp_path):
+    maps = good_maps()
+    maps["depth"][:] = 2
+    maps["normal"][3:6, 3:6] = 0
+    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    assert np.allclose(prediction.normal[4, 4], [0, 0, 1], atol=1e-4)
+
+
+def test_damaged_files_are_named(tmp_path):
+    spec = write(tmp_path, **good_maps())
+    (tmp_path / "roughness.exr").unlink()
+    (tmp_path / "roughness.png").write_bytes(b"\x89PNG\r\n\x1a\n rubbish")
+    with pytest.raises(InputError, match=r"roughness\.png"):
+        get_predictor(spec).predict(photo())
+    (tmp_path / "roughness.png").write_bytes(b"")
+    with pytest.raises(InputError, match=r"roughness\.png"):
+        get_predictor(spec).predict(photo())
+
+
+def test_the_spec_is_checked(tmp_path):
+    with pytest.raises(InputError, match="no folder"):
+        get_predictor(f"maps:{tmp_path / 'none'}")
+    with pytest.raises(InputError, match="needs a folder"):
+        get_predictor("maps:")
+    with pytest.raises(InputError, match="no predictor 'nonsense'"):
+        get_predictor("nonsense")
+    for name in ("bundled", "matnet", "marigold"):
+        with pytest.raises(SetupError, match="classical"):
+            get_predictor(name)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
+def test_published_maps_are_read():
+    linear = np.full((512, 512, 3), 0.3, np.float32)
+    prediction = get_predictor(f"maps:{SHARED / 'maps'}").predict(Photo(linear, Camera(512, 512, 35.0), linear))
+    assert prediction.warnings == ()
+    assert prediction.depth.min() > 16 and np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-4)
