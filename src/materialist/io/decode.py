@@ -28,8 +28,11 @@ MAX_ASPECT = 8
 """Longest shape accepted, long side over short side."""
 
 RAW_SUFFIXES = frozenset(
-    ".3fr .ari .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf .raw "
-    ".rw2 .rwl .sr2 .srf .srw .x3f".split()
+    f".{name}"
+    for name in (
+        *("3fr", "ari", "arw", "cr2", "cr3", "crw", "dcr", "dng", "erf", "fff", "iiq", "k25", "kdc", "mef", "mos"),
+        *("mrw", "nef", "nrw", "orf", "pef", "raf", "raw", "rw2", "rwl", "sr2", "srf", "srw", "x3f"),
+    )
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 

@@ -1,0 +1,253 @@
+"""The scene package: a folder that holds everything of a Scene (format: docs/conventions.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.errors import MaterialistError, OutputError, SceneError
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.image import write_png, write_png_bytes
+from materialist.io.overview import overview
+from materialist.io.photo import decode_photo
+from materialist.io.ply import read_ply, write_ply
+from materialist.io.target import MARKER, interrupted_replacement, whole_folder
+from materialist.types import Array, Camera, FitReport, Geometry, Materials, Photo, Prediction, Scene
+
+FORMAT = "materialist-scene"
+VERSION = 1
+
+
+def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
+    """Write the scene as a package folder at PATH, whole or not at all; `load_scene` gives every array back exactly.
+
+    Raises OutputError when PATH exists and `force` is not given, when `force` would replace something that is not a
+    scene package, or when the disk is full or read-only; nothing half-written stays behind.
+    """
+    with whole_folder(path, force) as folder:
+        try:
+            _write(scene, folder)
+        except OutputError as error:  # name the package the user asked for, not the temporary that will vanish
+            raise OutputError(str(error).replace(str(folder), str(path))) from error
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read a scene package. Raises SceneError when it is missing, incomplete, damaged or of an unknown version."""
+    folder = Path(path)
+    meta = _read_meta(folder)
+    try:
+        camera = Camera(**meta["camera"])
+        shape = (camera.height, camera.width)
+        prior, materials = meta["prior"], _read_materials(folder / "maps", shape)
+        label = _read_labels(folder / "plane_label.png", shape)
+        return Scene(
+            camera=camera,
+            photo=_read_photo(folder, meta["photo"], shape),
+            prior=Prediction(
+                _read_materials(folder / "prior", shape),
+                _exr(folder / "prior/normal.exr", (*shape, 3)),
+                _exr(folder / "prior/depth.exr", shape),
+                prior["predictor"],
+                tuple(prior["warnings"]),
+            ),
+            materials=materials,
+            normal=_exr(folder / "maps/normal.exr", (*shape, 3)),
+            depth=_exr(folder / "maps/depth.exr", shape),
+            geometry=Geometry(read_ply(folder / "mesh.ply"), label),
+            envmap=_exr(folder / "envmap.exr", None),
+            rerender=_exr(folder / "rerender.exr", (*shape, 3)),
+            report=_report_from_json(_read_json(folder / "report.json")),
+            provenance=meta["provenance"],
+        )
+    except (KeyError, TypeError) as error:
+        raise SceneError(f"{folder / MARKER} is incomplete ({error}); save the scene again.") from error
+
+
+def _write(scene: Scene, folder: Path) -> None:
+    """Every file of the package into an empty folder."""
+    photo = scene.photo
+    write_exr(folder / "photo.exr", photo.linear)
+    write_png(folder / "photo.png", photo.linear)
+    original = _write_original(photo, folder)
+    for name, materials, normal, depth in (
+        ("prior", scene.prior.materials, scene.prior.normal, scene.prior.depth),
+        ("maps", scene.materials, scene.normal, scene.depth),
+    ):
+        (folder / name).mkdir()
+        maps = {"albedo": materials.albedo, "roughness": materials.roughness, "metallic": materials.metallic}
+        for key, array in {**maps, "normal": normal, "depth": depth}.items():
+            write_exr(folder / name / f"{key}.exr", array)
+    write_exr(folder / "envmap.exr", scene.envmap)
+    write_ply(folder / "mesh.ply", scene.geometry.mesh)
+    # Labels -1 .. 126 become 0 .. 127, so that an image viewer shows them as grey levels.
+    write_png_bytes(folder / "plane_label.png", (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8))
+    write_exr(folder / "rerender.exr", scene.rerender)
+    write_png(folder / "rerender.png", scene.rerender)
+    write_png_bytes(folder / "overview.png", overview(scene))
+    _write_json(folder / "report.json", _report_to_json(scene.report))
+    _write_json(folder / MARKER, _meta(scene, original))
+
+
+def _meta(scene: Scene, original: str) -> dict[str, Any]:
+    """The content of scene.json."""
+    photo = scene.photo
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "camera": asdict(scene.camera),
+        "size": [scene.camera.width, scene.camera.height],
+        "photo": {
+            "original": original,
+            "has_source": photo.source is not None,
+            "camera": asdict(photo.camera),
+            "hdr": photo.hdr,
+            "fov_source": photo.fov_source,
+            "path": photo.path,
+            "warnings": list(photo.warnings),
+        },
+        "prior": {"predictor": scene.prior.predictor, "warnings": list(scene.prior.warnings)},
+        "provenance": scene.provenance,
+    }
+
+
+def _write_original(photo: Photo, folder: Path) -> str:
+    """The input file untouched, or, for a photo that came from memory, its pixels; returns the file name."""
+    if photo.source is None:
+        write_exr(folder / "original.exr", photo.original)
+        return "original.exr"
+    suffix = Path(photo.path or "").suffix.lower() or _suffix_of(photo.source)
+    try:
+        (folder / f"original{suffix}").write_bytes(photo.source)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+    return f"original{suffix}"
+
+
+def _suffix_of(source: bytes) -> str:
+    """File suffix by content, for photos without a file name."""
+    known = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"\x76\x2f\x31\x01": ".exr", b"#?RA": ".hdr", b"RIFF": ".webp"}
+    return next((suffix for mark, suffix in known.items() if source.startswith(mark)), ".img")
+
+
+def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> Photo:
+    """The Photo; its native pixels are decoded again from the original file."""
+    file = folder / Path(meta["original"]).name
+    try:
+        original = decode_photo(file).linear if meta["has_source"] else read_exr(file)
+        source = file.read_bytes() if meta["has_source"] else None
+    except (MaterialistError, OSError) as error:
+        raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
+    return Photo(
+        _exr(folder / "photo.exr", (*shape, 3)),
+        Camera(**meta["camera"]),
+        original,
+        meta["hdr"],
+        meta["fov_source"],
+        meta["path"],
+        source,
+        tuple(meta["warnings"]),
+    )
+
+
+def _read_materials(folder: Path, shape: tuple[int, int]) -> Materials:
+    """Albedo, roughness and metallic of a folder."""
+    return Materials(
+        _exr(folder / "albedo.exr", (*shape, 3)),
+        _exr(folder / "roughness.exr", shape),
+        _exr(folder / "metallic.exr", shape),
+    )
+
+
+def _exr(path: Path, shape: tuple[int, ...] | None) -> Array:
+    """A map of a known shape. Raises SceneError."""
+    try:
+        array = read_exr(path)
+    except MaterialistError as error:
+        raise SceneError(f"The scene package is damaged: {error}") from error
+    if shape is not None and array.shape != shape:
+        raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
+    return array
+
+
+def _read_labels(path: Path, shape: tuple[int, int]) -> Array:
+    """[H, W] int8 plane labels."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            label = (np.asarray(image).astype(np.int16) - 1).astype(np.int8)
+    except (OSError, SyntaxError) as error:
+        raise SceneError(f"{path} cannot be read; the scene package is damaged.") from error
+    if label.shape != shape:
+        raise SceneError(f"{path} is {list(label.shape)}, the scene needs {list(shape)}; the package is damaged.")
+    return label
+
+
+def _read_meta(folder: Path) -> dict[str, Any]:
+    """scene.json, checked for kind and version."""
+    aside = interrupted_replacement(folder)
+    if aside is not None:
+        raise SceneError(
+            f"An interrupted save left {folder} without its scene; get the old one back: mv {aside} {folder}"
+        )
+    if not folder.is_dir():
+        raise SceneError(f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}")
+    meta = _read_json(folder / MARKER)
+    if meta.get("format") != FORMAT:
+        raise SceneError(f"{folder / MARKER} does not describe a scene of this program.")
+    if meta.get("version") != VERSION:
+        raise SceneError(
+            f"{folder} has format version {meta.get('version')}, this program reads version {VERSION}; "
+            "open it with the version that wrote it, or invert the photo again."
+        )
+    return meta
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise SceneError(f"{path} is missing; this is not a whole scene package.") from error
+    except ValueError as error:
+        raise SceneError(f"{path} is damaged ({error}); save the scene again.") from error
+    if not isinstance(content, dict):
+        raise SceneError(f"{path} is damaged (not an object); save the scene again.")
+    return content
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    try:
+        path.write_text(json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n", "utf-8")
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types; NaN and infinity, which JSON lacks, become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int | bool):
+        return value
+    return [_plain(item) for item in value] if isinstance(value, Iterable) else str(value)
+
+
+def _report_to_json(report: FitReport) -> dict[str, Any]:
+    """report.json: the metrics lie flat beside `stages` and `warnings`."""
+    return {**report.metrics, "stages": list(report.stages), "warnings": list(report.warnings)}
+
+
+def _report_from_json(content: dict[str, Any]) -> FitReport:
+    metrics = {k: math.nan if v is None else v for k, v in content.items() if k not in ("stages", "warnings")}
+    return FitReport(tuple(content.get("stages", ())), metrics, tuple(content.get("warnings", ())))

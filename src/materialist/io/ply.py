@@ -1,0 +1,82 @@
+"""The scene's mesh as a binary PLY that ordinary tools open and that comes back bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import OutputError, SceneError
+from materialist.types import Array, Mesh
+
+_VERTEX = np.dtype([(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "s", "t")])
+_FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
+
+_HEADER = """\
+ply
+format binary_little_endian 1.0
+comment materialist scene mesh: camera frame, -Z ahead, +Y up
+comment s = u to the right, t = v DOWN (image rows), pixel centres at ((column + 0.5) / W, (row + 0.5) / H)
+comment pixel = row-major index of the pixel the face carries; plane = -1 depth surface, k continuation of plane k
+element vertex {vertices}
+property float x
+property float y
+property float z
+property float nx
+property float ny
+property float nz
+property float s
+property float t
+element face {faces}
+property list uchar int vertex_indices
+property int pixel
+property short plane
+end_header
+"""
+
+
+def write_ply(path: str | Path, mesh: Mesh) -> None:
+    """Write the mesh; texture coordinate t is Mesh.uv's v unchanged (DOWN), so that it stays exact."""
+    vertices = np.empty(len(mesh.vertices), _VERTEX)
+    columns = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], -1)  # [V, 8]
+    for index, name in enumerate(_VERTEX.names or ()):
+        vertices[name] = columns[:, index]
+    faces = np.empty(len(mesh.faces), _FACE)
+    faces["count"], faces["vertex_indices"] = 3, mesh.faces
+    faces["pixel"], faces["plane"] = mesh.face_pixel, mesh.face_plane
+    header = _HEADER.format(vertices=len(vertices), faces=len(faces)).encode()
+    try:
+        Path(path).write_bytes(header + vertices.tobytes() + faces.tobytes())
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def read_ply(path: str | Path) -> Mesh:
+    """Read a mesh that `write_ply` wrote. Raises SceneError for a missing, damaged or foreign PLY."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SceneError(f"The mesh {path} cannot be read: {error.strerror}.") from error
+    head, mark, body = data.partition(b"end_header\n")
+    counts = [int(line.split()[-1]) for line in head.decode("latin1").splitlines() if line.startswith("element")]
+    if not mark or len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
+        raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
+    split = counts[0] * _VERTEX.itemsize
+    if len(body) != split + counts[1] * _FACE.itemsize:
+        raise SceneError(f"The mesh {path} is truncated; save the scene again.")
+    vertices = np.frombuffer(body[:split], "<f4").reshape(-1, 8)
+    faces = np.frombuffer(body[split:], _FACE)
+    return Mesh(
+        _own(vertices[:, :3]),
+        faces["vertex_indices"].astype(np.int32),
+        _own(vertices[:, 3:6]),
+        _own(vertices[:, 6:]),
+        faces["pixel"].astype(np.int32),
+        faces["plane"].astype(np.int16),
+    )
+
+
+def _own(array: Array) -> Array:
+    """A writable contiguous float32 copy."""
+    return np.array(array, np.float32, order="C")

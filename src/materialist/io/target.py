@@ -1,0 +1,121 @@
+"""Folders that appear whole or not at all: written beside the target, then renamed.
+
+A killed run leaves only `.NAME.HASH.partial-PID` (being written) or `.NAME.HASH.replaced-PID` (the old scene, moved
+aside); both are recognised by name and removed by the next save to the same target, unless their process still runs.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+
+from materialist.errors import OutputError
+
+MARKER = "scene.json"
+"""The file that makes a folder a scene package."""
+
+
+def ensure_writable(path: str | Path, force: bool = False) -> None:
+    """Check that a scene can be written at PATH; call it before the fit. Raises OutputError with the way out.
+
+    PATH must not exist, or with `force` be a scene package or an empty folder: nothing else is ever replaced.
+    """
+    target = _absolute(path)
+    probe = _sibling(target, "probe")
+    try:
+        if target.is_symlink() or target.exists():
+            _require_replaceable(path, target, force)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        probe.mkdir()
+        probe.rmdir()
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {_reason(error)}.") from error
+
+
+@contextmanager
+def whole_folder(path: str | Path, force: bool = False) -> Iterator[Path]:
+    """Yield an empty temporary folder that becomes PATH when the block ends well, and vanishes when it does not."""
+    ensure_writable(path, force)
+    target = _absolute(path)
+    _sweep(target)
+    temporary = _sibling(target, "partial")
+    try:
+        temporary.mkdir()
+        yield temporary
+        _put_in_place(temporary, target)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {_reason(error)}.") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _require_replaceable(path: str | Path, target: Path, force: bool) -> None:
+    """Refuse an existing target without `force`, and anything but a scene package or an empty folder with it."""
+    if not force:
+        raise OutputError(f"{path} exists; give --force to replace it, or another name.")
+    if target.is_symlink() or not target.is_dir() or (any(target.iterdir()) and not (target / MARKER).is_file()):
+        raise OutputError(f"{path} is not a scene package, so --force will not replace it; give another name.")
+
+
+def interrupted_replacement(path: str | Path) -> Path | None:
+    """The old scene that a save killed at the worst moment left beside a PATH that is now missing, or None."""
+    target = _absolute(path)
+    if target.exists() or not target.parent.is_dir():
+        return None
+    return next((p for p in sorted(target.parent.iterdir()) if p.name.startswith(_stem(target) + "replaced-")), None)
+
+
+def _put_in_place(temporary: Path, target: Path) -> None:
+    """Rename into place; an old scene is moved aside first, and removed only when the new one is there."""
+    if not target.exists():
+        os.rename(temporary, target)
+        return
+    aside = _sibling(target, "replaced")
+    os.rename(target, aside)
+    try:
+        os.rename(temporary, target)
+    except BaseException:
+        os.rename(aside, target)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed runs left; an old scene moved aside goes back when nothing has taken its place."""
+    for leftover in sorted(target.parent.iterdir()):
+        kind, _, process = leftover.name.removeprefix(_stem(target)).partition("-")
+        if not leftover.name.startswith(_stem(target)) or not process.isdigit():
+            continue
+        if psutil.pid_exists(int(process)) and int(process) != os.getpid():
+            continue
+        if kind == "replaced" and not target.exists():
+            os.rename(leftover, target)
+        else:
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _stem(target: Path) -> str:
+    """Prefix of the temporaries of this target; short, so that a long name stays legal, and told apart by a hash."""
+    return f".{target.name[:40]}.{zlib.crc32(os.fsencode(target.name)):08x}."
+
+
+def _sibling(target: Path, kind: str) -> Path:
+    return target.with_name(f"{_stem(target)}{kind}-{os.getpid()}")
+
+
+def _absolute(path: str | Path) -> Path:
+    """PATH made absolute without following a link at its end; never the file-system root."""
+    target = Path(os.path.abspath(path))
+    if not target.name:
+        raise OutputError(f"{path} is not a place for a scene; give a folder name such as kitchen.scene.")
+    return target
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
