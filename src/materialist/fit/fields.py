@@ -1,0 +1,177 @@
+"""What the optimiser moves: fields for the environment map and for the materials.
+
+The paper's are MLPs on sinusoidal encodings; texels, spherical harmonics, direct maps and a small U-Net are its
+ablations. A field is a torch module; calling it gives the map or the materials.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from materialist.transport.environment import texel_directions
+
+
+def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:
+    """gamma(x): sin and cos of 2^k pi x for k = 0 .. bands-1; [..., C] -> [..., 2 * bands * C]."""
+    angles = torch.cat([(2.0**k) * math.pi * x for k in range(bands)], -1)
+    return torch.cat([angles.sin(), angles.cos()], -1)
+
+
+def mlp(inputs: int, outputs: int, *, width: int, layers: int) -> nn.Sequential:
+    """Fully connected network with `layers` hidden ReLU layers of `width`."""
+    sizes = [inputs] + [width] * layers
+    hidden = [m for a, b in zip(sizes, sizes[1:]) for m in (nn.Linear(a, b), nn.ReLU())]
+    return nn.Sequential(*hidden, nn.Linear(width, outputs))
+
+
+class EnvmapMLP(nn.Module):
+    """E(u, v) = Softplus(MLP_env(gamma(d))), d the unit direction (paper, Environment Map Optimization).
+
+    With `coordinates="uv"` the encoding is of (u, v) instead: the paper's ablation of coordinate systems.
+    """
+
+    def __init__(self, *, coordinates: str = "direction", bands: int = 4, width: int = 128, layers: int = 3):
+        super().__init__()
+        self.coordinates, self.bands = coordinates, bands
+        self.net = mlp(2 * bands * (3 if coordinates == "direction" else 2), 3, width=width, layers=layers)
+
+    def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
+        """Radiance [h, 2h, 3] at texel centres, or at random points of the texels when a generator is given."""
+        offset = torch.rand(2, generator=jitter) - 0.5 if jitter is not None else torch.zeros(2)
+        v = (torch.arange(height) + 0.5 + offset[0])[:, None] / height
+        u = (torch.arange(2 * height) + 0.5 + offset[1])[None, :] / (2 * height)
+        u, v = torch.broadcast_tensors(u, v)
+        if self.coordinates == "uv":
+            x = torch.stack([u, v], -1)
+        else:
+            theta, phi = math.pi * v, 2 * math.pi * (u - 0.5)
+            x = torch.stack([theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()], -1)
+        return functional.softplus(self.net(positional_encoding(x, self.bands)))
+
+
+class EnvmapTexels(nn.Module):
+    """exp of one parameter per texel and channel: positive, and equally easy to move over decades of radiance."""
+
+    def __init__(self, initial: torch.Tensor):
+        super().__init__()
+        self.log = nn.Parameter(initial.clamp_min(1e-6).log())
+
+    def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
+        """Radiance [h, 2h, 3], resampled bilinearly when `height` is not the field's own."""
+        return resize_envmap(self.log.exp(), height)
+
+
+class EnvmapSH(nn.Module):
+    """Softplus of real spherical harmonics up to `degree` (the paper's appendix compares degree 3)."""
+
+    def __init__(self, degree: int = 3):
+        super().__init__()
+        self.degree = degree
+        self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
+
+    def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
+        from materialist.metrics import sh_basis
+
+        basis = torch.as_tensor(sh_basis(texel_directions(height, 2 * height), self.degree), dtype=torch.float32)
+        return functional.softplus(basis @ self.coefficients)
+
+
+def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
+    """[h, 2h, 3] -> [height, 2 height, 3]: area average when shrinking, bilinear (azimuth wrapped) when enlarging."""
+    h = envmap.shape[0]
+    if h == height:
+        return envmap
+    image = envmap.permute(2, 0, 1)[None]
+    if height < h:
+        return functional.interpolate(image, (height, 2 * height), mode="area")[0].permute(1, 2, 0)
+    pad = 1
+    image = functional.pad(functional.pad(image, (pad, pad, 0, 0), mode="circular"), (0, 0, pad, pad), mode="replicate")
+    scale = height // h if height % h == 0 else height / h
+    size = (round((h + 2 * pad) * scale), round((2 * h + 2 * pad) * scale))
+    image = functional.interpolate(image, size, mode="bilinear")
+    top, left = round(pad * scale), round(pad * scale)
+    return image[0, :, top : top + height, left : left + 2 * height].permute(1, 2, 0)
+
+
+class MaterialMLP(nn.Module):
+    """m_p + zeta * tanh(MLP_mat(gamma(m_p))) with learnable zeta (paper, Material Properties Optimization)."""
+
+    def __init__(self, prior: torch.Tensor, *, bands: int = 6, width: int = 128, layers: int = 3, zeta: float = 0.3):
+        """prior: [P, 5] albedo, roughness, metallic."""
+        super().__init__()
+        self.register_buffer("prior", prior)
+        self.register_buffer("code", positional_encoding(prior, bands))
+        self.net = mlp(10 * bands, 5, width=width, layers=layers)
+        nn.init.zeros_(self.net[-1].weight)
+        nn.init.zeros_(self.net[-1].bias)
+        self.zeta = nn.Parameter(torch.tensor(zeta))
+
+    def forward(self) -> torch.Tensor:
+        return (self.prior + self.zeta * torch.tanh(self.net(self.code))).clamp(0, 1)
+
+
+class MaterialMaps(nn.Module):
+    """The maps themselves as parameters ("w/o Network" in the paper)."""
+
+    def __init__(self, prior: torch.Tensor):
+        super().__init__()
+        self.maps = nn.Parameter(prior.clone())
+
+    def forward(self) -> torch.Tensor:
+        return self.maps.clamp(0, 1)
+
+
+class MaterialUNet(nn.Module):
+    """Residual by a U-Net with two down- and two upsampling blocks of two 3x3 convolutions (paper's ablation)."""
+
+    def __init__(self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int, *, channels: int = 32):
+        super().__init__()
+        grid = torch.zeros(height * width, 5)
+        grid[pixels] = prior
+        pad_h, pad_w = -height % 4, -width % 4
+        image = grid.view(1, height, width, 5).permute(0, 3, 1, 2)
+        self.size, self.pixels = (height, width), pixels
+        self.register_buffer("image", functional.pad(image, (0, pad_w, 0, pad_h), mode="replicate"))
+        self.register_buffer("prior", prior)
+        c = channels
+        self.down1, self.down2 = _double_conv(5, c), _double_conv(c, 2 * c)
+        self.middle = _double_conv(2 * c, 2 * c)
+        self.up2, self.up1 = _double_conv(4 * c, c), _double_conv(2 * c, c)
+        self.head = nn.Conv2d(c, 5, 1)
+        nn.init.zeros_(self.head.weight)
+        nn.init.zeros_(self.head.bias)
+        self.zeta = nn.Parameter(torch.tensor(0.3))
+
+    def forward(self) -> torch.Tensor:
+        a = self.down1(self.image)
+        b = self.down2(functional.max_pool2d(a, 2))
+        m = self.middle(functional.max_pool2d(b, 2))
+        u = self.up2(torch.cat([functional.interpolate(m, scale_factor=2.0), b], 1))
+        u = self.up1(torch.cat([functional.interpolate(u, scale_factor=2.0), a], 1))
+        delta = self.head(u)[0, :, : self.size[0], : self.size[1]].reshape(5, -1).T[self.pixels]
+        return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)
+
+
+def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, 3, padding=1), nn.ReLU(), nn.Conv2d(outputs, outputs, 3, padding=1), nn.ReLU()
+    )
+
+
+class Unified(nn.Module):
+    """Mask mode: roughness and metallic take one value, their mean, inside a mask (paper, Material Editing Settings)."""
+
+    def __init__(self, field: nn.Module, inside: torch.Tensor):
+        """inside: [P] bool."""
+        super().__init__()
+        self.field, self.inside = field, inside
+
+    def forward(self) -> torch.Tensor:
+        maps = self.field()
+        mean = maps[self.inside, 3:].mean(0)
+        unified = torch.where(self.inside[:, None], mean, maps[:, 3:])
+        return torch.cat([maps[:, :3], unified], 1)

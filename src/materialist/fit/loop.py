@@ -1,0 +1,88 @@
+"""The one optimisation loop: Adam, a step-wise falling learning rate, early stopping, progress."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import torch
+
+Progress = Callable[[str, int, int], None]
+"""Called as progress(stage, done, total)."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Optimiser settings; the defaults are the paper's for the environment map (Hyperparameters and Timing)."""
+
+    learning_rate: float = 1e-3
+    max_steps: int = 500
+    decay_every: int = 100
+    decay: float = 0.8
+    patience: int = 100
+    """Stop when the loss improved by less than `min_improvement` (a fraction) over this many steps; 0: never."""
+    min_improvement: float = 0.01
+
+
+@dataclass(frozen=True)
+class StageResult:
+    """What one stage did."""
+
+    name: str
+    steps: int
+    seconds: float
+    losses: tuple[float, ...] = field(repr=False)
+
+    def summary(self) -> dict:
+        """Entry of report.json: steps, seconds, and the losses at up to 50 steps."""
+        stride = max(1, len(self.losses) // 50)
+        return {
+            "name": self.name,
+            "steps": self.steps,
+            "seconds": round(self.seconds, 3),
+            "loss_first": self.losses[0] if self.losses else None,
+            "loss_last": self.losses[-1] if self.losses else None,
+            "loss_curve": [round(v, 6) for v in self.losses[::stride]],
+        }
+
+
+def optimise(
+    name: str,
+    parameters: Iterable,
+    loss: Callable[[int], torch.Tensor],
+    schedule: Schedule,
+    *,
+    after_step: Callable[[], None] | None = None,
+    progress: Progress | None = None,
+) -> StageResult:
+    """Minimise `loss(step)` over `parameters` (tensors, or Adam parameter groups) in place.
+
+    The loss that counts for early stopping is the best of each window of `patience` steps.
+    """
+    optimiser = torch.optim.Adam(parameters, lr=schedule.learning_rate)
+    scheduler = torch.optim.lr_scheduler.StepLR(optimiser, schedule.decay_every, schedule.decay)
+    start, losses = time.perf_counter(), []
+    for step in range(schedule.max_steps):
+        optimiser.zero_grad(set_to_none=True)
+        value = loss(step)
+        value.backward()
+        optimiser.step()
+        scheduler.step()
+        if after_step is not None:
+            with torch.no_grad():
+                after_step()
+        losses.append(value.item())
+        if progress is not None:
+            progress(name, step + 1, schedule.max_steps)
+        if _stalled(losses, schedule):
+            break
+    return StageResult(name, len(losses), time.perf_counter() - start, tuple(losses))
+
+
+def _stalled(losses: list[float], schedule: Schedule) -> bool:
+    n = schedule.patience
+    if n == 0 or len(losses) <= n or len(losses) % 10:
+        return False
+    before, recent = min(losses[:-n]), min(losses[-n:])
+    return recent > before * (1 - schedule.min_improvement)

@@ -1,0 +1,48 @@
+"""Losses of the fit; torch tensors, any shape that broadcasts."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+
+CLIPPED = 0.99
+"""Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
+
+Encoding = Literal["linear", "srgb", "log1p"]
+
+
+def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
+    """Radiance as the loss sees it: `linear` (the paper), `srgb` (as an eye sees the photo), `log1p` (HDR appendix)."""
+    if encoding == "linear":
+        return radiance
+    x = radiance.clamp_min(0)
+    if encoding == "log1p":
+        return torch.log1p(x)
+    return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def residual(radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool) -> torch.Tensor:
+    """Encoded rendering minus encoded photo; with `clipped`, a rendering brighter than a clipped channel is no error."""
+    error = encode(radiance, encoding) - encode(photo, encoding)
+    return torch.where(photo >= CLIPPED, error.clamp_max(0), error) if clipped else error
+
+
+def l1_l2(error: torch.Tensor) -> torch.Tensor:
+    """L_re = L_1 + L_2 (paper, Progressive Differentiable Rendering)."""
+    return error.abs().mean() + error.square().mean()
+
+
+def consistency(materials, prior, weights=(1.0, 1.0, 1.0)) -> torch.Tensor:
+    """L_cons: weighted sum over albedo, roughness, metallic of the mean L1 distance to the prior."""
+    return sum(w * (x - p).abs().mean() for x, p, w in zip(materials, prior, weights, strict=True))
+
+
+def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
+    """Mean absolute difference of neighbouring texels of a log-radiance map [h, w, 3], wrapped in azimuth."""
+    return (log_map[1:] - log_map[:-1]).abs().mean() + (log_map - log_map.roll(1, 1)).abs().mean()
+
+
+def log_chroma(log_map: torch.Tensor) -> torch.Tensor:
+    """Mean absolute deviation of log radiance [..., 3] from grey: most lights are nearly white."""
+    return (log_map - log_map.mean(-1, keepdim=True)).abs().mean()

@@ -1,0 +1,263 @@
+"""The transport cache: rays are traced once, then every light is one gather and every material one shading call.
+
+Per pixel, `diffuse_samples` cosine-weighted directions and `specular_samples` visible-normal directions at each of
+ROUGHNESS_LEVELS are traced against the mesh. What is kept of a ray is one integer: MISS, or the radiance slot of the
+face it hit. Directions are regenerated from their index, so that a gather is pure memory traffic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import torch
+
+from materialist.transport.environment import EnvmapPyramid
+from materialist.transport.sampling import (
+    MIN_ALPHA,
+    cosine_direction,
+    diffuse_polynomial,
+    pixel_shift,
+    point,
+    schlick,
+    smith_g1,
+    visible_normal,
+)
+from materialist.types import Array, Camera, Geometry, Mesh
+
+ROUGHNESS_LEVELS = (0.04, 0.12, 0.2, 0.3, 0.42, 0.56, 0.75, 1.0)
+"""Perceptual roughness at which the specular lobe is tabulated; between them it is interpolated linearly."""
+
+MISS = 0xFFFFFFFF
+_OFF_DIAGONAL = (0.13, 0.05)
+"""Where in a pixel the primary ray passes, from the centre: not through the edge between its two triangles."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What a material step needs of light and geometry, for P surface pixels; torch float32, on the CPU."""
+
+    diffuse: torch.Tensor
+    """[P, 9]: D0, D1, D2 (RGB each); diffuse radiance is A (1 - M) (D0 + D1 R + D2 R^2)."""
+    specular: torch.Tensor
+    """[L, P, 6]: S0, S1 (RGB each) per roughness level; specular radiance is C0 S0(R) + S1(R)."""
+
+
+def build_scene(mesh: Mesh) -> mi.Scene:
+    """A Mitsuba scene of the whole mesh as one shape: prim_index is the face index."""
+    shape = mi.Mesh("surface", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True)
+    params = mi.traverse(shape)
+    params["vertex_positions"] = mi.Float(mesh.vertices.ravel())
+    params["vertex_normals"] = mi.Float(mesh.normals.ravel())
+    params["faces"] = mi.UInt32(mesh.faces.ravel().astype(np.uint32))
+    params.update()
+    return mi.load_dict({"type": "scene", "surface": shape})
+
+
+class TransportCache:
+    """Traced visibility of one camera and mesh.
+
+    Args:
+        geometry: the mesh; its faces carry the pixel whose radiance a ray that hits them sees.
+        camera: pinhole camera of the photograph.
+        diffuse_samples, specular_samples: rays a pixel, for the diffuse lobe and for each roughness level.
+        seed: of the point sets; equal seeds give equal caches.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        camera: Camera,
+        *,
+        diffuse_samples: int = 64,
+        specular_samples: int = 16,
+        seed: int = 0,
+        progress=None,
+    ):
+        self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
+        self.diffuse_samples, self.specular_samples = diffuse_samples, specular_samples
+        self.scene = build_scene(geometry.mesh)
+        self.slots = _radiance_slots(geometry.mesh, camera)
+        self._slots = mi.UInt32(self.slots)
+        self._primary()
+        self._hits: list[mi.UInt32] = []
+        for k in range(len(ROUGHNESS_LEVELS) + 1):
+            self._hits.append(self._trace(k))
+            if progress is not None:
+                progress("trace", k + 1, len(ROUGHNESS_LEVELS) + 1)
+
+    # -- primary visibility ------------------------------------------------------------------------------------------
+
+    def _primary(self) -> None:
+        cam = self.camera
+        index = dr.arange(mi.UInt32, cam.width * cam.height)
+        row, col = index // cam.width, index % cam.width
+        d = mi.Vector3f(
+            (mi.Float(col) + 0.5 + _OFF_DIAGONAL[0] - cam.width / 2) / cam.focal,
+            -(mi.Float(row) + 0.5 + _OFF_DIAGONAL[1] - cam.height / 2) / cam.focal,
+            -1,
+        )
+        d = dr.normalize(d)
+        si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
+        pixels = dr.compress(si.is_valid())
+        self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
+        take = lambda v: dr.gather(type(v), v, pixels)  # noqa: E731
+        self.position, self.geometric_normal = take(si.p), take(si.n)
+        normal, view = take(si.sh_frame.n), -take(d)
+        self.normal = _towards(normal, view)
+        self.frame = mi.Frame3f(self.normal)
+        self.wo = self.frame.to_local(view)
+        shift = pixel_shift(cam.height, cam.width, self.seed).reshape(-1, 2)[self.pixels]
+        self.shift = mi.Point2f(np.ascontiguousarray(shift.T))
+        dr.eval(self.position, self.geometric_normal, self.normal, self.frame, self.wo, self.shift)
+
+    # -- directions ----------------------------------------------------------------------------------------------------
+
+    def _count(self, k: int) -> int:
+        return self.diffuse_samples if k == 0 else self.specular_samples
+
+    def _alpha(self, k: int) -> float:
+        return 1.0 if k == 0 else max(ROUGHNESS_LEVELS[k - 1] ** 2, MIN_ALPHA)
+
+    # -- tracing -------------------------------------------------------------------------------------------------------
+
+    def _trace(self, k: int) -> mi.UInt32:
+        """Hits of lobe `k` (0 diffuse, else roughness level k-1): [N * P] radiance slots, sample-major."""
+        count, width = self._count(k), len(self.pixels)
+        hits = dr.empty(mi.UInt32, count * width)
+        _trace_loop(
+            self.scene, self._slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
+            self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, self._alpha(k)), k == 0,
+        )  # fmt: skip
+        dr.eval(hits)
+        return hits
+
+    # -- gathering -----------------------------------------------------------------------------------------------------
+
+    def gather(self, envmap: Array, radiance: Array | None) -> Tables:
+        """Tables for one light.
+
+        Args:
+            envmap: [h, 2h, 3] linear radiance.
+            radiance: [H, W, 3] linear radiance that leaves the surface seen by each pixel (for indirect light),
+                or None for direct light alone.
+        """
+        pyramid = EnvmapPyramid(envmap)
+        slots = mi.Float(self.slot_radiance(radiance).ravel())
+        width = len(self.pixels)
+        out = []
+        for k in range(len(ROUGHNESS_LEVELS) + 1):
+            count, alpha = self._count(k), self._alpha(k)
+            env = pyramid.level(np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
+            args = (
+                self._hits[k], slots, env, dr.arange(mi.UInt32, width), self.frame, self.wo, self.shift,
+                dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha),
+            )  # fmt: skip
+            sums = _gather_diffuse(*args) if k == 0 else _gather_specular(*args)
+            dr.eval(*sums)
+            out.append(torch.cat([s.torch().T for s in sums], -1) / count)
+        return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
+
+    def slot_radiance(self, radiance: Array | None) -> Array:
+        """[S, 3] radiance per slot: one a pixel, then one a face of the continued planes."""
+        size = self.camera.width * self.camera.height
+        planes = self.mesh.face_pixel[self.mesh.face_plane >= 0]
+        if radiance is None:
+            return np.zeros((size + len(planes), 3), np.float32)
+        flat = np.asarray(radiance, np.float32).reshape(size, 3)
+        return np.concatenate([flat, flat[planes]])
+
+    # -- images --------------------------------------------------------------------------------------------------------
+
+    def image(self, values, fill: float = 0.0) -> Array:
+        """[H, W, C] image of per-surface-pixel values [P, C]."""
+        values = np.asarray(values, np.float32)
+        out = np.full((self.camera.height * self.camera.width, values.shape[1]), fill, np.float32)
+        out[self.pixels] = values
+        return out.reshape(self.camera.height, self.camera.width, -1)
+
+
+def _radiance_slots(mesh: Mesh, camera: Camera) -> Array:
+    """[F] uint32 radiance slot of every face: its pixel, or one of its own on a continued plane."""
+    slots = mesh.face_pixel.astype(np.uint32).copy()
+    on_plane = mesh.face_plane >= 0
+    slots[on_plane] = camera.width * camera.height + np.arange(on_plane.sum(), dtype=np.uint32)
+    return slots
+
+
+def _towards(normal, view):
+    """The shading normal, bent just enough that the viewer is above its horizon."""
+    cos = dr.dot(normal, view)
+    lifted = dr.normalize(normal + (0.02 - cos) * view)
+    return dr.select(cos < 0.02, lifted, normal)
+
+
+def spawn(position, geometric_normal, direction):
+    """Ray that leaves a surface, offset as the path tracer offsets it."""
+    magnitude = (1 + dr.max(dr.abs(position))) * mi.math.RayEpsilon
+    sign = dr.mulsign(mi.Float(1), dr.dot(geometric_normal, direction))
+    return mi.Ray3f(dr.fma(magnitude * sign, geometric_normal, position), direction)
+
+
+def _direction(diffuse: bool, wo, alpha, sample):
+    if diffuse:
+        return cosine_direction(sample)
+    return mi.reflect(wo, visible_normal(wo, alpha, sample))
+
+
+@dr.syntax
+def _trace_loop(scene, slots, hits, lane, position, ng, frame, wo, shift, count, alpha, diffuse: bool):
+    i = dr.zeros(mi.UInt32, dr.width(lane))
+    width = dr.opaque(mi.UInt32, dr.width(lane))
+    while i < count:
+        wi = _direction(diffuse, wo, alpha, point(i, count, shift))
+        above = wi.z > 0
+        ray = spawn(position, ng, frame.to_world(wi))
+        pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
+        slot = dr.gather(mi.UInt32, slots, pi.prim_index, pi.is_valid())
+        dr.scatter(hits, dr.select(pi.is_valid(), slot, mi.UInt32(MISS)), i * width + lane)
+        i += 1
+
+
+def _incoming(hits, slots, env, index, direction, above):
+    slot = dr.gather(mi.UInt32, hits, index)
+    miss = slot == MISS
+    sky = env.lookup(direction, above & miss)
+    surface = dr.gather(mi.Color3f, slots, slot, above & ~miss)
+    return dr.select(above, dr.select(miss, sky, surface), mi.Color3f(0))
+
+
+@dr.syntax
+def _gather_diffuse(hits, slots, env, lane, frame, wo, shift, count, alpha):
+    width = dr.opaque(mi.UInt32, dr.width(lane))
+    i = dr.zeros(mi.UInt32, dr.width(lane))
+    d0, d1, d2 = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
+    while i < count:
+        wi = cosine_direction(point(i, count, shift))
+        h = dr.normalize(wi + wo)
+        light = _incoming(hits, slots, env, i * width + lane, frame.to_world(wi), wi.z > 0)
+        c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(h, wi))
+        d0 += c0 * light
+        d1 += c1 * light
+        d2 += c2 * light
+        i += 1
+    return d0, d1, d2
+
+
+@dr.syntax
+def _gather_specular(hits, slots, env, lane, frame, wo, shift, count, alpha):
+    width = dr.opaque(mi.UInt32, dr.width(lane))
+    i = dr.zeros(mi.UInt32, dr.width(lane))
+    s0, s1 = mi.Color3f(0), mi.Color3f(0)
+    while i < count:
+        h = visible_normal(wo, alpha, point(i, count, shift))
+        wi = mi.reflect(wo, h)
+        light = _incoming(hits, slots, env, i * width + lane, frame.to_world(wi), wi.z > 0)
+        fresnel = schlick(dr.dot(h, wo))
+        weighted = light * smith_g1(wi.z, alpha)
+        s0 += (1 - fresnel) * weighted
+        s1 += fresnel * weighted
+        i += 1
+    return s0, s1

@@ -1,0 +1,60 @@
+"""Joint filtering of the transport tables: neighbours on one surface share their samples.
+
+Each pixel of a TILE x TILE block holds another part of one point set, so that a box of that size, restricted to the
+same surface by normal and plane distance, has all of it. Radius and normal tolerance follow the lobe: mirror-like
+levels keep their detail.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+
+_TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
+"""5-tap box of width TILE."""
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Surface of each pixel of the image grid; torch float32."""
+
+    position: torch.Tensor
+    """[H, W, 3] camera frame."""
+    normal: torch.Tensor
+    """[H, W, 3] unit shading normal; zero where there is no surface."""
+    scale: torch.Tensor
+    """[H, W] size of a pixel on the surface, scene units."""
+
+
+def guide_weights(guide: Guide, dy: int, dx: int, sharpness: float) -> torch.Tensor:
+    """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
+    normal, position = _shifted(guide.normal, dy, dx), _shifted(guide.position, dy, dx)
+    cosine = (guide.normal * normal).sum(-1).clamp(0, 1)
+    away = (guide.normal * (position - guide.position)).sum(-1).abs() / (guide.scale * (1 + dy * dy + dx * dx) ** 0.5)
+    return cosine.pow(sharpness) * torch.exp(-0.5 * away * away)
+
+
+def joint_filter(values: torch.Tensor, guide: Guide, *, sharpness: float = 32.0, step: int = 1) -> torch.Tensor:
+    """Average `values` [H, W, C] over 5 x 5 neighbours `step` pixels apart that lie on the same surface."""
+    total = torch.zeros_like(values)
+    norm = torch.zeros_like(guide.scale)
+    for i, wy in enumerate(_TAPS):
+        for j, wx in enumerate(_TAPS):
+            dy, dx = (i - 2) * step, (j - 2) * step
+            weight = wy * wx * guide_weights(guide, dy, dx, sharpness)
+            total.addcmul_(_shifted(values, dy, dx), weight[..., None])
+            norm += weight
+    return total / norm.clamp_min(1e-6)[..., None]
+
+
+def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
+    """`image` [H, W, ...] with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
+    out = torch.zeros_like(image)
+    h, w = image.shape[:2]
+    if abs(dy) >= h or abs(dx) >= w:
+        return out
+    ys, xs = slice(max(0, -dy), min(h, h - dy)), slice(max(0, -dx), min(w, w - dx))
+    yd, xd = slice(max(0, dy), min(h, h + dy)), slice(max(0, dx), min(w, w + dx))
+    out[ys, xs] = image[yd, xd]
+    return out

@@ -1,0 +1,159 @@
+"""Light is linear: with materials fixed, the radiance of a pixel is `T E + b`, for an envmap E of few texels.
+
+T is stored for a subset of pixels at the resolution of the fit; b is what arrives from other surfaces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import torch
+
+from materialist.transport.cache import MISS, TransportCache, spawn
+from materialist.transport.sampling import (
+    MIN_ALPHA,
+    cosine_direction,
+    diffuse_polynomial,
+    point,
+    schlick,
+    smith_g1,
+    visible_normal,
+)
+from materialist.types import Array, Materials
+
+DIELECTRIC_R0 = 0.04
+"""Fresnel reflectance R_0 of a dielectric with IOR 1.5 at normal incidence."""
+
+
+@dataclass(frozen=True)
+class LightMatrix:
+    """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; torch float32."""
+
+    pixels: torch.Tensor
+    """[Q] int64 row-major pixel indices."""
+    shape: tuple[int, int]
+    """(h, 2h) of the envmap that `direct` multiplies."""
+    diffuse: torch.Tensor
+    """[Q, h * 2h] direct transport of the diffuse lobe, without A (1 - M)."""
+    fresnel0: torch.Tensor
+    """[Q, h * 2h] direct transport of the part of the specular lobe that C0 multiplies."""
+    fresnel1: torch.Tensor
+    """[Q, h * 2h] direct transport of the rest of the specular lobe."""
+    hit_index: torch.Tensor
+    """[3, K] int64: rows of non-misses (row, slot) and lobe, see `indirect`."""
+    hit_weight: torch.Tensor
+    """[K, 3] weight of each hit in the diffuse lobe, fresnel0 and fresnel1."""
+    base: torch.Tensor
+    """[Q, 3] A (1 - M)."""
+    c0: torch.Tensor
+    """[Q, 3] C_0 of Schlick's approximation."""
+
+    def direct(self, envmap: torch.Tensor) -> torch.Tensor:
+        """[Q, 3] direct radiance under `envmap` [h * 2h, 3]; differentiable in it."""
+        return self.base * (self.diffuse @ envmap) + self.c0 * (self.fresnel0 @ envmap) + self.fresnel1 @ envmap
+
+    def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
+        """[Q, 3] radiance by way of other surfaces, given what leaves each slot [S, 3]."""
+        light = slot_radiance[self.hit_index[1]]
+        sums = torch.zeros(3, len(self.pixels), 3)
+        for lobe in range(3):
+            sums[lobe].index_add_(0, self.hit_index[0], light * self.hit_weight[:, lobe : lobe + 1])
+        return self.base * sums[0] + self.c0 * sums[1] + sums[2]
+
+
+def light_matrix(
+    cache: TransportCache,
+    materials: Materials,
+    rows: Array,
+    height: int,
+    *,
+    diffuse_samples: int = 256,
+    specular_samples: int = 64,
+) -> LightMatrix:
+    """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows."""
+    pixels = cache.pixels[rows]
+    rough = materials.roughness.reshape(-1)[pixels]
+    albedo, metallic = materials.albedo.reshape(-1, 3)[pixels], materials.metallic.reshape(-1, 1)[pixels]
+    shape = (height, 2 * height)
+    matrices, hits = [], []
+    for diffuse in (True, False):
+        count = diffuse_samples if diffuse else specular_samples
+        direction, slot, weights = _samples(cache, rows, rough, count, diffuse)
+        row = np.tile(np.arange(len(rows)), count)
+        matrices += [_scatter(direction, slot, w, row, len(rows), shape) for w in weights]
+        hits.append(_hits(slot, weights, row, diffuse))
+    index = np.concatenate([h[0] for h in hits], 1)
+    weight = np.concatenate([h[1] for h in hits])
+    return LightMatrix(
+        torch.from_numpy(pixels.astype(np.int64)), shape, *matrices,
+        torch.from_numpy(index), torch.from_numpy(weight),
+        torch.from_numpy((albedo * (1 - metallic)).astype(np.float32)),
+        torch.from_numpy((DIELECTRIC_R0 * (1 - metallic) + metallic * albedo).astype(np.float32)),
+    )  # fmt: skip
+
+
+def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool):
+    """Directions [N, 3], slots [N] and lobe weights (each [N]) of `count` samples of each row, sample-major."""
+    q = len(rows)
+    lane = dr.arange(mi.UInt32, q * count)
+    source = dr.gather(mi.UInt32, mi.UInt32(rows.astype(np.uint32)), lane % q)
+    take = lambda v: dr.gather(type(v), v, source)  # noqa: E731
+    wo, frame, shift = take(cache.wo), mi.Frame3f(take(cache.normal)), take(cache.shift)
+    sample = point(lane // q, dr.opaque(mi.UInt32, count), shift)
+    alpha = dr.gather(mi.Float, mi.Float(np.maximum(rough**2, MIN_ALPHA).astype(np.float32)), lane % q)
+    if diffuse:
+        wi = cosine_direction(sample)
+        c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(dr.normalize(wi + wo), wi))
+        r = dr.gather(mi.Float, mi.Float(rough.astype(np.float32)), lane % q)
+        weights = [c0 + r * (c1 + r * c2)]
+    else:
+        h = visible_normal(wo, alpha, sample)
+        wi = mi.reflect(wo, h)
+        fresnel, g1 = schlick(dr.dot(h, wo)), smith_g1(wi.z, alpha)
+        weights = [(1 - fresnel) * g1, fresnel * g1]
+    above = wi.z > 0
+    world = frame.to_world(wi)
+    pi = cache.scene.ray_intersect_preliminary(
+        spawn(take(cache.position), take(cache.geometric_normal), world), coherent=False, active=above
+    )
+    slot = dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), mi.UInt32(MISS))
+    weights = [dr.select(above, w / count, 0) for w in weights]
+    dr.eval(world, slot, *weights)
+    return np.array(world).T, np.array(slot), [np.array(w) for w in weights]
+
+
+def _scatter(direction, slot, weight, row, rows: int, shape: tuple[int, int]) -> torch.Tensor:
+    """Bilinear footprints of the rays that leave the scene, added up: [rows, h * w]."""
+    free = (slot == MISS) & (weight > 0)
+    index, share = bilinear(direction[free], shape)
+    flat = row[free][:, None] * (shape[0] * shape[1]) + index
+    values = (share * weight[free][:, None]).astype(np.float32)
+    out = torch.zeros(rows * shape[0] * shape[1])
+    out.index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
+    return out.view(rows, -1)
+
+
+def _hits(slot, weights, row, diffuse: bool):
+    hit = (slot != MISS) & (weights[0] > 0)
+    columns = np.zeros((hit.sum(), 3), np.float32)
+    if diffuse:
+        columns[:, 0] = weights[0][hit]
+    else:
+        columns[:, 1], columns[:, 2] = weights[0][hit], weights[1][hit]
+    return np.stack([row[hit], slot[hit].astype(np.int64)]), columns
+
+
+def bilinear(direction: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
+    """The four texels ([N, 4] flat index) around unit directions [N, 3] in an [h, w] map, and their shares [N, 4]."""
+    h, w = shape
+    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * w - 0.5
+    y = np.clip(np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * h - 0.5, 0, h - 1)
+    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    fx, fy = x - x0, y - y0
+    xs, ys = np.stack([x0 % w, (x0 + 1) % w], -1), np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
+    index = ys[:, [0, 0, 1, 1]] * w + xs[:, [0, 1, 0, 1]]
+    share = np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx], -1)
+    return index, share

@@ -1,0 +1,38 @@
+"""Shading from the transport tables: one call gives the radiance of every pixel, with gradients, without noise."""
+
+from __future__ import annotations
+
+import torch
+
+from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
+from materialist.transport.light import DIELECTRIC_R0
+
+
+def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
+    """Outgoing radiance of P surface pixels by the paper's simplified Disney BRDF (Preliminary).
+
+    Args:
+        tables: light transport at these pixels.
+        albedo: [P, 3] in [0, 1]; roughness: [P] perceptual; metallic: [P].
+
+    Returns:
+        [P, 3] linear radiance, differentiable in the materials:
+        A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
+    """
+    r, m = roughness[:, None], metallic[:, None]
+    d0, d1, d2 = tables.diffuse.split(3, -1)
+    diffuse = albedo * (1 - m) * (d0 + r * (d1 + r * d2))
+    s0, s1 = specular_at(tables, roughness).split(3, -1)
+    return diffuse + (DIELECTRIC_R0 * (1 - m) + m * albedo) * s0 + s1
+
+
+def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
+    """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P]."""
+    levels = roughness.new_tensor(ROUGHNESS_LEVELS)
+    r = roughness.clamp(levels[0], levels[-1])
+    low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
+    t = ((r - levels[low]) / (levels[low + 1] - levels[low]))[:, None]
+    flat = tables.specular.view(-1, 6)
+    index = low * len(r) + torch.arange(len(r))
+    s_low, s_high = flat[index], flat[index + len(r)]
+    return s_low + t * (s_high - s_low)
