@@ -1,0 +1,68 @@
+"""Materialist: physically based editing of a single photograph.
+
+    import materialist as mt
+
+    scene = mt.invert("kitchen.jpg")
+    mt.save_scene(scene, "kitchen.scene")
+
+Everything public is named here and loaded on first use, so that `import materialist` stays quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "invert": "pipeline",
+    "render_scene": "pipeline",
+    "read_photo": "io.photo",
+    "save_scene": "io.package",
+    "load_scene": "io.package",
+    **dict.fromkeys(
+        ("Camera", "FitReport", "Geometry", "Materials", "Mesh", "Photo", "Prediction", "Scene"),
+        "types",
+    ),
+    **dict.fromkeys(
+        ("InputError", "MaterialistError", "OutputError", "SceneError", "SetupError", "WeightsError"), "errors"
+    ),
+}
+"""Public name -> module that defines it."""
+
+__all__ = ["__version__", *sorted(_HOME)]
+
+if TYPE_CHECKING:
+    from materialist.errors import InputError as InputError
+    from materialist.errors import MaterialistError as MaterialistError
+    from materialist.errors import OutputError as OutputError
+    from materialist.errors import SceneError as SceneError
+    from materialist.errors import SetupError as SetupError
+    from materialist.errors import WeightsError as WeightsError
+    from materialist.io.package import load_scene as load_scene
+    from materialist.io.package import save_scene as save_scene
+    from materialist.io.photo import read_photo as read_photo
+    from materialist.pipeline import invert as invert
+    from materialist.pipeline import render_scene as render_scene
+    from materialist.types import Camera as Camera
+    from materialist.types import FitReport as FitReport
+    from materialist.types import Geometry as Geometry
+    from materialist.types import Materials as Materials
+    from materialist.types import Mesh as Mesh
+    from materialist.types import Photo as Photo
+    from materialist.types import Prediction as Prediction
+    from materialist.types import Scene as Scene
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'materialist' has no attribute {name!r}")
+    value = getattr(import_module(f"materialist.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -72,7 +72,7 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
         tile("Photo", "as given", _bytes(photo)),
         tile("Re-rendering", f"path traced, {quality:.1f} dB", _bytes(again)),
         tile(
-            "Error", f"mean |difference| of sRGB × {_ERROR_GAIN}", _heat(_ERROR_GAIN * np.abs(photo - again).mean(-1))
+            "Error", f"mean |difference| of sRGB x {_ERROR_GAIN}", _heat(_ERROR_GAIN * np.abs(photo - again).mean(-1))
         ),
     ]
     maps = [
@@ -108,7 +108,7 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
     lines = [("   ·   ".join(parts), _INK)]
     warnings = dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings))
     for warning in list(warnings)[:6]:
-        lines += [(line, _AMBER) for line in textwrap.wrap(f"Note: {warning}", 170, max_lines=2)]
+        lines += [(line, _AMBER) for line in textwrap.wrap(f"Note: {warning}", 190, max_lines=2)]
     if len(warnings) > 6:
         lines.append((f"and {len(warnings) - 6} more in report.json", _AMBER))
     return lines
@@ -118,9 +118,9 @@ def _draw_header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
     camera, photo = scene.camera, scene.photo
     name = (photo.path or "photo").replace("\\", "/").rsplit("/", 1)[-1]
     draw.text((_MARGIN, _MARGIN - 10), _shortened(name, _font(34), WIDTH // 2), font=_font(34), fill=_INK)
-    native = f"{photo.original.shape[1]} × {photo.original.shape[0]}"
+    native = f"{photo.original.shape[1]} x {photo.original.shape[0]}"
     note = (
-        f"{native} photo  ·  worked at {camera.width} × {camera.height}  ·  {camera.fov:.1f}° wide ({photo.fov_source})"
+        f"{native} photo  ·  worked at {camera.width} x {camera.height}  ·  {camera.fov:.1f}° wide ({photo.fov_source})"
     )
     draw.text((WIDTH - _MARGIN, _MARGIN + 6), note, font=_font(18), fill=_DIM, anchor="ra")
 
@@ -151,8 +151,8 @@ def _fitted(pixels: Array, width: int, height: int):  # type: ignore[no-untyped-
     size = (max(1, round(image.width * scale)), max(1, round(image.height * scale)))
     if abs(size[0] - width) <= 0.02 * width + 1 and abs(size[1] - height) <= 0.02 * height + 1:
         size = (width, height)
-    small = size[0] > 2 * image.width  # a coarse envmap shows its texels
-    return image.resize(size, Image.Resampling.NEAREST if small else Image.Resampling.LANCZOS)
+    coarse = size[0] > 6 * image.width  # a coarse envmap shows its texels
+    return image.resize(size, Image.Resampling.NEAREST if coarse else Image.Resampling.LANCZOS)
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont:

@@ -1,0 +1,73 @@
+"""`materialist bench NAME`: dispatch to materialist.bench, with whatever options that benchmark takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.outcome import report_success
+from materialist.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    settings = {"allow_extra_args": True, "ignore_unknown_options": True}
+    app.command("bench", context_settings=settings)(bench)
+
+
+def bench(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="invert, light, ...")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="Folder for the report.")],
+    data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
+) -> None:
+    """Run a benchmark. Its own options follow the name, as --scenes 10 or scenes=10."""
+    options = parse_extra(context.args)
+    if data is not None and not data.is_dir():
+        raise InputError(f"There is no data folder at {data}.")
+    from materialist import bench as benchmarks
+
+    benchmarks.run(name, data=data, output=output, seed=seed, device=device.value, **options)  # type: ignore[attr-defined]
+    report_success("bench", as_json, [f"Look at {output}"], name=name, report=str(output))
+
+
+def parse_extra(arguments: list[str]) -> dict[str, Any]:
+    """`--scenes 10 --quick size=256` as {"scenes": 10, "quick": True, "size": 256}. Raises InputError."""
+    options: dict[str, Any] = {}
+    waiting: str | None = None
+    for argument in arguments:
+        if argument.startswith("--"):
+            name, equals, value = argument[2:].partition("=")
+            options[_key(name)] = _value(value) if equals else True
+            waiting = None if equals else _key(name)
+        elif waiting is not None:
+            options[waiting], waiting = _value(argument), None
+        elif "=" in argument:
+            name, _, value = argument.partition("=")
+            options[_key(name)] = _value(value)
+        else:
+            raise InputError(f"{argument!r} is not an option; write --name value or name=value.")
+    return options
+
+
+def _key(name: str) -> str:
+    key = name.replace("-", "_")
+    if not key.isidentifier():
+        raise InputError(f"{name!r} is not the name of an option.")
+    return key
+
+
+def _value(text: str) -> int | float | bool | str:
+    """The number or truth value that the text spells, else the text."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return {"true": True, "false": False}.get(text.lower(), text)

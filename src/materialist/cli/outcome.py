@@ -1,0 +1,87 @@
+"""How a command ends: the one place where exceptions become exit codes and the last line of --json is written.
+
+0 done; 2 bad input or setup (one sentence on stderr); 130 interrupted; 1 a bug of ours (with the traceback).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+
+from materialist.errors import MaterialistError
+
+OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
+    """Run the command line and return the exit code; no exception leaves except SystemExit of a signal."""
+    wants_json = "--json" in arguments
+    try:
+        result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
+        return result if isinstance(result, int) else OK
+    except MaterialistError as error:
+        return _fail(type(error).__name__, str(error), error.exit_code, wants_json)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("Interrupted", "Interrupted; nothing was written.", INTERRUPTED, wants_json)
+    except typer.Exit as stop:
+        return stop.exit_code
+    except BrokenPipeError:  # the reader of a pipe left, as `head` does
+        sys.stderr.close()
+        return OK
+    except Exception as error:
+        if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("materialist"):
+            return _fail("SetupError", f"{error.name} is not installed; see: materialist doctor", BAD_INPUT, wants_json)
+        if _is_usage_error(error):
+            return _usage(error, wants_json)
+        traceback.print_exc()
+        message = f"This is a bug in Materialist, not your mistake: please report it with the lines above ({error})."
+        return _fail(type(error).__name__, message, BUG, wants_json)
+
+
+def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:
+    """Tell a person in `lines`, or with `as_json` a program in one last line on stdout."""
+    if as_json:
+        typer.echo(json.dumps(_plain({"ok": True, "command": command, **facts})))
+    else:
+        for line in lines:
+            typer.echo(line)
+
+
+def _fail(kind: str, message: str, code: int, wants_json: bool) -> int:
+    typer.echo(f"Error: {message}" if code != INTERRUPTED else message, err=True)
+    if wants_json:
+        typer.echo(json.dumps({"ok": False, "error": kind, "message": message, "exit_code": code}))
+    return code
+
+
+def _usage(error: Any, wants_json: bool) -> int:
+    """An option that does not exist or does not parse; the parser knows best how to show it."""
+    error.show()
+    if wants_json:
+        return _fail("UsageError", error.format_message(), BAD_INPUT, True)
+    return BAD_INPUT
+
+
+def _is_usage_error(error: Exception) -> bool:
+    """Whether the option parser raised it; its base class is private in some versions of typer, so ask by family."""
+    family = {base.__name__ for base in type(error).__mro__}
+    return "ClickException" in family and hasattr(error, "show")
+
+
+def _plain(value: Any) -> Any:
+    """JSON's own types; NaN and infinity become null."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int | bool) else str(value)

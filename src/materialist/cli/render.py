@@ -1,0 +1,45 @@
+"""`materialist render SCENE -o OUT`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.outcome import report_success
+from materialist.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("render")(render)
+
+
+def render(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A .png (sRGB) or .exr (linear).")],
+    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 64,
+    denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
+    force: Force = False,
+) -> None:
+    """Path-trace a scene package."""
+    from materialist.io.image import ensure_image_writable, write_image
+    from materialist.io.package import load_scene
+
+    if not 1 <= spp <= 1_000_000:
+        raise InputError(f"--spp is a number of samples from 1 to 1000000, not {spp}.")
+    ensure_image_writable(output, force=force)
+    loaded = load_scene(scene)
+    from rich.console import Console
+
+    from materialist import pipeline
+
+    with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
+        image = pipeline.render_scene(loaded, spp=spp, denoise=denoise, seed=seed, device=device.value)
+    write_image(output, image, force=force)
+    report_success("render", as_json, [f"Look at {output}"], image=str(output), spp=spp)

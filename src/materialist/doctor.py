@@ -1,0 +1,149 @@
+"""What works on this machine, what does not, and the one command that mends each thing.
+
+Nothing here loads Mitsuba or LLVM into this process: a wrong LLVM aborts the process that loads it, so the renderer
+is tried in a child.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from materialist.errors import MaterialistError
+
+_PROBE = """
+import os, sys
+if len(sys.argv) > 1: os.environ["DRJIT_LIBLLVM_PATH"] = sys.argv[1]
+import mitsuba as mi
+names = [n for n in ("llvm_ad_rgb", "cuda_ad_rgb") if n in mi.variants()]
+mi.set_variant("llvm_ad_rgb")
+import drjit as dr
+assert float(dr.sum(mi.Float([1.0, 2.0]) * 2)[0]) == 6
+sys.stdout.write(" ".join(names))
+"""
+"""Loads the CPU variant and runs one kernel: the step that a wrong LLVM does not survive."""
+
+_EXTRAS = {
+    "rawpy": ("camera RAW photos", "pip install rawpy"),
+    "pyoidn": ("denoised pictures", "pip install pyoidn"),
+    "transformers": ("hub predictors", "pip install transformers"),
+    "diffusers": ("Marigold predictor", "pip install diffusers"),
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the examination."""
+
+    name: str
+    state: str
+    """'ok', 'missing' (optional, absent) or 'broken' (the main job cannot run)."""
+    detail: str
+    remedy: str = ""
+    """The one command that mends it; empty when there is nothing to mend."""
+
+
+def examine() -> list[Finding]:
+    """Look at everything the program needs; takes a few seconds and never raises."""
+    llvm, path = _llvm()
+    return [
+        _python(),
+        *(_package(name) for name in ("torch", "mitsuba", "drjit")),
+        llvm,
+        _renderer(path),
+        _cuda(),
+        *(_extra(name, *about) for name, about in _EXTRAS.items()),
+        _weights(),
+        _memory(),
+        _disk(),
+    ]
+
+
+def _python() -> Finding:
+    good = sys.version_info >= (3, 11)
+    return Finding(
+        "Python", "ok" if good else "broken", platform.python_version(), "" if good else "apt install python3"
+    )
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, "ok", version(name))
+    except PackageNotFoundError:
+        return Finding(name, "broken", "not installed", f"{sys.executable} -m pip install {name}")
+
+
+def _llvm() -> tuple[Finding, str | None]:
+    """The LLVM that the renderer will use."""
+    try:
+        from materialist.render.variant import find_llvm
+
+        found = find_llvm()
+    except (MaterialistError, ImportError) as error:
+        return Finding("LLVM", "broken", str(error), "sudo apt-get install -y libllvm19"), None
+    return Finding("LLVM", "ok", f"{found.version} at {found.path}"), str(found.path)
+
+
+def _renderer(llvm: str | None) -> Finding:
+    """Mitsuba's CPU variant, tried in a child process."""
+    command = [sys.executable, "-c", _PROBE, *([llvm] if llvm else [])]
+    try:
+        child = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Finding("renderer (CPU)", "broken", f"the probe did not finish: {error}", "materialist doctor")
+    if child.returncode == 0:
+        return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
+    last = (child.stderr.strip().splitlines() or ["no message"])[-1]
+    return Finding(
+        "renderer (CPU)", "broken", f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19"
+    )
+
+
+def _cuda() -> Finding:
+    """Whether an NVIDIA driver answers."""
+    tool = shutil.which("nvidia-smi")
+    if tool is None:
+        return Finding("GPU (CUDA)", "missing", "no NVIDIA driver; everything runs on the CPU")
+    query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
+    try:
+        child = subprocess.run(query, capture_output=True, text=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return Finding("GPU (CUDA)", "missing", f"nvidia-smi does not answer ({error}); the CPU is used")
+    if child.returncode != 0 or not child.stdout.strip():
+        return Finding("GPU (CUDA)", "missing", "nvidia-smi reports no GPU; the CPU is used")
+    return Finding("GPU (CUDA)", "ok", child.stdout.strip().splitlines()[0])
+
+
+def _extra(name: str, purpose: str, remedy: str) -> Finding:
+    try:
+        return Finding(name, "ok", f"{version(name)} ({purpose})")
+    except PackageNotFoundError:
+        return Finding(name, "missing", f"optional: {purpose}", remedy)
+
+
+def _weights() -> Finding:
+    return Finding("weights", "missing", "none yet: the built-in predictor needs none")
+
+
+def _memory() -> Finding:
+    import psutil
+
+    free = psutil.virtual_memory().available / 2**30
+    detail = f"{free:.1f} GB free (an inversion at 512 needs up to 4)"
+    return Finding(
+        "memory", "ok" if free >= 4 else "missing", detail, "" if free >= 4 else "materialist invert --size 256"
+    )
+
+
+def _disk() -> Finding:
+    where = Path.cwd()
+    free = shutil.disk_usage(where).free / 2**30
+    good = free >= 0.5 and os.access(where, os.W_OK)
+    detail = f"{free:.1f} GB free in {where}"
+    return Finding("disk", "ok" if good else "missing", detail, "" if good else f"df -h {where}")
