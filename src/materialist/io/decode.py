@@ -66,6 +66,8 @@ def decode(path: Path) -> Decoded:
             return _exr(path)
         if head.startswith((b"#?RADIANCE", b"#?RGBE")):
             return _hdr(path)
+        if head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")) and _is_float_tiff(path):
+            return _float_tiff(path)
         return _picture(path)
     except MaterialistError:
         raise
@@ -184,6 +186,32 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     else:
         raise InputError(f"{path} holds {pixels.dtype} pixels; save it as 8- or 16-bit RGB.")
     return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
+
+
+def _is_float_tiff(path: Path) -> bool:
+    """Whether a TIFF holds colour in a layout that Pillow does not know: float channels."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with _pixel_limit_lifted(), Image.open(path):
+            return False
+    except UnidentifiedImageError:
+        return True
+
+
+def _float_tiff(path: Path) -> Decoded:
+    """Float RGB TIFF, scene-linear; OpenCV applies the orientation itself."""
+    import cv2
+
+    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3 or pixels.dtype.kind != "f":
+        raise InputError(f"{path} is a damaged TIFF, or one of an unusual layout; save it as 8- or 16-bit RGB.")
+    check_size(pixels.shape[1], pixels.shape[0], path)
+    warnings: list[str] = []
+    colour = np.ascontiguousarray(pixels[..., 2::-1], np.float32)
+    if pixels.shape[2] == 4:
+        colour = _over_white(colour, pixels[..., 3:].astype(np.float32), warnings)
+    return Decoded(colour, True, {}, warnings)
 
 
 def _exr(path: Path) -> Decoded:

@@ -1,0 +1,354 @@
+"""Photos of every kind, and every kind of bad file."""
+
+import io
+import struct
+import zlib
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image, ImageCms
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.errors import InputError, SetupError
+from materialist.io.exr import write_exr
+from materialist.io.photo import read_photo
+
+
+def picture(height=20, width=30, seed=0):
+    """[H, W, 3] uint8, smooth enough for lossy formats."""
+    y, x = np.mgrid[0:height, 0:width]
+    waves = [np.sin(x / 5 + seed + k) + np.cos(y / 4 - k) for k in range(3)]
+    return np.round(127 + 60 * np.stack(waves, -1)).clip(0, 255).astype(np.uint8)
+
+
+def linear8(pixels):
+    return srgb_to_linear(pixels.astype(np.float32) / 255)
+
+
+def save(path, pixels, **options):
+    Image.fromarray(pixels).save(path, **options)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["png", "tiff", "bmp", "webp"])
+def test_lossless_8_bit_files_decode_exactly(tmp_path, suffix):
+    pixels = picture()
+    photo = read_photo(save(tmp_path / f"a.{suffix}", pixels, **({"lossless": True} if suffix == "webp" else {})))
+    np.testing.assert_allclose(photo.linear, linear8(pixels), atol=1e-6)
+    assert photo.linear.dtype == np.float32 and photo.linear.flags.c_contiguous
+    assert photo.source == (tmp_path / f"a.{suffix}").read_bytes() and photo.warnings == ()
+    assert (photo.camera.width, photo.camera.height, photo.camera.fov) == (30, 20, 35.0)
+    assert not photo.hdr and photo.fov_source == "default"
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "heic", "avif"])
+def test_lossy_files_decode_closely(tmp_path, suffix):
+    from pillow_heif import register_heif_opener
+
+    register_heif_opener()
+    pixels = picture(64, 96)
+    photo = read_photo(save(tmp_path / f"a.{suffix}", pixels, quality=95))
+    assert np.abs(linear_to_srgb(photo.linear) - pixels / 255).mean() < 0.02
+
+
+@pytest.mark.parametrize("suffix", ["png", "tiff"])
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_16_bits_stay_16_bits(tmp_path, suffix, channels):
+    rng = np.random.default_rng(0)
+    pixels = rng.integers(0, 65536, (16, 17, channels)).astype(np.uint16)
+    if channels == 4:
+        pixels[..., 3] = 65535
+    cv2.imwrite(str(tmp_path / f"a.{suffix}"), pixels)
+    photo = read_photo(tmp_path / f"a.{suffix}")
+    colour = pixels[..., [0, 0, 0]] if channels == 1 else pixels[..., 2::-1]
+    expected = srgb_to_linear(colour.astype(np.float64) / 65535)
+    np.testing.assert_allclose(photo.linear, expected, atol=2e-6)
+    assert photo.warnings == ()
+
+
+def test_float_tiff_is_scene_linear(tmp_path):
+    values = np.random.default_rng(0).random((12, 13, 3), np.float32) * 4
+    cv2.imwrite(str(tmp_path / "a.tiff"), values[..., ::-1])
+    photo = read_photo(tmp_path / "a.tiff")
+    np.testing.assert_array_equal(photo.linear, values)
+    assert photo.hdr
+
+
+def test_exr_is_exact_and_clipped_to_ten(tmp_path):
+    values = np.random.default_rng(0).random((12, 13, 3), np.float32) * 30
+    write_exr(tmp_path / "a.exr", values)
+    photo = read_photo(tmp_path / "a.exr")
+    np.testing.assert_array_equal(photo.original, values)
+    np.testing.assert_array_equal(photo.linear, np.minimum(values, 10))
+    assert photo.hdr and any("10" in warning for warning in photo.warnings)
+
+
+def test_dim_exr_is_not_called_hdr_and_grey_is_spread(tmp_path):
+    values = np.random.default_rng(0).random((12, 13), np.float32)
+    values[0, 0] = -0.25
+    write_exr(tmp_path / "a.exr", values)
+    photo = read_photo(tmp_path / "a.exr")
+    assert not photo.hdr and photo.linear[0, 0, 0] == 0
+    np.testing.assert_array_equal(photo.linear[1:, :, 1], values[1:])
+    assert photo.warnings == ("Negative values are set to 0.",)
+
+
+def test_radiance_hdr_against_the_definition(tmp_path):
+    """Ward's RGBE: value = mantissa * 2**(exponent - 136), written flat by hand."""
+    rng = np.random.default_rng(0)
+    rgbe = rng.integers(128, 256, (8, 9, 4)).astype(np.uint8)
+    rgbe[..., 3] = rng.integers(126, 134, (8, 9))
+    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 9\n"
+    (tmp_path / "a.hdr").write_bytes(header + rgbe.tobytes())
+    photo = read_photo(tmp_path / "a.hdr")
+    expected = rgbe[..., :3] * 2.0 ** (rgbe[..., 3:].astype(float) - 136)
+    np.testing.assert_allclose(photo.original, expected, rtol=0.005)
+    assert photo.hdr
+
+
+@pytest.mark.parametrize("mode", ["L", "P", "1", "CMYK", "LA", "I;16"])
+def test_other_pixel_layouts(tmp_path, mode):
+    image = Image.fromarray(picture())
+    suffix = "jpg" if mode == "CMYK" else "png"
+    if mode == "I;16":
+        image = Image.fromarray((np.asarray(image.convert("L")).astype(np.uint16)) * 257)
+    else:
+        image = image.convert("L").convert("LA") if mode == "LA" else image.convert(mode)
+    image.save(tmp_path / f"a.{suffix}")
+    photo = read_photo(tmp_path / f"a.{suffix}")
+    if mode != "CMYK":
+        shown = image.convert("L") if mode in ("L", "LA", "1") else image.convert("RGB") if mode == "P" else None
+        if shown is not None:
+            np.testing.assert_allclose(photo.linear, linear8(np.asarray(shown.convert("RGB"))), atol=1e-6)
+        if mode != "P":
+            assert np.ptp(photo.linear, axis=-1).max() == 0
+    else:
+        assert np.abs(linear_to_srgb(photo.linear) - picture() / 255).mean() < 0.1 and photo.warnings
+
+
+@pytest.mark.parametrize("depth", [8, 16])
+def test_alpha_is_laid_over_white(tmp_path, depth):
+    top = 255 if depth == 8 else 65535
+    pixels = np.zeros((10, 10, 4), np.uint8 if depth == 8 else np.uint16)
+    pixels[..., 1], pixels[..., 3] = top, top
+    pixels[:5, :, 3] = 0
+    pixels[5, :, 3] = round(top * 0.4)
+    cv2.imwrite(str(tmp_path / "a.png"), pixels)
+    photo = read_photo(tmp_path / "a.png")
+    np.testing.assert_array_equal(photo.linear[:5], 1)
+    np.testing.assert_allclose(photo.linear[5], np.tile([0.6, 1, 0.6], (10, 1)), atol=1e-5)
+    np.testing.assert_allclose(photo.linear[6:], np.tile([0, 1, 0], (4, 10, 1)), atol=1e-6)
+    assert photo.warnings == ("Transparent parts are laid over white.",)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("depth", [8, 16])
+def test_orientation_turns_the_photo_upright(tmp_path, orientation, depth):
+    """The marked corner must be where the EXIF standard puts row 0, column 0."""
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    pixels = np.full((10, 14, 3), 60, np.uint8)
+    pixels[0, 0], pixels[0, 13] = 255, 160
+    if depth == 8:
+        Image.fromarray(pixels).save(tmp_path / "a.png", exif=exif)
+    else:
+        cv2.imwrite(str(tmp_path / "b.png"), pixels.astype(np.uint16) * 257)
+        data = (tmp_path / "b.png").read_bytes()
+        block = exif.tobytes().removeprefix(b"Exif\0\0")
+        chunk = struct.pack(">I", len(block)) + b"eXIf" + block + struct.pack(">I", zlib.crc32(b"eXIf" + block))
+        (tmp_path / "a.png").write_bytes(data[:33] + chunk + data[33:])
+    linear = read_photo(tmp_path / "a.png").linear[..., 0]
+    height, width = linear.shape
+    first = {1: "tl", 2: "tr", 3: "br", 4: "bl", 5: "tl", 6: "tr", 7: "br", 8: "bl"}[orientation]
+    second = {1: "tr", 2: "tl", 3: "bl", 4: "br", 5: "bl", 6: "br", 7: "tr", 8: "tl"}[orientation]
+    corner = {"tl": (0, 0), "tr": (0, width - 1), "bl": (height - 1, 0), "br": (height - 1, width - 1)}
+    assert (height, width) == ((10, 14) if orientation < 5 else (14, 10))
+    assert linear[corner[first]] == linear.max()
+    assert linear[corner[second]] == pytest.approx(srgb_to_linear(160 / 255), abs=1e-6)
+
+
+def test_shrinking_averages_light_not_codes(tmp_path):
+    board = np.indices((64, 128)).sum(0) % 2 * 255
+    save(tmp_path / "a.png", np.repeat(board[..., None], 3, -1).astype(np.uint8))
+    board_photo = np.zeros((64, 128, 3), np.uint8) + (np.indices((64, 128)).sum(0) % 2 * 255)[..., None].astype(
+        np.uint8
+    )
+    board_photo[:, :64] //= 2
+    photo = read_photo(save(tmp_path / "b.png", board_photo), size=32)
+    assert photo.linear.shape == (16, 32, 3) and photo.original.shape == (64, 128, 3)
+    np.testing.assert_allclose(photo.linear[:, 16:], 0.5, atol=1e-5)
+    np.testing.assert_allclose(photo.linear.mean(), photo.original.mean(), rtol=1e-5)
+
+
+def test_small_photos_keep_their_size(tmp_path):
+    photo = read_photo(save(tmp_path / "a.png", picture(20, 30)), size=512)
+    assert photo.linear.shape == (20, 30, 3)
+
+
+def test_wide_gamut_profile_is_converted(tmp_path):
+    """A profile with swapped primaries and gamma 2 must swap the channels back and undo that gamma."""
+    from materialist.io.icc import matrix_profile
+
+    srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    assert matrix_profile(srgb).is_srgb
+    swapped = bytearray(srgb)
+    count = struct.unpack_from(">I", swapped, 128)[0]
+    entries = {bytes(swapped[132 + 12 * i : 136 + 12 * i]): 132 + 12 * i for i in range(count)}
+    red, green = entries[b"rXYZ"], entries[b"gXYZ"]
+    swapped[red : red + 4], swapped[green : green + 4] = b"gXYZ", b"rXYZ"
+    pixels = picture()
+    photo = read_photo(save(tmp_path / "a.png", pixels, icc_profile=bytes(swapped)))
+    np.testing.assert_allclose(photo.linear, linear8(pixels[..., [1, 0, 2]]), atol=3e-3)
+    plain = read_photo(save(tmp_path / "b.png", pixels, icc_profile=srgb))
+    np.testing.assert_array_equal(plain.linear, read_photo(save(tmp_path / "c.png", pixels)).linear)
+
+
+def test_matrix_profile_agrees_with_lcms(shared):
+    """Our float evaluation against LittleCMS on a real file with a display profile."""
+    path = shared / "odd_inputs" / "rgba_concert.tiff"
+    photo = read_photo(path, size=1024)
+    image = Image.open(path)
+    source = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
+    twin = ImageCms.profileToProfile(image.convert("RGB"), source, ImageCms.createProfile("sRGB"))
+    assert np.abs(linear_to_srgb(photo.linear) - np.asarray(twin) / 255).mean() < 0.004
+
+
+def test_grey_profile_and_unusable_profile(tmp_path):
+    pixels = picture()
+    photo = read_photo(save(tmp_path / "a.png", pixels, icc_profile=b"nonsense" * 40))
+    np.testing.assert_allclose(photo.linear, linear8(pixels), atol=1e-6)
+    assert any("profile" in warning for warning in photo.warnings)
+
+
+def test_fov_option_wins_and_must_make_sense(tmp_path):
+    path = save(tmp_path / "a.png", picture())
+    photo = read_photo(path, fov=71.5)
+    assert (photo.camera.fov, photo.fov_source) == (71.5, "option")
+    assert read_photo(path, fov="71.5").camera.fov == 71.5
+    for bad in (0, 1, 170, -5, float("nan"), "wide"):
+        with pytest.raises(InputError, match="field of view"):
+            read_photo(path, fov=bad)
+
+
+def test_example_photos(tmp_path):
+    assert read_photo("example:coffee").original.shape == (400, 600, 3)
+    assert read_photo("example:coffee", size=64).path == "example:coffee"
+    with pytest.raises(InputError, match="coffee"):
+        read_photo("example:tea")
+
+
+def _cut(path, fraction):
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * fraction)])
+    return path
+
+
+def _bad_files(folder):
+    """Name -> (path, words that the message must contain)."""
+    rng = np.random.default_rng(0)
+    noise = rng.integers(0, 256, (64, 64, 3)).astype(np.uint8)
+    made = {
+        "missing": (folder / "nothing.jpg", "no photo at"),
+        "folder": (folder, "is a folder"),
+    }
+
+    def add(name, path, words):
+        made[name] = (path, words)
+
+    empty = folder / "empty.jpg"
+    empty.touch()
+    add("empty", empty, "is empty")
+    text = folder / "letter.jpg"
+    text.write_text("Dear photographer, " * 20)
+    add("text", text, "not an image")
+    for suffix in ("jpg", "png", "webp", "tiff"):
+        add(f"cut {suffix}", _cut(save(folder / f"cut.{suffix}", noise), 0.6), "damaged or truncated")
+    cv2.imwrite(str(folder / "cut16.png"), noise.astype(np.uint16) * 257)
+    add("cut 16", _cut(folder / "cut16.png", 0.6), "damaged or truncated")
+    write_exr(folder / "cut.exr", noise / np.float32(255))
+    add("cut exr", _cut(folder / "cut.exr", 0.6), "damaged|readable")
+    (folder / "stub.exr").write_bytes(b"\x76\x2f\x31\x01")
+    add("stub exr", folder / "stub.exr", "damaged|readable")
+    (folder / "stub.hdr").write_bytes(b"#?RADIANCE\n\n-Y 64 +X 64\n1234")
+    add("stub hdr", folder / "stub.hdr", "damaged or truncated")
+    add("one pixel", save(folder / "1.png", noise[:1, :1]), "1 x 1 pixels")
+    add("thin", save(folder / "thin.png", noise[:3]), "64 x 3 pixels")
+    add("ribbon", save(folder / "ribbon.png", np.zeros((100, 20000, 3), np.uint8)), "20000 x 100.*8:1")
+    add("black", save(folder / "black.png", noise * 0), "entirely black")
+    add("flat", save(folder / "flat.png", noise * 0 + 90), "one flat colour")
+    for name, value in (("nan", np.nan), ("inf", np.inf)):
+        values = noise.astype(np.float32)
+        values[5, 7] = value
+        write_exr(folder / f"{name}.exr", values)
+        add(name, folder / f"{name}.exr", "column 7, row 5")
+    return made
+
+
+NAMES = [
+    *("missing", "folder", "empty", "text", "cut jpg", "cut png", "cut webp", "cut tiff", "cut 16", "cut exr"),
+    *("stub exr", "stub hdr", "one pixel", "thin", "ribbon", "black", "flat", "nan", "inf"),
+]
+
+
+@pytest.fixture(scope="module")
+def bad_files(tmp_path_factory):
+    made = _bad_files(tmp_path_factory.mktemp("bad"))
+    assert sorted(made) == sorted(NAMES)
+    return made
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bad_files_get_one_clear_sentence(bad_files, name):
+    path, words = bad_files[name]
+    with pytest.raises(InputError, match=words) as caught:
+        read_photo(path)
+    message = str(caught.value)
+    assert "\n" not in message and message.endswith(".") and path.name in message
+
+
+def test_a_huge_photo_is_refused_before_decoding(tmp_path):
+    """A PNG header that claims 20000 x 20000; nothing of that size may be allocated."""
+    head = struct.pack(">IIBBBBB", 20000, 20000, 8, 2, 0, 0, 0)
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(InputError, match="400 megapixels; the limit is 200"):
+        read_photo(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("size", [0, 7, -1, 9000, 2.5, True])
+def test_working_size_must_make_sense(tmp_path, size):
+    with pytest.raises(InputError, match="working size"):
+        read_photo(save(tmp_path / "a.png", picture()), size=size)
+
+
+def test_raw_without_rawpy_says_how_to_get_it(tmp_path, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "rawpy", None)
+    (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
+    with pytest.raises(SetupError, match="pip install rawpy"):
+        read_photo(tmp_path / "a.CR2")
+
+
+def test_broken_raw_is_an_input_error(tmp_path):
+    pytest.importorskip("rawpy", reason="needs rawpy")
+    (tmp_path / "a.nef").write_bytes(b"II*\0" * 200)
+    with pytest.raises(InputError, match="RAW"):
+        read_photo(tmp_path / "a.nef")
+
+
+def test_odd_inputs_all_work(shared):
+    shapes = {path.name: read_photo(path, size=128).linear.shape for path in (shared / "odd_inputs").iterdir()}
+    assert len(shapes) == 10
+    assert shapes["orientation6_streetlamp_exif.jpg"] == (128, 96, 3)
+    assert shapes["orientation8_landscape.jpg"] == (96, 128, 3)
+    assert any("360" in w for w in read_photo(shared / "odd_inputs/panorama_braunschweig_equirect.jpg").warnings)
+
+
+def test_16_bit_photo_has_more_than_256_levels(shared):
+    assert len(np.unique(read_photo(shared / "odd_inputs/rgb16_car_interior.png").original[..., 0])) > 1000
