@@ -6,6 +6,8 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.completion import complete
+from materialist.geometry.planes import find_planes
 from materialist.types import Array, Camera, Geometry
 
 
@@ -21,4 +23,9 @@ def build_geometry(
         raise InputError(f"Completion is '{completion}'; choose 'planes' or 'none'.")
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W]
-    return Geometry(mesh, label)
+    if completion == "none":
+        return Geometry(mesh, label)
+    planes = find_planes(depth, normal, camera, seed=seed)
+    for k, plane in enumerate(planes):
+        label[plane.mask] = k
+    return Geometry(complete(mesh, planes, depth, camera), label)

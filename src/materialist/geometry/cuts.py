@@ -11,9 +11,9 @@ from materialist.types import Array, Camera
 
 SUPPORT_PIXELS = 3
 """A slope counts as the surface's own only if it holds over this many pixels beside the pair."""
-SUPPORT_FACTOR = 4.0
-"""A step is a cut only if it exceeds the surface's own slope by this factor. 4 clears the steepest smooth case, the
-rim of a sphere, whose last step is at most 1 / (2 - sqrt(3)) = 3.73 times the smallest of the three before it."""
+SUPPORT_FACTOR = 5.0
+"""A step is a cut only if it exceeds the surface's own slope by this factor. The steepest smooth case is the rim of a
+sphere, whose last step is up to 4.2 times the smallest of the three before it wherever tau = 6 calls it grazing."""
 
 
 @dataclass(frozen=True)

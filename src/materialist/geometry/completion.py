@@ -1,0 +1,219 @@
+"""Continue the dominant planes behind objects and beyond the picture, where light and reflections would look for them.
+
+Nothing that the picture shows changes: inside the picture only what lies behind the observed surface is added, and
+where the picture shows open sky nothing is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from materialist.camera import unproject
+from materialist.geometry.planes import Plane
+from materialist.geometry.polygon import clip, triangulate
+from materialist.types import Array, Camera, Mesh
+
+BEHIND = 0.01
+"""Inside the picture a continuation lies at least this fraction of the depth behind the observed surface."""
+EXTENT = 2.0
+"""A continuation reaches this many scene radii (median distance of the surface from the camera) from the plane's
+visible middle: under the camera and somewhat behind it, but not so far that it hides a hemisphere of light."""
+GROUND_EXTENT = 20.0
+"""The same for ground under open sky."""
+SKY_SHARE = 0.05
+"""Share of the picture without a surface from which a scene counts as outdoors."""
+UPWARD = 0.7
+"""Least Y of the normal of a floor or table top. Only those go on behind the camera: a wall or ceiling there would
+shut out the light that the picture never shows."""
+BOUNDING = 0.9
+"""A plane that has this share of the other points in front of it bounds the scene (floor, wall, ceiling) and goes on
+freely; any other (a table top above a floor) only between its own pixels and across the frame sides that it touches."""
+TOUCH = 0.2
+"""Share of a frame side that a plane must cover to touch it."""
+ONE_SIDE = 0.9
+"""Share of a plane's pixels that must lie on one side of another plane for the planes to stop at each other."""
+CELLS = 256
+"""Cells of the continuation along the picture's longer side; at least a pixel each."""
+RIM = 0.01
+"""Pixels by which the part beyond the frame keeps clear of it, against round-off."""
+MOST_TRIANGLES = 8000
+"""Bound on the triangles of one plane beyond one side of the frame."""
+
+
+@dataclass(frozen=True)
+class _Sheet:
+    """A plane with what is needed to continue it."""
+
+    index: int
+    plane: Plane
+    points: Array
+    """[N, 3] some of the visible points, dropped onto the plane; scene units."""
+    pixels: Array
+    """[N] their row-major pixels."""
+    bounding: bool
+    touches: tuple[bool, ...]
+    """[4] whether its pixels reach the frame's bottom, left, right, top."""
+    half_size: float
+    """Half the side of the square it may fill, scene units."""
+
+
+def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, extent: float = EXTENT) -> Mesh:
+    """Append the continuations of the planes to the mesh of the depth map.
+
+    mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
+    extent: how far from its visible middle a plane is continued, in scene radii (see `EXTENT`).
+
+    The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
+    pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
+    of the scene nor cross the frame (the flat side of an object) are left alone.
+    """
+    depth = np.asarray(depth, np.float64)
+    sheets = [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent))]
+    parts = [mesh]
+    farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
+    for sheet in sheets:
+        walls = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
+        inside = _inside_frame(sheet, walls, farthest, camera)  # [Q, 4, 3]
+        outside = _beyond_frame(sheet, walls, camera)  # [T, 3, 3]
+        parts += [_patch(sheet, corners, camera) for corners in (inside, outside) if len(corners)]
+    return _join(parts)
+
+
+def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float) -> _Sheet | None:
+    """Measure a plane; None if it is not part of the scene's structure."""
+    surface = depth > 0
+    points = unproject(depth, camera).astype(np.float64)
+    radius = float(np.median(np.linalg.norm(points[surface], axis=-1)))
+    if -plane.offset < 0.02 * radius:  # a plane through the camera would cut the view open
+        return None
+    others = points[surface & ~plane.mask]
+    bounding = len(others) == 0 or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > BOUNDING
+    mask = plane.mask
+    touches = tuple(bool(side.mean() > TOUCH) for side in (mask[-1], mask[:, 0], mask[:, -1], mask[0]))
+    if not (bounding or any(touches)):
+        return None
+    pixels = np.flatnonzero(mask)
+    pixels = pixels[:: max(1, len(pixels) // 20_000)]
+    own = points.reshape(-1, 3)[pixels]
+    own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
+    outdoors = np.mean(~surface) > SKY_SHARE and plane.normal[1] > UPWARD
+    half_size = (GROUND_EXTENT if outdoors else extent) * radius
+    return _Sheet(index, plane, own, pixels, bool(bounding), touches, half_size)
+
+
+def _farthest_shown(mesh: Mesh, depth: Array) -> Array:
+    """[H, W] smallest inverse depth over the front faces of each pixel (1 / scene unit); 0 where there is no surface.
+
+    Inverse depth is linear in screen space on a triangle, so what lies behind the corners lies behind the face.
+    """
+    surface = np.flatnonzero(depth.ravel() > 0)
+    corners = mesh.vertices[mesh.faces[: 2 * len(surface)], 2].reshape(len(surface), 6)
+    farthest = np.zeros(depth.size)
+    farthest[surface] = 1 / (-corners).max(1)
+    return farthest.reshape(depth.shape)
+
+
+def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
+    """[S, 4] half-spaces a . p + b >= 0: one for each other plane that the sheet's pixels lie on one side of."""
+    walls = [np.zeros((0, 4))]
+    for other in sheets:
+        if other is sheet:
+            continue
+        height = sheet.points @ other.plane.normal - other.plane.offset  # [N] above the other plane
+        share = float(np.mean(height > 0))
+        if max(share, 1 - share) >= ONE_SIDE:
+            sign = 1 if share > 0.5 else -1
+            walls.append(sign * np.array([[*other.plane.normal, -other.plane.offset]]))
+    if sheet.plane.normal[1] < UPWARD:
+        walls.append(np.array([[0.0, 0, -1, 0]]))  # in front of the camera
+    return np.concatenate(walls)
+
+
+def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) -> Array:
+    """[Q, 4, 3] corners of the quads that continue the plane behind what the picture shows, scene units."""
+    height, width = farthest.shape
+    cell = max(1, max(height, width) // CELLS)
+    xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
+    x, y = (xs[None] - width / 2) / camera.focal, (height / 2 - ys[:, None]) / camera.focal
+    rays = np.stack(np.broadcast_arrays(x, y, np.array(-1.0)), -1)  # [h+1, w+1, 3] through the cell corners
+    reach = sheet.plane.inverse_depth(rays)  # [h+1, w+1]
+    points = rays / np.maximum(reach, 1e-9)[..., None]
+    allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
+    allowed &= np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.half_size
+    reach4, allowed4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
+        np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2) for g in (reach, allowed, points)
+    )
+    hidden = np.where(sheet.plane.mask, 0, farthest)  # on the plane's own pixels there is nothing to add
+    hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)  # [h, w] farthest in the cell
+    # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
+    keep = (reach4 > 0).all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - BEHIND) * hidden)
+    if not sheet.bounding:
+        keep &= _within_hull(sheet.pixels, (xs[:-1] + xs[1:]) / 2, (ys[:-1] + ys[1:]) / 2, width)
+    return points4[keep]
+
+
+def _within_hull(pixels: Array, xs: Array, ys: Array, width: int) -> Array:
+    """[h, w] bool: screen positions (xs [w], ys [h], in pixels) inside the convex hull of row-major pixels [N]."""
+    try:
+        hull = ConvexHull(np.stack([pixels % width + 0.5, pixels // width + 0.5], -1))
+    except QhullError:  # all in one line
+        return np.zeros((len(ys), len(xs)), bool)
+    grid = np.stack(np.meshgrid(xs, ys), -1)
+    return (grid @ hull.equations[:, :2].T + hull.equations[:, 2] <= 0).all(-1)
+
+
+def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
+    """[T, 3, 3] triangles of the plane outside the view frustum, scene units."""
+    normal = sheet.plane.normal
+    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    across /= np.linalg.norm(across)
+    basis = np.stack([across, np.cross(normal, across)])  # [2, 3] right-handed with the normal: faces the camera
+    origin = sheet.points.mean(0)
+    square = sheet.half_size * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    for wall in walls:
+        square = clip(square, _line(wall, basis, origin))
+    side_x, side_y = (camera.width / 2 + RIM) / camera.focal, (camera.height / 2 + RIM) / camera.focal
+    # a . p >= 0 inside the frustum: bottom, left, right, top
+    frustum = np.array([[0.0, 1, -side_y], [1, 0, -side_x], [-1, 0, -side_x], [0, -1, -side_y]])
+    spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
+    pieces = []
+    for inward, touched in zip(frustum, sheet.touches):
+        line = _line(np.append(inward, 0), basis, origin)
+        if sheet.bounding or touched:
+            piece = clip(square, -line)
+            pieces.append(triangulate(piece, np.zeros(2), 0.2 * spread, 0.2, MOST_TRIANGLES))
+        square = clip(square, line)  # what is beyond this side is done; go on with the rest
+    return np.concatenate(pieces or [np.zeros((0, 3, 2))]) @ basis + origin
+
+
+def _line(half_space: Array, basis: Array, origin: Array) -> Array:
+    """[3] the half-space [4] in coordinates of the plane spanned by basis [2, 3] at origin [3]."""
+    return np.append(basis @ half_space[:3], origin @ half_space[:3] + half_space[3])
+
+
+def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
+    """A Mesh of polygons [N, 3 or 4, 3] (scene units), each with its own vertices and the plane's nearest pixel."""
+    count, sides = corners.shape[:2]
+    triangles = np.array([[0, 1, 2], [0, 2, 3]][: sides - 2])
+    nearest = sheet.pixels[cKDTree(sheet.points).query(corners.mean(1))[1]]  # [N]
+    uv = np.stack([(nearest % camera.width + 0.5) / camera.width, (nearest // camera.width + 0.5) / camera.height], -1)
+    vertices = corners.reshape(-1, 3).astype(np.float32)
+    return Mesh(
+        vertices=vertices,
+        faces=(np.arange(count)[:, None, None] * sides + triangles).reshape(-1, 3).astype(np.int32),
+        normals=np.tile(sheet.plane.normal.astype(np.float32), (len(vertices), 1)),
+        uv=np.repeat(uv, sides, 0).astype(np.float32),
+        face_pixel=np.repeat(nearest, len(triangles)).astype(np.int32),
+        face_plane=np.full(count * len(triangles), sheet.index, np.int16),
+    )
+
+
+def _join(parts: list[Mesh]) -> Mesh:
+    """One mesh of several; faces keep their order."""
+    first = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
+    names = ("vertices", "normals", "uv", "face_pixel", "face_plane")
+    return replace(parts[0], faces=faces, **{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})

@@ -1,0 +1,80 @@
+"""Analytic depth maps with known geometry, and a slow, exact ray tracer that shares no code with the package."""
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.types import Camera
+
+
+def plane_depth(camera: Camera, normal, offset: float):
+    """Depth [H, W] of the plane normal . p = offset (scene units), inf where rays miss it."""
+    facing = pixel_rays(camera).astype(float) @ np.asarray(normal, float)
+    with np.errstate(divide="ignore"):
+        depth = offset / facing
+    return np.where(depth > 0, depth, np.inf)
+
+
+def sphere_depth(camera: Camera, centre, radius: float):
+    """Depth [H, W] of a sphere's front, inf where rays miss it, and its unit normals [H, W, 3]."""
+    rays, centre = pixel_rays(camera).astype(float), np.asarray(centre, float)
+    a, b = (rays**2).sum(-1), rays @ centre
+    root = b**2 - a * (centre @ centre - radius**2)
+    depth = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+    points = rays * np.where(np.isfinite(depth), depth, 1)[..., None]
+    return depth, (points - centre) / radius
+
+
+def box_depth(camera: Camera, low, high):
+    """Depth [H, W] of an axis-aligned box (corners low, high), inf where missed, and its face normals [H, W, 3]."""
+    rays = pixel_rays(camera).astype(float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = np.asarray(low) / rays, np.asarray(high) / rays
+    near, far = np.minimum(first, second), np.maximum(first, second)
+    axis = near.argmax(-1)
+    hit = (near.max(-1) < far.min(-1)) & (near.max(-1) > 0)
+    normal = -np.sign(rays) * np.eye(3)[axis]
+    return np.where(hit, near.max(-1), np.inf), normal
+
+
+def room(camera: Camera):
+    """Floor y = -1 (label 0), wall z = -6 (1), a box on the floor (2): depth [H, W], normal [H, W, 3], label [H, W]."""
+    floor, wall = plane_depth(camera, (0, 1, 0), -1.0), plane_depth(camera, (0, 0, 1), -6.0)
+    box, box_normal = box_depth(camera, (-0.9, -1.0, -4.0), (0.1, -0.2, -3.0))
+    depths = np.stack([floor, wall, box])
+    label = depths.argmin(0)
+    normal = np.where((label == 2)[..., None], box_normal, np.array([[0.0, 1, 0], [0, 0, 1], [0, 0, 0]])[label])
+    return depths.min(0), normal.astype(np.float32), label
+
+
+def screen_rays(camera: Camera, screen):
+    """Directions [N, 3] with z = -1 through screen positions [N, 2] (pixels, x right, y down)."""
+    screen = np.asarray(screen, float)
+    x, y = screen[:, 0] - camera.width / 2, camera.height / 2 - screen[:, 1]
+    return np.stack([x / camera.focal, y / camera.focal, -np.ones(len(x))], -1)
+
+
+def trace(mesh, origin, directions, slack: float = 1e-7):
+    """First hits of rays [N, 3] from origin [3]: distance in units of the direction [N] (inf: none) and face [N] (-1).
+
+    Every ray against every triangle in float64; `slack` is how far outside a triangle, as a share of its size, still
+    counts as a hit: float32 vertices are no more exact than that.
+    """
+    a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(float) - origin for k in range(3))
+    scale = np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+    # Signed volumes of the ray with each edge: cross products do not depend on the ray.
+    sides = [np.cross(u, v) for u, v in ((b, c), (c, a), (a, b))]
+    normal = np.cross(b - a, c - a)
+    height = (normal * a).sum(-1)
+    distance, face = np.full(len(directions), np.inf), np.full(len(directions), -1)
+    for start in range(0, len(directions), 256):
+        rays = directions[start : start + 256]
+        volumes = np.stack([rays @ side.T for side in sides])  # [3, n, F]
+        size = np.maximum(np.abs(volumes).max(0), 1e-300)
+        inside = (volumes >= -slack * size).all(0) | (volumes <= slack * size).all(0)
+        facing = rays @ normal.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.where(inside & (np.abs(facing) > 1e-12 * scale), height / facing, np.inf)
+        t = np.where(t > 1e-6, t, np.inf)
+        face[start : start + 256] = np.where(np.isfinite(t.min(1)), t.argmin(1), -1)
+        distance[start : start + 256] = t.min(1)
+    return distance, face

@@ -1,0 +1,174 @@
+"""Continued planes: found where light looks for them, never seen by the camera."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
+
+from materialist.errors import InputError
+from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.build import build_geometry
+from materialist.geometry.completion import complete
+from materialist.geometry.planes import Plane
+from materialist.types import Camera
+
+CAMERA = Camera(64, 48, 60.0)
+OFFICIAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "official_indoor" / "maps"
+
+
+@pytest.fixture(scope="module")
+def furnished():
+    """The room, built with its planes: geometry, and which label is floor, wall."""
+    depth, normal, label = room(CAMERA)
+    geometry = build_geometry(depth, normal, CAMERA)
+    floor, wall = (np.bincount(geometry.plane_label[(label == k)] + 1).argmax() - 1 for k in (0, 1))
+    assert floor >= 0 and wall >= 0 and floor != wall
+    return geometry, depth, label, floor, wall
+
+
+def hit(mesh, origin, direction):
+    """Distance and face_plane of one ray's first hit."""
+    distance, face = trace(mesh, np.asarray(origin, float), np.array([direction], float))
+    return distance[0], (mesh.face_plane[face[0]] if face[0] >= 0 else None), face[0]
+
+
+def test_rays_down_beside_below_and_behind_the_camera_find_the_floor(furnished):
+    geometry, _, _, floor, _ = furnished
+    for x, z in ((3.5, -3.0), (-4.0, -5.0), (0.2, -0.5), (0.0, 0.0), (1.0, 2.0)):
+        distance, plane, face = hit(geometry.mesh, (x, 0.3, z), (0, -1, 0))
+        assert plane == floor and distance == pytest.approx(1.3, abs=0.03)
+        assert geometry.plane_label.ravel()[geometry.mesh.face_pixel[face]] == floor
+        np.testing.assert_allclose(geometry.mesh.normals[geometry.mesh.faces[face]], [[0, 1, 0]] * 3, atol=0.02)
+
+
+def test_the_floor_and_the_wall_go_on_behind_the_box(furnished):
+    geometry, _, _, floor, wall = furnished
+    # Just behind the box (its back is at z = -4), where the camera sees neither.
+    distance, plane, _ = hit(geometry.mesh, (-0.4, -0.5, -5.0), (0, -1, 0))
+    assert plane == floor and distance == pytest.approx(0.5, abs=0.02)
+    distance, plane, _ = hit(geometry.mesh, (-0.5, -0.9, -5.5), (0, 0, -1))
+    assert plane == wall and distance == pytest.approx(0.5, abs=0.05)
+    distance, plane, _ = hit(geometry.mesh, (6.0, 1.0, -3.0), (0, 0, -1))  # and beside the frame
+    assert plane == wall and distance == pytest.approx(3, abs=0.05)
+
+
+def test_planes_stop_at_each_other_and_leave_light_from_above_and_behind(furnished):
+    geometry, _, _, floor, wall = furnished
+    corners = geometry.mesh.vertices[geometry.mesh.faces]
+    cell = 0.2
+    assert corners[geometry.mesh.face_plane == floor][..., 2].min() > -6 - 6 * cell
+    assert corners[geometry.mesh.face_plane == wall][..., 1].min() > -1 - cell
+    for direction in ((0, 1, 0), (0, 0.3, 1), (1, 0.3, 0.2), (-1, 0.5, 0.5)):
+        assert hit(geometry.mesh, (0.5, 0, 0), direction)[1] is None
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_camera_sees_none_of_it(furnished, seed):
+    geometry, depth, _, _, _ = furnished
+    assert (geometry.mesh.face_plane >= 0).sum() > 500
+    rows, columns = np.nonzero(depth)
+    screen = np.stack([columns, rows], -1) + np.random.default_rng(seed).uniform(0.01, 0.99, (depth.size, 2))
+    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(CAMERA, screen))
+    np.testing.assert_array_equal(geometry.mesh.face_pixel[face], np.arange(depth.size))
+    assert (geometry.mesh.face_plane[face] == -1).all()
+
+
+def test_outdoors_the_sky_stays_open_and_the_ground_goes_far():
+    ground = plane_depth(CAMERA, (0, 1, 0), -1.5)
+    box, box_normal = box_depth(CAMERA, (-1, -1.5, -6), (1, 1.5, -5))
+    depth = np.minimum(ground, box)
+    normal = np.where((box <= ground)[..., None], box_normal, [0, 1, 0])
+    depth = np.where(depth < 100, depth, 0)
+    geometry = build_geometry(depth, normal, CAMERA)
+    rows, columns = np.nonzero(np.ones_like(depth))
+    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(CAMERA, np.stack([columns + 0.43, rows + 0.58], -1)))
+    np.testing.assert_array_equal(face >= 0, depth.ravel() > 0)
+    assert (geometry.mesh.face_plane[face[face >= 0]] == -1).all()
+    distance, plane, _ = hit(geometry.mesh, (40, 5, -20), (0, -1, 0))
+    assert plane is not None and plane >= 0 and distance == pytest.approx(6.5, rel=0.02)
+
+
+def test_a_table_top_goes_on_below_the_frame_but_not_into_the_air_above_the_floor():
+    # A table top ends at z = -4; beyond its edge one sees the floor, lower down.
+    top = plane_depth(CAMERA, (0, 1, 0), -0.8)
+    floor = plane_depth(CAMERA, (0, 1, 0), -2.0)
+    wall = plane_depth(CAMERA, (0, 0, 1), -9.0)
+    depth = np.minimum(np.where(top < 4, top, floor), wall)
+    normal = np.where((depth == wall)[..., None], [0.0, 0, 1], [0.0, 1, 0])
+    geometry = build_geometry(depth, normal, CAMERA)
+    table = geometry.plane_label[-1, 32]
+    assert table >= 0
+    distance, plane, _ = hit(geometry.mesh, (0.1, 0, -0.3), (0, -1, 0))
+    assert plane == table and distance == pytest.approx(0.8, abs=0.02)
+    for x, z in ((0.1, -6.0), (1.5, -7.0), (-1.5, -5.5)):  # seen floor: no table above it
+        assert hit(geometry.mesh, (x, 0.5, z), (0, -1, 0))[0] > 2
+
+
+def test_the_flat_face_of_an_object_is_not_continued():
+    wall = plane_depth(CAMERA, (0, 0, 1), -9.0)
+    box, box_normal = box_depth(CAMERA, (-1.2, -1.0, -4), (1.2, 1.0, -3))
+    depth = np.minimum(wall, box)
+    normal = np.where(np.isfinite(box)[..., None], box_normal, [0.0, 0, 1])
+    geometry = build_geometry(depth, normal, CAMERA)
+    face = geometry.plane_label[24, 32]
+    assert face >= 0 and face != geometry.plane_label[0, 0]
+    assert not (geometry.mesh.face_plane == face).any()
+    assert (geometry.mesh.face_plane == geometry.plane_label[0, 0]).any()
+
+
+def test_completion_can_be_switched_off_and_its_extent_chosen(furnished):
+    geometry, depth, _, _, _ = furnished
+    normal = room(CAMERA)[1]
+    bare = build_geometry(depth, normal, CAMERA, completion="none")
+    assert (bare.plane_label == -1).all() and (bare.mesh.face_plane == -1).all()
+    assert bare.plane_label.dtype == np.int8 and bare.mesh.face_plane.dtype == np.int16
+    count = len(bare.mesh.faces)
+    np.testing.assert_array_equal(geometry.mesh.faces[:count], bare.mesh.faces)
+    np.testing.assert_array_equal(geometry.mesh.face_pixel[:count], bare.mesh.face_pixel)
+    plane = Plane(np.array([0.0, 1, 0]), -1.0, geometry.plane_label == geometry.plane_label[-1, 0])
+    sizes = []
+    for extent in (1.0, 4.0):
+        mesh = complete(depth_to_mesh(depth, normal, CAMERA), [plane], depth, CAMERA, extent=extent)
+        sizes.append(np.ptp(mesh.vertices[:, 0]))
+    assert sizes[1] == pytest.approx(4 * sizes[0], rel=0.05)
+    with pytest.raises(InputError, match="'walls'"):
+        build_geometry(depth, normal, CAMERA, completion="walls")
+
+
+def test_faces_of_continuations_are_well_formed(furnished):
+    geometry, _, _, _, _ = furnished
+    mesh = geometry.mesh
+    added = mesh.face_plane >= 0
+    corners = mesh.vertices[mesh.faces[added]].astype(float)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.linalg.norm(normal, axis=-1) > 0).all()
+    assert ((normal * -corners[:, 0]).sum(-1) > 0).all()  # counter-clockwise seen from the camera's side
+    pixel = mesh.face_pixel[added]
+    np.testing.assert_array_equal(geometry.plane_label.ravel()[pixel], mesh.face_plane[added])
+    uv = mesh.uv[mesh.faces[added]]
+    texel = np.floor(uv[..., 1] * 48).astype(int) * 64 + np.floor(uv[..., 0] * 64).astype(int)
+    np.testing.assert_array_equal(texel, np.repeat(pixel[:, None], 3, 1))
+    assert added.sum() < 60_000
+
+
+@pytest.mark.skipif(not OFFICIAL.exists(), reason="shared/data/official_indoor is not here")
+def test_the_table_of_a_real_picture_is_one_plane_and_goes_on_under_the_camera():
+    import OpenEXR
+
+    depth, normal = (
+        next(iter(OpenEXR.File(str(OFFICIAL / f"{name}.exr")).channels().values())).pixels.astype(np.float32)
+        for name in ("depth", "normal")
+    )
+    depth, normal = depth[1::4, 1::4], normal[1::4, 1::4]
+    camera = Camera(128, 128, 35.0)
+    geometry = build_geometry(depth, normal, camera)
+    table = geometry.plane_label[-1, 64]
+    assert table >= 0 and (geometry.plane_label[-30:] == table).mean() > 0.9
+    assert geometry.plane_label[5, 20] not in (-1, table)  # the wall
+    below = [0, 0, -0.5 * np.median(depth)]
+    _, plane, _ = hit(geometry.mesh, below, (0, -1, 0))
+    assert plane == table
+    screen = np.argwhere(depth > 0)[::7, ::-1] + 0.37
+    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(camera, screen))
+    assert (face >= 0).all() and (geometry.mesh.face_plane[face] == -1).all()

@@ -1,0 +1,91 @@
+"""Occlusion cuts: where the grid parts, and where it must not."""
+
+import numpy as np
+import pytest
+from geometry_scenes import plane_depth, sphere_depth
+
+from materialist.geometry.cuts import find_cuts
+from materialist.types import Camera
+
+CAMERA = Camera(96, 64, 50.0)
+
+
+@pytest.mark.parametrize("tau", [1.0, 6.0, 12.0])
+def test_a_floor_seen_down_to_the_horizon_is_whole(tau):
+    # A floor 1 below the camera, level, seen from 22 degrees below the horizon up to a third of a pixel below it.
+    depth = plane_depth(CAMERA, (0.003, 1, -0.002), -1.0)
+    depth = np.where(depth < 1e4, depth, 0)
+    assert (depth > 200).any()  # below a degree
+    cuts = find_cuts(depth, CAMERA, tau)
+    assert not cuts.cut_x.any() and not cuts.cut_y.any()
+
+
+@pytest.mark.parametrize("degrees", [3.0, 1.0])
+@pytest.mark.parametrize("turn", [0.0, 30.0, 45.0, 90.0])
+def test_a_plane_at_grazing_angle_is_whole(degrees, turn):
+    camera = Camera(64, 48, 3.0)  # a narrow view, so that the angle is nearly the same everywhere
+    tilt, spin = np.radians(90 - degrees), np.radians(turn)
+    normal = np.array([np.sin(tilt) * np.cos(spin), np.sin(tilt) * np.sin(spin), np.cos(tilt)])
+    depth = plane_depth(camera, normal, normal @ [0, 0, -10])
+    depth = np.where((depth > 2) & (depth < 100), depth, 0)
+    cuts = find_cuts(depth, camera, 6.0)
+    assert cuts.link_x.sum() > 500
+    assert not cuts.cut_x.any() and not cuts.cut_y.any()
+
+
+@pytest.mark.parametrize("pixels", [6, 12, 25, 45])
+@pytest.mark.parametrize("shift", [0.0, 0.13, 0.37])
+def test_a_sphere_is_cut_off_all_round_but_not_cracked(pixels, shift):
+    camera = Camera(100, 100, 40.0)
+    distance = 10.0
+    radius = pixels * distance / camera.focal
+    sphere, _ = sphere_depth(camera, (shift * distance / camera.focal, 0.05, -distance), radius)
+    depth = np.minimum(sphere, 40.0)
+    ball = np.isfinite(sphere)
+    cuts = find_cuts(depth, camera, 6.0)
+    rim_x, rim_y = ball[:, :-1] != ball[:, 1:], ball[:-1] != ball[1:]
+    np.testing.assert_array_equal(cuts.cut_x, rim_x)
+    np.testing.assert_array_equal(cuts.cut_y, rim_y)
+
+
+@pytest.mark.parametrize("tau", [1.0, 6.0, 8.0, 12.0])
+def test_the_criterion_switches_at_tau(tau):
+    # One step across the middle of the picture: the ray runs along -Z there, so the angle has a closed form.
+    camera = Camera(40, 30, 5.0)
+    near = 5.0
+    for factor, cut in ((0.9, True), (1.1, False)):
+        # The pair spans half a pixel at depth `near` and half a pixel at `near + step`:
+        # tan(angle) = (near + step / 2) / focal / step.
+        step = near / (camera.focal * np.tan(np.radians(tau * factor)) - 0.5)
+        depth = np.full((30, 40), near)
+        depth[:, 20:] = near + step
+        cuts = find_cuts(depth, camera, tau)
+        assert cuts.cut_x[15, 19] == cut
+        assert cuts.cut_x.sum() == (30 if cut else 0) and not cuts.cut_y.any()
+
+
+def test_a_diagonal_step_is_cut_across_both_axes():
+    depth = np.where(np.add.outer(np.arange(30), np.arange(30)) > 29, 5.0, 2.0)
+    cuts = find_cuts(depth, Camera(30, 30, 40.0), 6.0)
+    np.testing.assert_array_equal(cuts.cut_x, depth[:, 1:] != depth[:, :-1])
+    np.testing.assert_array_equal(cuts.cut_y, depth[1:] != depth[:-1])
+
+
+def test_a_step_blurred_over_three_pixels_is_still_cut():
+    depth = np.full((20, 40), 4.0)
+    depth[:, 20:] = 2.0
+    depth[:, 18:22] = [3.6, 3.2, 2.8, 2.4]
+    cuts = find_cuts(depth, Camera(40, 20, 10.0), 6.0)
+    assert cuts.cut_x.any(1).all()
+
+
+def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
+    rng = np.random.default_rng(1)
+    depth = rng.uniform(1, 3, (24, 31)) * (rng.random((24, 31)) > 0.3)
+    camera = Camera(31, 24, 60.0)
+    small, large = find_cuts(depth, camera, 2.0), find_cuts(depth, camera, 20.0)
+    pair = (depth[:, 1:] > 0) & (depth[:, :-1] > 0)
+    for cuts in (small, large):
+        np.testing.assert_array_equal(cuts.cut_x ^ cuts.link_x, pair)
+    assert (large.cut_x | ~small.cut_x).all() and (large.cut_y | ~small.cut_y).all()
+    assert large.cut_x.sum() > small.cut_x.sum()

@@ -1,0 +1,83 @@
+"""Dominant planes: found where they are, and not where they are not."""
+
+import numpy as np
+import pytest
+from geometry_scenes import plane_depth, room, sphere_depth
+
+from materialist.errors import InputError
+from materialist.geometry.planes import find_planes
+from materialist.types import Camera
+
+CAMERA = Camera(128, 96, 60.0)
+
+
+def degrees_between(a, b):
+    return np.degrees(np.arccos(np.clip(np.dot(a, b), -1, 1)))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_floor_and_wall_of_a_room(seed):
+    depth, normal, label = room(CAMERA)
+    planes = find_planes(depth, normal, CAMERA, seed=seed)
+    for k, (true, offset) in enumerate((((0, 1, 0), -1.0), ((0, 0, 1), -6.0))):
+        best = min(planes, key=lambda plane: degrees_between(plane.normal, true) + abs(plane.offset - offset))
+        assert degrees_between(best.normal, true) < 1
+        assert best.offset == pytest.approx(offset, rel=0.02)
+        overlap = (best.mask & (label == k)).sum() / (best.mask | (label == k)).sum()
+        assert overlap > 0.97
+
+
+def test_noise_in_depth_and_normals_is_survived():
+    rng = np.random.default_rng(3)
+    depth, normal, label = room(CAMERA)
+    depth = depth * (1 + 0.006 * rng.standard_normal(depth.shape))
+    normal = normal + 0.1 * rng.standard_normal(normal.shape)
+    normal = (normal / np.linalg.norm(normal, axis=-1, keepdims=True)).astype(np.float32)
+    planes = find_planes(depth, normal, CAMERA)
+    floor = min(planes, key=lambda plane: degrees_between(plane.normal, (0, 1, 0)))
+    assert degrees_between(floor.normal, (0, 1, 0)) < 1
+    assert (floor.mask & (label == 0)).sum() > 0.9 * (label == 0).sum()
+
+
+def test_a_bent_table_stays_one_plane():
+    depth = plane_depth(CAMERA, (0, 0.9, 0.436), -2.0)
+    depth = depth * (1 + 0.05 * np.linspace(-1, 1, 96)[:, None] ** 2)  # a relief that is not metric
+    normal = np.broadcast_to(np.float32([0, 0.9, 0.436]), (96, 128, 3))
+    planes = find_planes(depth, normal, CAMERA)
+    assert len(planes) == 1 and planes[0].mask.mean() > 0.97
+
+
+def test_a_sphere_is_no_plane_and_masks_are_disjoint():
+    sphere, outward = sphere_depth(CAMERA, (0, 0, -4), 1.8)
+    depth = np.where(np.isfinite(sphere), sphere, 0)
+    planes = find_planes(depth, np.where(depth[..., None] > 0, outward, 0).astype(np.float32), CAMERA)
+    assert sum(plane.mask.sum() for plane in planes) < 0.5 * (depth > 0).sum()
+    depth, normal, _ = room(CAMERA)
+    planes = find_planes(depth, normal, CAMERA, max_planes=4)
+    assert sum(plane.mask.astype(int) for plane in planes).max() == 1
+    assert [int(p.mask.sum()) for p in planes] == sorted((int(p.mask.sum()) for p in planes), reverse=True)
+
+
+def test_planes_face_the_camera_and_their_inverse_depth_is_that_of_the_map():
+    depth, normal, _ = room(CAMERA)
+    from materialist.camera import pixel_rays
+
+    for plane in find_planes(depth, normal, CAMERA):
+        assert plane.offset < 0 and np.linalg.norm(plane.normal) == pytest.approx(1)
+        np.testing.assert_allclose(
+            plane.inverse_depth(pixel_rays(CAMERA))[plane.mask] * depth[plane.mask], 1, atol=0.081
+        )
+
+
+def test_same_seed_same_planes_and_a_limit_on_their_number():
+    depth, normal, _ = room(CAMERA)
+    first, second = (find_planes(depth, normal, CAMERA, seed=5) for _ in range(2))
+    assert all((a.normal == b.normal).all() and (a.mask == b.mask).all() for a, b in zip(first, second, strict=True))
+    assert len(find_planes(depth, normal, CAMERA, max_planes=1)) == 1
+    assert find_planes(depth, normal, CAMERA, max_planes=0) == []
+
+
+def test_tiny_pictures_and_bad_maps():
+    assert find_planes(np.ones((1, 1)), np.ones((1, 1, 3)), Camera(1, 1)) == []
+    with pytest.raises(InputError, match="0 everywhere"):
+        find_planes(np.zeros((4, 4)), np.ones((4, 4, 3)), Camera(4, 4))
