@@ -14,7 +14,7 @@ LAYER = {
     **dict.fromkeys(("fit", "edit", "export"), 2),
     "pipeline": 3,
     "doctor": 3,
-    **dict.fromkeys(("cli", "studio", "batch", "bench", "train"), 4),
+    **dict.fromkeys(("__main__", "cli", "studio", "batch", "bench", "train"), 4),
 }
 """Package or module -> layer; an import may go to the same or a lower one."""
 

@@ -30,10 +30,10 @@ sys.stdout.write(" ".join(names))
 """Loads the CPU variant and runs one kernel: the step that a wrong LLVM does not survive."""
 
 _EXTRAS = {
-    "rawpy": ("camera RAW photos", "pip install rawpy"),
-    "pyoidn": ("denoised pictures", "pip install pyoidn"),
-    "transformers": ("hub predictors", "pip install transformers"),
-    "diffusers": ("Marigold predictor", "pip install diffusers"),
+    "rawpy": "camera RAW photos",
+    "pyoidn": "denoised pictures",
+    "transformers": "hub predictors",
+    "diffusers": "Marigold predictor",
 }
 
 
@@ -58,7 +58,7 @@ def examine() -> list[Finding]:
         llvm,
         _renderer(path),
         _cuda(),
-        *(_extra(name, *about) for name, about in _EXTRAS.items()),
+        *(_extra(name, purpose) for name, purpose in _EXTRAS.items()),
         _weights(),
         _memory(),
         _disk(),
@@ -76,7 +76,12 @@ def _package(name: str) -> Finding:
     try:
         return Finding(name, "ok", version(name))
     except PackageNotFoundError:
-        return Finding(name, "broken", "not installed", f"{sys.executable} -m pip install {name}")
+        return Finding(name, "broken", "not installed", _pip(name))
+
+
+def _pip(name: str) -> str:
+    """Install into this very Python, whichever `pip` the shell would find."""
+    return f"{sys.executable} -m pip install {name}"
 
 
 def _llvm() -> tuple[Finding, str | None]:
@@ -120,11 +125,11 @@ def _cuda() -> Finding:
     return Finding("GPU (CUDA)", "ok", child.stdout.strip().splitlines()[0])
 
 
-def _extra(name: str, purpose: str, remedy: str) -> Finding:
+def _extra(name: str, purpose: str) -> Finding:
     try:
         return Finding(name, "ok", f"{version(name)} ({purpose})")
     except PackageNotFoundError:
-        return Finding(name, "missing", f"optional: {purpose}", remedy)
+        return Finding(name, "missing", f"optional: {purpose}", _pip(name))
 
 
 def _weights() -> Finding:

@@ -46,11 +46,11 @@ def parse_extra(arguments: list[str]) -> dict[str, Any]:
             name, equals, value = argument[2:].partition("=")
             options[_key(name)] = _value(value) if equals else True
             waiting = None if equals else _key(name)
+        elif argument.partition("=")[0].isidentifier() and "=" in argument:
+            name, _, value = argument.partition("=")
+            options[name], waiting = _value(value), None
         elif waiting is not None:
             options[waiting], waiting = _value(argument), None
-        elif "=" in argument:
-            name, _, value = argument.partition("=")
-            options[_key(name)] = _value(value)
         else:
             raise InputError(f"{argument!r} is not an option; write --name value or name=value.")
     return options

@@ -24,6 +24,8 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     wants_json = "--json" in arguments
     try:
         result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
+        if result == INTERRUPTED:  # how some versions of typer report Ctrl-C
+            raise KeyboardInterrupt
         return result if isinstance(result, int) else OK
     except MaterialistError as error:
         return _fail(type(error).__name__, str(error), error.exit_code, wants_json)

@@ -102,5 +102,5 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
         mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_AREA)
     inside = mask > 0.5
     if not inside.any():
-        raise InputError(f"The mask {path} is empty: no pixel is brighter than half.")
+        raise InputError(f"The mask {path} is empty: no pixel is brighter than half at working size.")
     return inside

@@ -1,0 +1,5 @@
+"""`python -m materialist`."""
+
+from materialist.cli import main
+
+main()

@@ -1,0 +1,50 @@
+"""A stand-in for the pipeline, so that the command line is tested without minutes of fitting."""
+
+import sys
+import types
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from made_scene import make_mesh, make_scene
+
+from materialist.types import Geometry, Photo, Scene
+
+
+def scene_of(photo: Photo) -> Scene:
+    """A made-up scene of the photo's size."""
+    shape = photo.linear.shape[:2]
+    scene = make_scene(*shape)
+    mesh = make_mesh(scene.depth, scene.normal, photo.camera)
+    return replace(
+        scene,
+        photo=photo,
+        camera=photo.camera,
+        geometry=Geometry(mesh, scene.geometry.plane_label),
+        rerender=photo.linear,
+    )
+
+
+def install(monkeypatch: Any, failure: BaseException | None = None) -> list[dict[str, Any]]:
+    """Put the stand-in in the pipeline's place; returns the list of calls it will see."""
+    calls: list[dict[str, Any]] = []
+
+    def invert(photo: Photo, **options: Any) -> Scene:
+        calls.append({"photo": photo, **options})
+        for step in range(3):
+            options["progress"]("light", step + 1, 3)
+        if failure is not None:
+            raise failure
+        return scene_of(photo)
+
+    def render_scene(scene: Scene, **options: Any) -> np.ndarray:
+        calls.append({"scene": scene, **options})
+        return scene.rerender
+
+    module = types.ModuleType("materialist.pipeline")
+    module.invert, module.render_scene = invert, render_scene  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "materialist.pipeline", module)
+    import materialist
+
+    monkeypatch.setattr(materialist, "pipeline", module, raising=False)
+    return calls

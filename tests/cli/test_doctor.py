@@ -1,0 +1,52 @@
+"""The examination: it never raises, and every failing line has the command that mends it."""
+
+import json
+import subprocess
+
+import pytest
+
+from materialist import doctor
+from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
+from materialist.doctor import Finding
+
+
+def test_a_wrong_llvm_is_found_in_a_child_and_survived(monkeypatch):
+    monkeypatch.setattr(
+        doctor.subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, -6, "", "Cannot select")
+    )
+    finding = doctor._renderer("/wrong/libLLVM.so")
+    assert finding.state == "broken" and "Cannot select" in finding.detail and "libllvm19" in finding.remedy
+
+
+def test_a_probe_that_hangs_is_survived(monkeypatch):
+    def hang(*_, **__):
+        raise subprocess.TimeoutExpired("python", 120)
+
+    monkeypatch.setattr(doctor.subprocess, "run", hang)
+    assert doctor._renderer(None).state == "broken"
+
+
+def test_missing_packages_name_their_command():
+    finding = doctor._package("no-such-package-here")
+    assert finding.state == "broken" and finding.remedy.endswith("pip install no-such-package-here")
+    assert doctor._extra("no-such-package-here", "nothing").state == "missing"
+
+
+@pytest.mark.parametrize(("state", "code"), [("ok", 0), ("missing", 0), ("broken", 2)])
+def test_exit_code_follows_the_main_job(monkeypatch, capsys, state, code):
+    monkeypatch.setattr(doctor, "examine", lambda: [Finding("LLVM", state, "19", "mend it")])
+    assert run_to_exit_code(app, ["doctor"]) == code
+    shown = capsys.readouterr().out
+    assert "LLVM" in shown and "mend it" in shown
+    assert run_to_exit_code(app, ["doctor", "--json"]) == code
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["ok"] is (code == 0) and last["findings"][0]["remedy"] == "mend it"
+
+
+def test_this_machine():
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert findings["Python"].state == "ok" and findings["torch"].state == "ok"
+    for finding in findings.values():
+        assert finding.state in ("ok", "missing", "broken")
+        assert finding.state != "broken" or finding.remedy

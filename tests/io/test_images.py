@@ -1,0 +1,126 @@
+"""EXR, PNG, maps, masks and the contact sheet."""
+
+import os
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from made_scene import make_scene
+from PIL import Image
+
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError, OutputError
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.image import ensure_image_writable, read_map, read_mask, write_image, write_png
+from materialist.io.overview import overview
+
+
+@settings(deadline=None, max_examples=25)
+@given(data=st.data(), channels=st.sampled_from([(), (3,), (4,)]))
+def test_exr_round_trip_is_exact(data, channels, tmp_path_factory):
+    size = data.draw(st.tuples(st.integers(1, 9), st.integers(1, 9)))
+    array = data.draw(hnp.arrays(np.float32, (*size, *channels), elements=st.floats(width=32)))
+    path = tmp_path_factory.getbasetemp() / "a.exr"
+    write_exr(path, array)
+    back = read_exr(path)
+    assert back.dtype == np.float32
+    np.testing.assert_array_equal(back, array)
+
+
+def test_half_exr_and_strided_input(tmp_path):
+    array = np.random.default_rng(0).random((6, 8, 3), np.float32)[::-1, ::2]
+    write_exr(tmp_path / "a.exr", array, half=True)
+    np.testing.assert_array_equal(read_exr(tmp_path / "a.exr"), array.astype(np.float16).astype(np.float32))
+
+
+def test_exr_errors(tmp_path):
+    with pytest.raises(InputError, match=r"\[2, 2, 2\]"):
+        write_exr(tmp_path / "a.exr", np.zeros((2, 2, 2)))
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_exr(tmp_path / "no/such/a.exr", np.zeros((2, 2)))
+    with pytest.raises(InputError, match="no EXR"):
+        read_exr(tmp_path / "a.exr")
+    (tmp_path / "a.exr").write_bytes(b"v/1\x01" + b"x" * 100)
+    with pytest.raises(InputError, match="readable EXR"):
+        read_exr(tmp_path / "a.exr")
+
+
+def test_exr_of_the_renderer(shared):
+    maps = shared / "official_indoor/maps"
+    assert read_exr(maps / "albedo.exr").shape == (512, 512, 3)
+    assert read_exr(maps / "depth.exr").shape == (512, 512)
+
+
+def test_png_is_srgb_and_right_way_up(tmp_path):
+    linear = np.random.default_rng(0).random((5, 9, 3), np.float32) * 1.5 - 0.2
+    write_png(tmp_path / "a.png", linear)
+    pixels = np.asarray(Image.open(tmp_path / "a.png"))
+    np.testing.assert_array_equal(pixels, np.round(linear_to_srgb(linear) * 255))
+
+
+def test_write_image_is_whole_and_asks_before_replacing(tmp_path, monkeypatch):
+    linear = np.random.default_rng(0).random((5, 9, 3), np.float32)
+    write_image(tmp_path / "new/a.exr", linear)
+    np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear)
+    with pytest.raises(OutputError, match="--force"):
+        write_image(tmp_path / "new/a.exr", linear)
+    write_image(tmp_path / "new/a.exr", linear * 2, force=True)
+    np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear * 2)
+    assert os.listdir(tmp_path / "new") == ["a.exr"]
+    with pytest.raises(InputError, match=r"\.png"):
+        ensure_image_writable(tmp_path / "a.jpg")
+    with pytest.raises(OutputError):
+        ensure_image_writable("/proc/a.png")
+
+
+def test_maps_of_8_and_16_bits_are_scaled_not_decoded(tmp_path):
+    values = np.random.default_rng(0).integers(0, 256, (6, 7, 3)).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "a.png"), values[..., ::-1])
+    np.testing.assert_allclose(read_map(tmp_path / "a.png"), values / 255, atol=1e-7)
+    cv2.imwrite(str(tmp_path / "b.png"), values[..., 0].astype(np.uint16) * 257)
+    np.testing.assert_allclose(read_map(tmp_path / "b.png"), values[..., 0] / 255, atol=1e-7)
+    for name, content in (("c.png", b""), ("d.png", b"text")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match="readable"):
+            read_map(tmp_path / name)
+
+
+def test_masks(tmp_path):
+    mask = np.zeros((40, 60), np.uint8)
+    mask[10:20, 30:50] = 255
+    cv2.imwrite(str(tmp_path / "m.png"), mask)
+    np.testing.assert_array_equal(read_mask(tmp_path / "m.png", (40, 60)), mask > 0)
+    small = read_mask(tmp_path / "m.png", (20, 30), (40, 60))
+    assert small.dtype == bool and small.sum() == 5 * 10 and small[5:10, 15:25].all()
+    with pytest.raises(InputError, match="60 x 40 pixels, the photo 30 x 30"):
+        read_mask(tmp_path / "m.png", (30, 30))
+    cv2.imwrite(str(tmp_path / "e.png"), mask * 0)
+    with pytest.raises(InputError, match="empty"):
+        read_mask(tmp_path / "e.png", (40, 60))
+
+
+@pytest.mark.parametrize("shape", [(40, 40), (60, 24), (96, 12), (24, 60), (12, 96)])
+def test_overview_of_any_shape(shape):
+    sheet = overview(make_scene(*shape))
+    assert sheet.dtype == np.uint8 and sheet.shape[1:] == (1600, 3) and 500 < sheet.shape[0] < 3200
+
+
+def test_overview_shows_the_photo_and_its_error(scene):
+    sheet = overview(scene)
+    assert (sheet == overview(scene)).all()
+    changed = overview(replace(scene, rerender=scene.photo.linear))
+    rows, columns = np.nonzero((sheet != changed).any(-1))
+    # The photo's own tile, the left third of the first row, must not depend on the re-rendering.
+    assert columns[rows < 500].min() > 540
+
+
+def test_overview_of_a_scene_with_nothing_in_it(scene):
+    """All sky, no faces, black light: still a sheet."""
+    empty = replace(scene.geometry.mesh, faces=np.zeros((0, 3), np.int32), face_plane=np.zeros(0, np.int16))
+    geometry = replace(scene.geometry, mesh=replace(empty, face_pixel=np.zeros(0, np.int32)))
+    bare = replace(scene, depth=scene.depth * 0, envmap=scene.envmap * 0, geometry=geometry)
+    assert overview(bare).shape[1] == 1600

@@ -1,0 +1,276 @@
+"""The scene package: exact round trip, and whole or not at all."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from dataclasses import fields, is_dataclass, replace
+
+import numpy as np
+import pytest
+from made_scene import make_scene
+
+from materialist.errors import OutputError, SceneError
+from materialist.io import package, target
+from materialist.io.package import load_scene, save_scene
+from materialist.io.ply import read_ply, write_ply
+from materialist.io.target import ensure_writable
+
+
+def assert_same(a, b, where="scene"):
+    """Every field of two dataclass trees, arrays bit for bit with their dtypes."""
+    assert type(a) is type(b), where
+    if is_dataclass(a):
+        for field in fields(a):
+            assert_same(getattr(a, field.name), getattr(b, field.name), f"{where}.{field.name}")
+    elif isinstance(a, np.ndarray):
+        assert a.dtype == b.dtype and a.shape == b.shape, where
+        assert a.tobytes() == b.tobytes(), where
+    else:
+        assert a == b, where
+
+
+def test_round_trip_is_exact(scene, tmp_path):
+    save_scene(scene, tmp_path / "a.scene")
+    assert_same(load_scene(tmp_path / "a.scene"), scene)
+
+
+def test_round_trip_of_a_photo_from_memory(scene, tmp_path):
+    scene = replace(
+        scene, photo=replace(scene.photo, source=None, path=None, original=scene.photo.original[:7, :5] * 7)
+    )
+    save_scene(scene, tmp_path / "a.scene")
+    assert_same(load_scene(tmp_path / "a.scene"), scene)
+
+
+def test_round_trip_of_a_real_photo(shared, scene, tmp_path):
+    from materialist.io.photo import read_photo
+
+    photo = read_photo(shared / "odd_inputs/orientation6_streetlamp_exif.jpg", size=33)
+    shape = (photo.camera.height, photo.camera.width)
+    materials = replace(
+        scene.materials,
+        albedo=np.zeros((*shape, 3), np.float32),
+        roughness=np.ones(shape, np.float32),
+        metallic=np.ones(shape, np.float32),
+    )
+    normal, depth = np.ones((*shape, 3), np.float32), np.ones(shape, np.float32)
+    prior = replace(scene.prior, materials=materials, normal=normal, depth=depth)
+    label = np.full(shape, -1, np.int8)
+    scene = replace(
+        scene, camera=photo.camera, photo=photo, materials=materials, prior=prior, normal=normal, depth=depth
+    )
+    scene = replace(scene, geometry=replace(scene.geometry, plane_label=label), rerender=photo.linear)
+    save_scene(scene, tmp_path / "a.scene")
+    assert_same(load_scene(tmp_path / "a.scene"), scene)
+    original = tmp_path / "a.scene/original.jpg"
+    assert original.read_bytes() == (shared / "odd_inputs/orientation6_streetlamp_exif.jpg").read_bytes()
+
+
+def test_the_files_of_the_contract(scene, tmp_path):
+    save_scene(scene, tmp_path / "deep/down/a.scene")
+    root = tmp_path / "deep/down/a.scene"
+    maps = ("albedo", "roughness", "metallic", "normal", "depth")
+    expected = {"scene.json", "photo.exr", "photo.png", "original.png", "envmap.exr", "mesh.ply", "plane_label.png"}
+    expected |= {"rerender.exr", "rerender.png", "report.json", "overview.png"}
+    expected |= {f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in maps}
+    assert {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()} == expected
+    assert os.listdir(tmp_path / "deep/down") == ["a.scene"]
+    report = json.loads((root / "report.json").read_text())
+    assert report["rerender_psnr_path"] == 31.25 and report["warnings"] == ["dim"]
+    meta = json.loads((root / "scene.json").read_text())
+    assert meta["version"] == 1 and meta["size"] == [33, 24] and meta["provenance"]["seed"] == 3
+
+
+def test_provenance_of_numpy_numbers_and_infinite_metrics(scene, tmp_path):
+    report = replace(scene.report, metrics={"psnr": float("inf"), "n": np.float32(0.5)})
+    scene = replace(scene, report=report, provenance={"sizes": (np.int64(3), tmp_path)})
+    save_scene(scene, tmp_path / "a.scene")
+    loaded = load_scene(tmp_path / "a.scene")
+    assert np.isnan(loaded.report.metrics["psnr"]) and loaded.report.metrics["n"] == 0.5
+    assert loaded.provenance == {"sizes": [3, str(tmp_path)]}
+
+
+def test_an_existing_scene_is_kept_without_force_and_replaced_with_it(scene, tmp_path):
+    place = tmp_path / "a.scene"
+    save_scene(scene, place)
+    other = replace(scene, envmap=scene.envmap * 2)
+    with pytest.raises(OutputError, match="--force"):
+        save_scene(other, place)
+    assert_same(load_scene(place), scene)
+    save_scene(other, place, force=True)
+    assert_same(load_scene(place), other)
+    assert os.listdir(tmp_path) == ["a.scene"]
+
+
+def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
+    (tmp_path / "holiday").mkdir()
+    (tmp_path / "holiday/precious.jpg").write_text("x")
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "link").symlink_to(tmp_path / "holiday")
+    for name in ("holiday", "file", "link"):
+        with pytest.raises(OutputError, match="not a scene package"):
+            save_scene(scene, tmp_path / name, force=True)
+    assert (tmp_path / "holiday/precious.jpg").exists()
+
+
+@pytest.mark.parametrize("place", ["/proc/a.scene", "FILE/a.scene", "n" * 300, "/"])
+def test_places_that_cannot_be_written(scene, tmp_path, place):
+    (tmp_path / "FILE").write_text("x")
+    where = place if place.startswith("/") else tmp_path / place
+    for attempt in (lambda: ensure_writable(where), lambda: save_scene(scene, where)):
+        with pytest.raises(OutputError) as caught:
+            attempt()
+        assert "\n" not in str(caught.value)
+    assert os.listdir(tmp_path) == ["FILE"]
+
+
+def test_the_check_before_the_work_leaves_nothing(tmp_path):
+    ensure_writable(tmp_path / "a.scene")
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("culprit", ["write_exr", "write_ply", "write_png_bytes", "_write_json"])
+def test_a_full_disk_leaves_nothing_and_keeps_the_old_scene(scene, tmp_path, monkeypatch, culprit):
+    save_scene(scene, tmp_path / "a.scene")
+
+    def full(path, *rest, **options):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(package, culprit, full)
+    with pytest.raises(OutputError, match="no space left"):
+        save_scene(replace(scene, envmap=scene.envmap * 2), tmp_path / "a.scene", force=True)
+    with pytest.raises(OutputError, match="no space left"):
+        save_scene(scene, tmp_path / "b.scene")
+    monkeypatch.undo()
+    assert os.listdir(tmp_path) == ["a.scene"]
+    assert_same(load_scene(tmp_path / "a.scene"), scene)
+
+
+@pytest.mark.parametrize("limit", [200, 3_000, 30_000, 70_000])
+def test_files_that_the_system_really_refuses_to_grow(tmp_path, limit):
+    """A file size limit stands for a full disk; each size stops another writer."""
+    resource = pytest.importorskip("resource", reason="needs POSIX limits")
+    scene = make_scene(64, 80)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    try:
+        with pytest.raises(OutputError, match="cannot be written"):
+            save_scene(scene, tmp_path / "a.scene")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
+def test_an_interruption_leaves_nothing(scene, tmp_path, monkeypatch, stop):
+    def interrupted(*_):
+        raise stop
+
+    monkeypatch.setattr(package, "write_ply", interrupted)
+    with pytest.raises(stop):
+        save_scene(scene, tmp_path / "a.scene")
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_failed_rename_puts_the_old_scene_back(scene, tmp_path, monkeypatch):
+    save_scene(scene, tmp_path / "a.scene")
+    rename = os.rename
+
+    def stubborn(source, destination):
+        if "partial" in str(source):
+            raise OSError(errno.EIO, "Input/output error")
+        rename(source, destination)
+
+    monkeypatch.setattr(target.os, "rename", stubborn)
+    with pytest.raises(OutputError, match="input/output"):
+        save_scene(replace(scene, envmap=scene.envmap * 2), tmp_path / "a.scene", force=True)
+    monkeypatch.undo()
+    assert_same(load_scene(tmp_path / "a.scene"), scene)
+    assert os.listdir(tmp_path) == ["a.scene"]
+
+
+def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
+    """A child is killed between two files of the package, and once more between the two renames."""
+    script = (
+        "import os, sys\nsys.path.insert(0, {tests!r})\nfrom made_scene import make_scene\n"
+        "from materialist.io import package, target\n"
+        "def die(*a, **k): os.kill(os.getpid(), 9)\n{patch}\n"
+        "package.save_scene(make_scene(), {place!r}, force=True)\n"
+    )
+    place = tmp_path / "a.scene"
+    tests = os.path.dirname(__file__)
+    kill_midway = script.format(tests=tests, place=str(place), patch="package.write_ply = die")
+    assert subprocess.run([sys.executable, "-c", kill_midway], check=False).returncode == -9
+    assert not place.exists() and len(os.listdir(tmp_path)) == 1
+    save_scene(scene, place)
+    assert os.listdir(tmp_path) == ["a.scene"]
+
+    patch = "old = os.rename\ndef swap(s, d): old(s, d) or die()\ntarget.os.rename = swap"
+    kill_between = script.format(tests=tests, place=str(place), patch=patch)
+    assert subprocess.run([sys.executable, "-c", kill_between], check=False).returncode == -9
+    assert not place.exists()
+    with pytest.raises(SceneError, match="mv "):
+        load_scene(place)
+    save_scene(replace(scene, provenance={}), place, force=True)
+    assert load_scene(place).provenance == {} and os.listdir(tmp_path) == ["a.scene"]
+
+
+def test_a_running_neighbour_is_left_alone(scene, tmp_path):
+    neighbour = tmp_path / target._sibling(tmp_path / "a.scene", "partial").name.replace(str(os.getpid()), "1")
+    neighbour.mkdir()
+    save_scene(scene, tmp_path / "a.scene")
+    assert neighbour.is_dir()
+
+
+def damage(root, name, content):
+    (root / name).unlink()
+    if content is not None:
+        (root / name).write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["scene.json", "report.json", "maps/depth.exr", "mesh.ply", "plane_label.png"])
+@pytest.mark.parametrize("content", [None, b"", b"{}", b"nonsense" * 9])
+def test_damaged_packages(scene, tmp_path, name, content):
+    if name == "report.json" and content == b"{}":
+        pytest.skip("an empty report is legal")
+    root = tmp_path / "a.scene"
+    save_scene(scene, root)
+    damage(root, name, content)
+    with pytest.raises(SceneError):
+        load_scene(root)
+
+
+def test_missing_and_unknown_packages(scene, tmp_path):
+    with pytest.raises(SceneError, match="no scene package at"):
+        load_scene(tmp_path / "nothing")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(SceneError, match="missing"):
+        load_scene(tmp_path / "empty")
+    root = tmp_path / "a.scene"
+    save_scene(scene, root)
+    meta = json.loads((root / "scene.json").read_text())
+    (root / "scene.json").write_text(json.dumps({**meta, "version": 99}))
+    with pytest.raises(SceneError, match="version 99"):
+        load_scene(root)
+
+
+def test_maps_of_another_size_are_noticed(scene, tmp_path):
+    from materialist.io.exr import write_exr
+
+    save_scene(scene, tmp_path / "a.scene")
+    write_exr(tmp_path / "a.scene/maps/albedo.exr", scene.materials.albedo[:-1])
+    with pytest.raises(SceneError, match=r"albedo.exr is \[23, 33, 3\], the scene needs \[24, 33, 3\]"):
+        load_scene(tmp_path / "a.scene")
+
+
+def test_mesh_file_header_is_what_other_tools_expect(scene, tmp_path):
+    write_ply(tmp_path / "m.ply", scene.geometry.mesh)
+    assert_same(read_ply(tmp_path / "m.ply"), scene.geometry.mesh)
+    head = (tmp_path / "m.ply").read_bytes().split(b"end_header\n")[0].decode().splitlines()
+    assert head[:2] == ["ply", "format binary_little_endian 1.0"]
+    assert f"element vertex {24 * 33}" in head and "property list uchar int vertex_indices" in head
+    (tmp_path / "m.ply").write_bytes((tmp_path / "m.ply").read_bytes()[:-1])
+    with pytest.raises(SceneError, match="truncated"):
+        read_ply(tmp_path / "m.ply")
