@@ -1,0 +1,174 @@
+"""Procedural HDR environments, and captures from a folder, turned into the frame of a camera."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.types import Array
+
+HEIGHT = 256
+"""Rows of a benchmark envmap (the paper's 512 x 256)."""
+
+Radiance = Callable[[Array], Array]
+"""Unit directions [..., 3] in the scene frame (+Y up) -> linear radiance [..., 3]."""
+
+
+def directions(height: int) -> Array:
+    """[h, 2h, 3] float64 unit directions of texel centres, in the project's envmap convention."""
+    theta = (np.arange(height) + 0.5)[:, None] / height * np.pi
+    phi = ((np.arange(2 * height) + 0.5)[None, :] / height - 1) * np.pi
+    return np.stack(
+        [np.sin(theta) * np.sin(phi), np.cos(theta) * np.ones_like(phi), -np.sin(theta) * np.cos(phi)], axis=-1
+    )
+
+
+def environment(light_index: int, *, seed: int, data: Path | None) -> Radiance:
+    """The light of that number: a capture from DATA/envmaps/*.exr (turned at random) or a procedural one.
+
+    Raises InputError when DATA is given but holds no captures.
+    """
+    rng = np.random.default_rng([seed, 3, light_index])
+    if data is None:
+        return _KINDS[light_index % len(_KINDS)](rng)
+    files = sorted((data / "envmaps").glob("*.exr"))
+    if not files:
+        raise InputError(
+            f"{data / 'envmaps'} holds no .exr environment maps; give a folder that does, or leave out --data."
+        )
+    order = np.random.default_rng([seed, 4]).permutation(len(files))
+    return _capture(files[order[light_index % len(files)]], rng.uniform(0, 2 * np.pi))
+
+
+def envmap(radiance: Radiance, to_scene: Array) -> Array:
+    """[HEIGHT, 2 HEIGHT, 3] float32 in the camera frame; `to_scene` [3, 3] turns camera into scene directions."""
+    # Four directions a texel keep small suns from flickering between texels.
+    fine = radiance(directions(2 * HEIGHT) @ to_scene.T)
+    return fine.reshape(HEIGHT, 2, 2 * HEIGHT, 2, 3).mean((1, 3)).astype(np.float32)
+
+
+def _capture(path: Path, turn: float) -> Radiance:
+    """Bilinear lookup in a captured envmap, turned about +Y by `turn` radians."""
+    import cv2
+
+    from materialist.io.exr import read_exr
+
+    source = np.nan_to_num(np.maximum(read_exr(path), 0))[..., :3]
+    h, w = source.shape[:2]
+    wrapped = cv2.copyMakeBorder(source, 0, 0, 1, 1, cv2.BORDER_WRAP)
+
+    def lookup(d: Array) -> Array:
+        u = ((np.arctan2(d[..., 0], -d[..., 2]) + turn) / (2 * np.pi) + 0.5) % 1
+        v = np.arccos(np.clip(d[..., 1], -1, 1)) / np.pi
+        x, y = (u * w + 0.5).astype(np.float32), (v * h - 0.5).astype(np.float32)
+        return cv2.remap(wrapped, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+    return lookup
+
+
+def _axis(azimuth: float, elevation: float) -> Array:
+    """[3] unit direction at an azimuth (from -Z towards +X) and elevation, radians."""
+    return np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
+
+
+def _step(x: Array, width: float) -> Array:
+    """Smooth step from 0 at x = 0 to 1 at x = width."""
+    t = np.clip(x / width, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def _window(d: Array, axis: Array, half: tuple[float, float]) -> Array:
+    """[...] 1 inside a rectangular light of angular half sizes (radians) about an axis, soft at its border."""
+    right = np.cross([0, 1, 0], axis)
+    right /= max(np.linalg.norm(right), 1e-9)
+    up = np.cross(axis, right)
+    front = np.maximum(d @ axis, 1e-6)
+    x, y = np.abs(d @ right) / front, np.abs(d @ up) / front
+    inside = _step(np.tan(half[0]) - x + 0.02, 0.04) * _step(np.tan(half[1]) - y + 0.02, 0.04)
+    return np.where(d @ axis > 0, inside, 0)
+
+
+def _tint(rng: np.random.Generator, saturation: float) -> Array:
+    """[3] light colour between warm and cool, brightest channel 1."""
+    return np.array(colorsys.hsv_to_rgb(rng.choice([rng.uniform(0.05, 0.12), rng.uniform(0.55, 0.63)]), saturation, 1))
+
+
+def _sky(rng: np.random.Generator) -> Radiance:
+    """Blue or hazy gradient over a darker ground, with a sun of 2 to 5 degrees: strong contrast."""
+    sun = _axis(rng.uniform(-np.pi, np.pi), np.radians(rng.uniform(20, 65)))
+    zenith, horizon = np.array([0.25, 0.45, 0.9]), np.array([0.85, 0.9, 1.0])
+    ground = np.array([0.3, 0.26, 0.2]) * rng.uniform(0.5, 1)
+    width, power = np.radians(rng.uniform(1.5, 3)), rng.uniform(0.5, 1.5)
+    colour = np.array([1.0, 0.85, 0.65]) ** rng.uniform(0.5, 2)
+
+    def radiance(d: Array) -> Array:
+        y = d[..., 1:2]
+        sky = horizon + (zenith - horizon) * np.clip(y, 0, 1) ** 0.6
+        base = sky + (ground - sky) * (1 - _step(y + 0.03, 0.06))
+        angle = np.arccos(np.clip(d @ sun, -1, 1))[..., None]
+        disc = np.exp(-((angle / width) ** 2)) * (power * np.pi / (np.pi * width**2))
+        return base + (disc + 0.6 * np.exp(-angle / 0.25)) * colour
+
+    return radiance
+
+
+def _overcast(rng: np.random.Generator) -> Radiance:
+    """Bright cloud cover, brightest on one side: moderate contrast."""
+    side, amount = _axis(rng.uniform(-np.pi, np.pi), 0.5), rng.uniform(0.5, 1.5)
+    ground, tint = rng.uniform(0.1, 0.3), _tint(rng, 0.1)
+
+    def radiance(d: Array) -> Array:
+        y = d[..., 1:2]
+        sky = (1 + 2 * np.clip(y, 0, 1)) / 3 * (1 + amount * np.clip(d @ side, 0, 1)[..., None] ** 3)
+        return (ground + (sky - ground) * _step(y + 0.1, 0.2)) * tint
+
+    return radiance
+
+
+def _studio(rng: np.random.Generator) -> Radiance:
+    """Two or three soft boxes in a dim room: strong contrast."""
+    ambient = rng.uniform(0.05, 0.2) * _tint(rng, 0.2)
+    lamps = [
+        (
+            _axis(rng.uniform(-np.pi, np.pi), np.radians(rng.uniform(10, 60))),
+            (np.radians(rng.uniform(6, 20)), np.radians(rng.uniform(6, 16))),
+            rng.uniform(4, 20) * _tint(rng, rng.uniform(0, 0.35)),
+        )
+        for _ in range(int(rng.integers(2, 4)))
+    ]
+
+    def radiance(d: Array) -> Array:
+        total = ambient * (1 + 0.5 * d[..., 1:2])
+        for axis, half, colour in lamps:
+            total = total + _window(d, axis, half)[..., None] * colour
+        return total
+
+    return radiance
+
+
+def _room(rng: np.random.Generator) -> Radiance:
+    """A room with painted walls, a row of windows on one side and a ceiling lamp: moderate to strong contrast."""
+    paint = [rng.uniform(0.15, 0.5) * _tint(rng, rng.uniform(0, 0.3)) for _ in range(4)]
+    ceiling, floor = rng.uniform(0.3, 0.6), rng.uniform(0.05, 0.25) * np.array([1.0, 0.8, 0.6])
+    azimuth, outside = rng.uniform(-np.pi, np.pi), rng.uniform(4, 12) * _tint(rng, 0.15)
+    lamp = rng.uniform(0, 15) * np.array([1.0, 0.8, 0.55])
+    windows = [_axis(azimuth + k * 0.5, np.radians(12)) for k in range(int(rng.integers(1, 4)))]
+
+    def radiance(d: Array) -> Array:
+        ends = np.where(d[..., 2:] < 0, paint[0], paint[1])
+        sides = np.where(d[..., :1] < 0, paint[2], paint[3])
+        wall = np.where(np.abs(d[..., :1]) < np.abs(d[..., 2:]), ends, sides)
+        y = d[..., 1:2]
+        total = wall + (ceiling - wall) * _step(y - 0.6, 0.02) + (floor - wall) * _step(-y - 0.5, 0.02)
+        for axis in windows:
+            total = total + _window(d, axis, (0.18, 0.3))[..., None] * outside
+        return total + _window(d, _axis(azimuth + 1, 1.3), (0.2, 0.2))[..., None] * lamp
+
+    return radiance
+
+
+_KINDS = (_sky, _studio, _room, _overcast)

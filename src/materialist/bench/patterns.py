@@ -1,0 +1,89 @@
+"""Procedural albedo patterns: seamless colour pictures."""
+
+from __future__ import annotations
+
+import colorsys
+
+import numpy as np
+
+from materialist.types import Array
+
+SIZE = 256
+"""Pixels on a side of a pattern."""
+
+
+def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False) -> Array:
+    """A seamless picture [SIZE, SIZE, 3] float32 linear, albedo in [0.03, 0.9].
+
+    `kind` is 'plain', 'checker', 'noise', 'stripes', 'wood' or 'spots'; metals are bright and weakly coloured.
+    """
+    first = _colour(rng, metal)
+    second = _colour(rng, metal) if rng.random() < 0.5 else first * rng.uniform(0.25, 0.6)
+    mix = _KINDS[kind](rng)[..., None]  # [SIZE, SIZE, 1] in [0, 1]
+    grain = 1 + 0.05 * (_noise(rng, 1.0)[..., None] - 0.5)
+    return np.clip((first * (1 - mix) + second * mix) * grain, 0.03, 0.9).astype(np.float32)
+
+
+def _colour(rng: np.random.Generator, metal: bool) -> Array:
+    """[3] linear colour of a dielectric (any hue) or of a metal (silver, gold, copper)."""
+    if metal:
+        base = np.array([(0.9, 0.88, 0.86), (0.85, 0.64, 0.30), (0.82, 0.50, 0.36), (0.60, 0.60, 0.62)])
+        return base[rng.integers(len(base))] * rng.uniform(0.85, 1)
+    value, saturation = rng.uniform(0.12, 0.8), rng.choice([rng.uniform(0, 0.15), rng.uniform(0.3, 0.85)])
+    return np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value))
+
+
+def _noise(rng: np.random.Generator, slope: float) -> Array:
+    """[SIZE, SIZE] periodic noise with spectrum 1 / f**slope, in [0, 1]."""
+    f = np.hypot(np.fft.fftfreq(SIZE)[:, None], np.fft.fftfreq(SIZE)[None, :])
+    f[0, 0] = 1
+    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
+    spectrum[0, 0] = 0
+    field = np.fft.ifft2(spectrum).real
+    return np.clip(0.5 + field / (5 * field.std()), 0, 1)
+
+
+def _axes() -> tuple[Array, Array]:
+    """Two [SIZE, SIZE] coordinates in [0, 1), to the right and down."""
+    t = (np.arange(SIZE) + 0.5) / SIZE
+    return np.broadcast_to(t[None, :], (SIZE, SIZE)), np.broadcast_to(t[:, None], (SIZE, SIZE))
+
+
+def _checker(rng: np.random.Generator) -> Array:
+    x, y = _axes()
+    n = 2 * int(rng.integers(2, 5))
+    return ((np.floor(x * n) + np.floor(y * n)) % 2).astype(float)
+
+
+def _stripes(rng: np.random.Generator) -> Array:
+    x, y = _axes()
+    n, m = int(rng.integers(3, 9)), int(rng.integers(0, 3))
+    return np.clip(0.5 + 2 * np.sin(2 * np.pi * (n * y + m * x)), 0, 1)
+
+
+def _wood(rng: np.random.Generator) -> Array:
+    x, y = _axes()
+    n = int(rng.integers(5, 10))
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * y + 1.2 * _noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * x)))
+    return np.clip(0.7 * rings**2 + 0.3 * _noise(rng, 0.8), 0, 1)
+
+
+def _spots(rng: np.random.Generator) -> Array:
+    x, y = _axes()
+    mix = np.zeros((SIZE, SIZE))
+    for _ in range(int(rng.integers(8, 24))):
+        cx, cy, radius = rng.random(), rng.random(), rng.uniform(0.03, 0.1)
+        distance = np.hypot((x - cx + 0.5) % 1 - 0.5, (y - cy + 0.5) % 1 - 0.5)
+        mix = np.maximum(mix, np.clip((radius - distance) * SIZE / 2, 0, 1))
+    return mix
+
+
+_KINDS = {
+    "plain": lambda rng: np.zeros((SIZE, SIZE)),
+    "checker": _checker,
+    "noise": lambda rng: _noise(rng, 1.6),
+    "stripes": _stripes,
+    "wood": _wood,
+    "spots": _spots,
+}
+KINDS = tuple(_KINDS)
