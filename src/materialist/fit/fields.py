@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import torch
+from scipy.special import sph_harm_y
 from torch import nn
 from torch.nn import functional
 
@@ -74,10 +76,20 @@ class EnvmapSH(nn.Module):
         self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        from materialist.metrics import sh_basis
+        return functional.softplus(sh_basis(texel_directions(height, 2 * height), self.degree) @ self.coefficients)
 
-        basis = torch.as_tensor(sh_basis(texel_directions(height, 2 * height), self.degree), dtype=torch.float32)
-        return functional.softplus(basis @ self.coefficients)
+
+def sh_basis(direction, degree: int) -> torch.Tensor:
+    """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
+    x, y, z = direction[..., 2], direction[..., 0], direction[..., 1]
+    theta, phi = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
+    columns = []
+    for order in range(degree + 1):
+        for m in range(-order, order + 1):
+            value = sph_harm_y(order, abs(m), theta, phi)
+            part = value.real if m >= 0 else value.imag
+            columns.append(part if m == 0 else np.sqrt(2) * part)
+    return torch.from_numpy(np.stack(columns, -1).astype(np.float32))
 
 
 def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:

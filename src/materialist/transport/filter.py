@@ -58,3 +58,22 @@ def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
     yd, xd = slice(max(0, dy), min(h, h + dy)), slice(max(0, dx), min(w, w + dx))
     out[ys, xs] = image[yd, xd]
     return out
+
+
+def filter_tables(cache, tables, guide: Guide):
+    """Filter the diffuse lobe and the specular levels that are wider than a pixel's neighbourhood; returns Tables."""
+    kept = _first_filtered(cache)
+    stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
+    grid = torch.zeros(guide.scale.numel(), stack.shape[1])
+    pixels = torch.from_numpy(cache.pixels.astype("int64"))
+    grid[pixels] = stack
+    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
+    levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
+    return type(tables)(smooth[:, :9].contiguous(), torch.stack(list(levels)))
+
+
+def _first_filtered(cache) -> int:
+    """Index of the first roughness level to filter: sharper ones are nearly noise-free and carry reflected detail."""
+    from materialist.transport.cache import ROUGHNESS_LEVELS
+
+    return next(i for i, r in enumerate(ROUGHNESS_LEVELS) if r >= 0.2)

@@ -30,38 +30,43 @@ DIELECTRIC_R0 = 0.04
 
 @dataclass(frozen=True)
 class LightMatrix:
-    """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; torch float32."""
+    """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; torch float32.
+
+    Everything comes in three lobes: diffuse (without A (1 - M)), the part of the specular lobe that C_0 multiplies,
+    and the rest of the specular lobe.
+    """
 
     pixels: torch.Tensor
     """[Q] int64 row-major pixel indices."""
     shape: tuple[int, int]
-    """(h, 2h) of the envmap that `direct` multiplies."""
-    diffuse: torch.Tensor
-    """[Q, h * 2h] direct transport of the diffuse lobe, without A (1 - M)."""
-    fresnel0: torch.Tensor
-    """[Q, h * 2h] direct transport of the part of the specular lobe that C0 multiplies."""
-    fresnel1: torch.Tensor
-    """[Q, h * 2h] direct transport of the rest of the specular lobe."""
+    """(h, 2h) of the envmap."""
+    lobes: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
+    """Each [Q, h * 2h]: direct transport of a lobe."""
     hit_index: torch.Tensor
-    """[3, K] int64: rows of non-misses (row, slot) and lobe, see `indirect`."""
+    """[2, K] int64: (row, radiance slot) of every ray that meets a surface."""
     hit_weight: torch.Tensor
-    """[K, 3] weight of each hit in the diffuse lobe, fresnel0 and fresnel1."""
-    base: torch.Tensor
-    """[Q, 3] A (1 - M)."""
-    c0: torch.Tensor
-    """[Q, 3] C_0 of Schlick's approximation."""
+    """[K, 3] weight of each such ray in the three lobes."""
+    albedo: torch.Tensor
+    """[Q, 3]."""
+    metallic: torch.Tensor
+    """[Q, 1]."""
 
     def direct(self, envmap: torch.Tensor) -> torch.Tensor:
-        """[Q, 3] direct radiance under `envmap` [h * 2h, 3]; differentiable in it."""
-        return self.base * (self.diffuse @ envmap) + self.c0 * (self.fresnel0 @ envmap) + self.fresnel1 @ envmap
+        """[3, Q, 3] light of each lobe straight from `envmap` [h * 2h, 3]; differentiable in it."""
+        return torch.stack([lobe @ envmap for lobe in self.lobes])
 
     def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
-        """[Q, 3] radiance by way of other surfaces, given what leaves each slot [S, 3]."""
+        """[3, Q, 3] light of each lobe by way of other surfaces, given what leaves each slot [S, 3]."""
         light = slot_radiance[self.hit_index[1]]
         sums = torch.zeros(3, len(self.pixels), 3)
         for lobe in range(3):
             sums[lobe].index_add_(0, self.hit_index[0], light * self.hit_weight[:, lobe : lobe + 1])
-        return self.base * sums[0] + self.c0 * sums[1] + sums[2]
+        return sums
+
+    def combine(self, light: torch.Tensor, albedo: torch.Tensor | None = None) -> torch.Tensor:
+        """Radiance [Q, 3] from the light of the lobes [3, Q, 3], with another albedo [Q, 3] if one is given."""
+        a, m = self.albedo if albedo is None else albedo, self.metallic
+        return a * (1 - m) * light[0] + (DIELECTRIC_R0 * (1 - m) + m * a) * light[1] + light[2]
 
 
 def light_matrix(
@@ -88,10 +93,9 @@ def light_matrix(
     index = np.concatenate([h[0] for h in hits], 1)
     weight = np.concatenate([h[1] for h in hits])
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, *matrices,
+        torch.from_numpy(pixels.astype(np.int64)), shape, tuple(matrices),
         torch.from_numpy(index), torch.from_numpy(weight),
-        torch.from_numpy((albedo * (1 - metallic)).astype(np.float32)),
-        torch.from_numpy((DIELECTRIC_R0 * (1 - metallic) + metallic * albedo).astype(np.float32)),
+        torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
     )  # fmt: skip
 
 

@@ -1,0 +1,177 @@
+"""Two ways to render inside the optimisation, behind one interface.
+
+`TransportEngine` shades from cached transport; `PathEngine` is the paper's: Mitsuba's path replay backpropagation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from materialist.camera import pixel_rays
+from materialist.fit.fields import resize_envmap
+from materialist.transport.cache import Tables, TransportCache
+from materialist.transport.filter import Guide, filter_tables
+from materialist.transport.light import LightMatrix, bilinear, light_matrix
+from materialist.transport.shading import shade
+from materialist.types import Array, Camera, Geometry, Materials
+
+
+@dataclass(frozen=True)
+class LightProblem:
+    """Rendering as a function of the light, materials fixed."""
+
+    pixels: torch.Tensor
+    """[Q] int64 row-major pixels that `render` answers for."""
+    height: int
+    """Rows of the environment map that `render` takes."""
+    render: Callable[..., torch.Tensor]
+    """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable; see also `matrix`."""
+    matrix: LightMatrix | None = None
+    """The transport behind `render`, where the engine has one; `render(envmap, albedo)` then takes another albedo
+    for its rows, which are the first of `pixels`."""
+
+
+class Engine(Protocol):
+    """A differentiable renderer of one camera and geometry."""
+
+    name: str
+    pixels: torch.Tensor
+    """[P] int64 row-major pixels with a surface."""
+
+    def light_problem(self, materials: Materials) -> LightProblem:
+        """Rendering as a function of the light."""
+        ...
+
+    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
+        """Rendering as a function of the materials: [P, 5] (albedo, roughness, metallic) -> radiance [P, 3]."""
+        ...
+
+
+class TransportEngine:
+    """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
+
+    Args:
+        radiance: [H, W, 3] what the surfaces send to each other, until `set_radiance` replaces it: the photograph.
+        light_height: rows of the environment map inside the light fit.
+        light_pixels: size of the pixel subset of the light fit.
+    """
+
+    name = "transport"
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        camera: Camera,
+        radiance: Array,
+        *,
+        seed: int = 0,
+        light_height: int = 32,
+        light_pixels: int = 4096,
+        diffuse_samples: int = 64,
+        specular_samples: int = 16,
+        progress=None,
+    ):
+        self.cache = TransportCache(
+            geometry, camera, seed=seed, diffuse_samples=diffuse_samples, specular_samples=specular_samples,
+            progress=progress,
+        )  # fmt: skip
+        self.camera, self.seed = camera, seed
+        self.light_height, self.light_pixels = light_height, light_pixels
+        self.radiance = radiance
+        self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
+        self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
+        self.guide = _guide(self.cache, camera)
+
+    def set_radiance(self, radiance: Array) -> None:
+        """Take [H, W, 3] as what the surfaces send to each other from now on."""
+        self.radiance = radiance
+
+    def light_problem(self, materials: Materials) -> LightProblem:
+        rng = np.random.default_rng(self.seed + 17)
+        share = self.light_pixels / (self.camera.width * self.camera.height)
+        rows = _subset(rng, len(self.cache.pixels), min(1.0, share))
+        sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
+        matrix = light_matrix(self.cache, materials, rows, self.light_height)
+        indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
+        direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
+        direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+        index, weight = (torch.from_numpy(v) for v in bilinear(direction, matrix.shape))
+
+        def render(envmap: torch.Tensor, albedo: torch.Tensor | None = None) -> torch.Tensor:
+            flat = envmap.reshape(-1, 3)
+            seen = (flat[index] * weight[..., None].float()).sum(1)
+            return torch.cat([matrix.combine(matrix.direct(flat) + indirect, albedo), seen])
+
+        pixels = torch.cat([matrix.pixels, torch.from_numpy(sky.astype(np.int64))])
+        return LightProblem(pixels, self.light_height, render, matrix)
+
+    def tables(self, envmap: Array) -> Tables:
+        """Filtered transport tables under `envmap` [h, 2h, 3]."""
+        return filter_tables(self.cache, self.cache.gather(envmap, self.radiance), self.guide)
+
+    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
+        tables = self.tables(envmap)
+        return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
+
+
+class PathEngine:
+    """The paper's engine: Mitsuba's PRB integrator, a fresh seed in every step.
+
+    Args:
+        scene: `materialist.render.scene.RenderScene`.
+    """
+
+    name = "path"
+
+    def __init__(self, scene, camera: Camera, pixels: Array, *, spp: int = 64, max_depth: int = 4, envmap_height: int = 256, seed: int = 0):
+        self.scene, self.camera, self.spp, self.max_depth = scene, camera, spp, max_depth
+        self.pixels = torch.from_numpy(pixels.astype(np.int64))
+        self.envmap_height, self.seed, self._step = envmap_height, seed, 0
+
+    def _render(self, albedo, roughness, metallic, envmap) -> torch.Tensor:
+        self._step += 1
+        return self.scene.render_torch(
+            albedo, roughness, metallic, envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
+        )
+
+    def light_problem(self, materials: Materials) -> LightProblem:
+        maps = [torch.from_numpy(np.ascontiguousarray(m)) for m in (materials.albedo, materials.roughness, materials.metallic)]
+        everything = torch.arange(self.camera.width * self.camera.height)
+        return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
+
+    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
+        light = torch.from_numpy(np.ascontiguousarray(envmap, dtype=np.float32))
+        h, w = self.camera.height, self.camera.width
+
+        def render(maps: torch.Tensor) -> torch.Tensor:
+            full = torch.zeros(h * w, 5).index_copy(0, self.pixels, maps).view(h, w, 5)
+            image = self._render(full[..., :3].contiguous(), full[..., 3].contiguous(), full[..., 4].contiguous(), light)
+            return image.reshape(-1, 3)[self.pixels]
+
+        return render
+
+
+def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
+    """[height, 2 height, 3] float32 numpy map from a torch map of any size."""
+    return resize_envmap(envmap.detach(), height).contiguous().numpy().astype(np.float32)
+
+
+def _subset(rng, size: int, share: float) -> Array:
+    """A sorted random subset of range(size), stratified: one of each run of 1 / share."""
+    count = round(size * share)
+    if count == 0:
+        return np.zeros(0, np.int64)
+    edges = np.linspace(0, size, count + 1)
+    return np.minimum((edges[:-1] + rng.random(count) * np.diff(edges)).astype(np.int64), size - 1)
+
+
+def _guide(cache: TransportCache, camera: Camera) -> Guide:
+    position = np.array(cache.position).T
+    image = lambda v: torch.from_numpy(cache.image(v))  # noqa: E731
+    scale = image(-position[:, 2:] / camera.focal)[..., 0]
+    return Guide(image(position), image(np.array(cache.normal).T), scale.clamp_min(1e-9))

@@ -1,0 +1,203 @@
+"""The whole fit: light, then materials, alternated and corrected as the preset says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+
+from materialist.camera import pixel_rays
+from materialist.color import linear_to_srgb
+from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
+from materialist.fit.fields import EnvmapTexels
+from materialist.fit.light import envmap_field, fit_light
+from materialist.fit.loop import Progress
+from materialist.fit.materials import fit_materials, material_field, remapped
+from materialist.fit.neighbours import neighbours
+from materialist.fit.settings import FitSettings, MaterialStage
+from materialist.transport.environment import texel_directions
+from materialist.transport.filter import joint_filter
+from materialist.types import Array, Camera, Materials, Photo
+
+Judge = Callable[[Materials, Array, int], Array]
+"""judge(materials, envmap, spp) -> path-traced [H, W, 3]."""
+
+
+@dataclass
+class FitState:
+    """What the fit has found so far."""
+
+    maps: torch.Tensor
+    """[P, 5] albedo, roughness, metallic of the surface pixels."""
+    envmap: Array
+    """[h, 2h, 3]."""
+    stages: list[dict] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One inverse problem: a photo, an engine to render with, and the settings."""
+
+    photo: Photo
+    prior: Materials
+    engine: Engine
+    settings: FitSettings
+    envmap_height: int = 256
+    judge: Judge | None = None
+    """Path tracer for the fixed-point corrections; None: no corrections."""
+    mask: Array | None = None
+    """[H, W] bool: roughness and metallic are one value inside."""
+    strategy: str = "default"
+    """`default`: light, then materials. `white-light-first`: under a white map, roughness and metallic from 0.5,
+    then light, then albedo (paper, Material Editing Settings)."""
+    seed: int = 0
+    progress: Progress | None = None
+
+    def run(self) -> FitState:
+        """Fit; returns maps and light."""
+        state = FitState(self._prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
+        if self.strategy == "white-light-first":
+            return self._white_light_first(state)
+        for round_ in range(self.settings.rounds):
+            self._light(state, round_)
+            self._materials(state, corrections=self.settings.corrections * (round_ == self.settings.rounds - 1))
+        return state
+
+    # -- stages --------------------------------------------------------------------------------------------------------
+
+    def _light(self, state: FitState, round_: int = 0) -> None:
+        """Fit the light with the materials of the prior: the light must not explain what later stages have baked in."""
+        settings = self.settings.light
+        problem = self.engine.light_problem(self.prior if round_ == 0 else self._slack_base(state))
+        light = envmap_field(settings, seed=self.seed)
+        if round_ > 0 and isinstance(light, EnvmapTexels):
+            with torch.no_grad():
+                light.log.copy_(state_log(state.envmap, settings.height))
+        steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
+        result = fit_light(
+            problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress
+        )
+        state.stages.append(result.summary())
+        state.envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
+        state.envmap = paste_visible_sky(state.envmap, self.photo.linear, self._surface(), self.photo.camera)
+
+    def _slack_base(self, state: FitState) -> Materials:
+        """The prior's albedo with the roughness and metallic found so far."""
+        fitted = self.materials(state)
+        return replace(self.prior, roughness=fitted.roughness, metallic=fitted.metallic)
+
+    def _materials(self, state: FitState, *, corrections: int = 0, stages: tuple[MaterialStage, ...] = ()) -> None:
+        settings = self.settings.materials
+        if stages:
+            settings = replace(settings, stages=stages)
+        render = self.engine.material_renderer(state.envmap)
+        prior = self._prior_maps()
+        held = remapped(prior) if settings.remap else prior
+        start = held if not state.stages or settings.field != "maps" else state.maps
+        inside = None if self.mask is None else torch.from_numpy(self.mask.reshape(-1)[self.engine.pixels.numpy()])
+        pairs = neighbours(self.engine.pixels.numpy(), linear_to_srgb(self.photo.linear)) if any(settings.smooth) else None
+        photo = self._photo()[self.engine.pixels]
+        model = material_field(
+            start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
+        )
+        correction = torch.zeros(1)
+        for k in range(corrections + 1):
+            results = fit_materials(
+                lambda maps, c=correction: (render(maps) + c).clamp_min(0), photo, model, held, settings, pairs,
+                progress=self.progress,
+            )  # fmt: skip
+            state.stages += [r.summary() for r in results]
+            state.maps = model().detach()
+            if k < corrections:
+                correction = self._correction(state, render)
+        if isinstance(self.engine, TransportEngine):
+            self.engine.set_radiance(self._image(render(state.maps)))
+
+    def _correction(self, state: FitState, render) -> torch.Tensor:
+        """[P, 3] what the path tracer adds to the cached rendering, smoothed along surfaces."""
+        traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp)
+        cached = self._image(render(state.maps))
+        difference = torch.from_numpy(traced - cached)
+        for step in (1, 2):
+            difference = joint_filter(difference, self.engine.guide, step=step)
+        return difference.reshape(-1, 3)[self.engine.pixels]
+
+    def _white_light_first(self, state: FitState) -> FitState:
+        neutral = state.maps.clone()
+        neutral[:, 3:] = 0.5
+        schedule = self.settings.materials.stages[0].schedule
+        start = replace(self, prior=self._as_materials(neutral), strategy="default")
+        state.maps = neutral
+        start._materials(state, stages=(MaterialStage(("roughness", "metallic"), schedule),))
+        refined = replace(start, prior=self._as_materials(state.maps))
+        refined._light(state)
+        refined._materials(
+            state, stages=(MaterialStage(("albedo",), schedule),), corrections=self.settings.corrections
+        )
+        return state
+
+    # -- conversions ---------------------------------------------------------------------------------------------------
+
+    def materials(self, state: FitState) -> Materials:
+        """Full-size maps of the state; the prior's values where there is no surface."""
+        return self._as_materials(state.maps)
+
+    def _as_materials(self, maps: torch.Tensor) -> Materials:
+        pixels, values = self.engine.pixels.numpy(), maps.numpy()
+        out = [m.reshape(m.shape[0] * m.shape[1], -1).copy() for m in _maps(self.prior)]
+        out[0][pixels], out[1][pixels], out[2][pixels] = values[:, :3], values[:, 3:4], values[:, 4:5]
+        shape = self.prior.roughness.shape
+        return Materials(out[0].reshape(*shape, 3), out[1].reshape(shape), out[2].reshape(shape))
+
+    def _prior_maps(self) -> torch.Tensor:
+        flat = [m.reshape(m.shape[0] * m.shape[1], -1) for m in _maps(self.prior)]
+        return torch.from_numpy(np.concatenate(flat, 1).astype(np.float32))[self.engine.pixels]
+
+    def _photo(self) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(self.photo.linear.reshape(-1, 3)))
+
+    def _image(self, values: torch.Tensor) -> Array:
+        out = np.zeros((self.photo.linear.shape[0] * self.photo.linear.shape[1], 3), np.float32)
+        out[self.engine.pixels.numpy()] = values.detach().numpy()
+        return out.reshape(self.photo.linear.shape)
+
+    def _surface(self) -> Array:
+        surface = np.zeros(self.photo.linear.shape[0] * self.photo.linear.shape[1], bool)
+        surface[self.engine.pixels.numpy()] = True
+        return surface.reshape(self.photo.linear.shape[:2])
+
+
+def _maps(materials: Materials) -> tuple[Array, Array, Array]:
+    return materials.albedo, materials.roughness, materials.metallic
+
+
+def state_log(envmap: Array, height: int) -> torch.Tensor:
+    """Log of an envmap at `height` rows, to go on from."""
+    from materialist.fit.fields import resize_envmap
+
+    return resize_envmap(torch.from_numpy(np.ascontiguousarray(envmap)), height).clamp_min(1e-6).log()
+
+
+def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camera) -> Array:
+    """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
+
+    Clipped photo pixels only raise a texel. surface: [H, W] bool.
+    """
+    if surface.all():
+        return envmap
+    h, w = envmap.shape[:2]
+    d = texel_directions(h, w)
+    depth = np.where(d[..., 2] < -1e-3, -d[..., 2], np.inf)
+    col = np.floor(d[..., 0] / depth * camera.focal + camera.width / 2)
+    row = np.floor(-d[..., 1] / depth * camera.focal + camera.height / 2)
+    inside = np.isfinite(depth) & (col >= 0) & (col < camera.width) & (row >= 0) & (row < camera.height)
+    r, c = np.where(inside, row, 0).astype(int), np.where(inside, col, 0).astype(int)
+    seen = (inside & ~surface[r, c])[..., None]
+    value = photo[r, c]
+    value = np.where(value >= 0.99, np.maximum(value, envmap), value)
+    return np.where(seen, value, envmap).astype(np.float32)
+
+
+__all__ = ["Fit", "FitState", "PathEngine", "TransportEngine", "paste_visible_sky"]

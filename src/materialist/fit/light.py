@@ -1,0 +1,77 @@
+"""Environment map optimisation (paper, Progressive Differentiable Rendering)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import torch
+from torch import nn
+
+from materialist.errors import InputError
+from materialist.fit.engine import LightProblem
+from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels
+from materialist.fit.loop import Progress, StageResult, optimise
+from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual
+from materialist.fit.settings import LightSettings
+
+START_RADIANCE = 0.6
+"""Grey level at which plain texels start."""
+
+
+def envmap_field(settings: LightSettings, *, seed: int = 0) -> nn.Module:
+    """A fresh field of the kind the settings name."""
+    torch.manual_seed(seed)
+    if settings.field == "mlp":
+        return EnvmapMLP()
+    if settings.field == "mlp-uv":
+        return EnvmapMLP(coordinates="uv")
+    if settings.field == "sh":
+        return EnvmapSH(3)
+    if settings.field == "texels":
+        return EnvmapTexels(torch.full((settings.height, 2 * settings.height, 3), START_RADIANCE))
+    raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
+
+
+def fit_light(
+    problem: LightProblem,
+    photo: torch.Tensor,
+    field: nn.Module,
+    settings: LightSettings,
+    *,
+    steps: int | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> StageResult:
+    """Move `field` so that the rendering matches the photo: argmin_E L1 + L2.
+
+    Args:
+        photo: [H * W, 3] linear.
+        steps: at most this many, instead of the schedule's.
+    """
+    target = photo[problem.pixels]
+    jitter = torch.Generator().manual_seed(seed)
+    schedule = settings.schedule if steps is None else replace(settings.schedule, max_steps=steps)
+    parameters: list = [{"params": list(field.parameters())}]
+    slack = None
+    if settings.slack is not None and problem.matrix is not None:
+        slack = nn.Parameter(problem.matrix.albedo.clone())
+        parameters.append({"params": [slack], "lr": 0.02})
+
+    def loss(_: int) -> torch.Tensor:
+        # The full map is costly to evaluate: a coarser light matrix is served by random points of its texels.
+        full = problem.height >= settings.height or settings.field == "texels"
+        envmap = field(problem.height, None if full else jitter)
+        radiance = problem.render(envmap) if slack is None else problem.render(envmap, slack)
+        value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped))
+        if slack is not None:
+            value = value + settings.slack * (slack - problem.matrix.albedo).abs().mean()
+        if settings.smooth or settings.chroma:
+            log = envmap.clamp_min(1e-6).log()
+            value = value + settings.smooth * log_total_variation(log) + settings.chroma * log_chroma(log)
+        return value
+
+    def into_range() -> None:
+        if slack is not None:
+            slack.clamp_(0, 1)
+
+    return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)

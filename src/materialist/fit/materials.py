@@ -1,0 +1,92 @@
+"""Material properties optimisation (paper, Progressive Differentiable Rendering)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import torch
+from torch import nn
+
+from materialist.errors import InputError
+from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
+from materialist.fit.loop import Progress, StageResult, optimise
+from materialist.fit.losses import consistency, l1_l2, residual
+from materialist.fit.neighbours import Neighbours
+from materialist.fit.settings import MaterialSettings
+from materialist.types import Camera
+
+_COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
+
+
+def remapped(prior: torch.Tensor) -> torch.Tensor:
+    """Roughness and metallic of [P, 5] maps moved to 0.7 x + 0.2, where gradients live (paper, Initialization)."""
+    return torch.cat([prior[:, :3], 0.7 * prior[:, 3:] + 0.2], 1)
+
+
+def material_field(
+    prior: torch.Tensor, settings: MaterialSettings, pixels: torch.Tensor, camera: Camera, *,
+    inside: torch.Tensor | None = None, seed: int = 0,
+) -> nn.Module:  # fmt: skip
+    """A fresh field around `prior` [P, 5]; with `inside` [P] bool, roughness and metallic are one value there."""
+    torch.manual_seed(seed)
+    start = remapped(prior) if settings.remap else prior
+    if settings.field == "mlp":
+        field: nn.Module = MaterialMLP(start)
+    elif settings.field == "maps":
+        field = MaterialMaps(start)
+    elif settings.field == "unet":
+        field = MaterialUNet(start, pixels, camera.height, camera.width)
+    else:
+        raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
+    return field if inside is None else Unified(field, inside)
+
+
+def fit_materials(
+    render: Callable[[torch.Tensor], torch.Tensor],
+    photo: torch.Tensor,
+    field: nn.Module,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    neighbours: Neighbours | None = None,
+    *,
+    progress: Progress | None = None,
+) -> list[StageResult]:
+    """Move `field` stage by stage: argmin L_re + delta L_cons.
+
+    Args:
+        render: [P, 5] materials -> [P, 3] radiance.
+        photo: [P, 3] linear.
+        prior: [P, 5] the maps that L_cons holds on to.
+        neighbours: pixel pairs for the smoothness term; needed when `settings.smooth` is not zero.
+    """
+    results = []
+    for stage in settings.stages:
+        frozen = [name for name in _COLUMNS if name not in stage.targets]
+        held = field().detach()
+
+        def maps(frozen=frozen, held=held) -> torch.Tensor:
+            values = field()
+            return torch.cat([(held if n in frozen else values)[:, c] for n, c in _COLUMNS.items()], 1)
+
+        def loss(_: int, maps=maps) -> torch.Tensor:
+            values = maps()
+            value = l1_l2(residual(render(values), photo, settings.encoding, clipped=settings.clipped))
+            parts = [values[:, c] for c in _COLUMNS.values()]
+            priors = [prior[:, c] for c in _COLUMNS.values()]
+            value = value + settings.delta * consistency(parts, priors, settings.weights)
+            if neighbours is not None and any(settings.smooth):
+                change = values - prior
+                for weight, column in zip(settings.smooth, _COLUMNS.values(), strict=True):
+                    if weight:
+                        value = value + weight * neighbours.total_variation(change[:, column])
+            return value
+
+        def into_range() -> None:
+            if isinstance(field, MaterialMaps):
+                field.maps.clamp_(0, 1)
+
+        name = "materials" if not frozen else "+".join(stage.targets)
+        results.append(
+            optimise(name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress)
+        )
+    return results

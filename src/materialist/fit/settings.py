@@ -1,0 +1,134 @@
+"""Settings of the fit: what `--preset paper` and `--preset default` mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from materialist.errors import InputError
+from materialist.fit.loop import Schedule
+from materialist.fit.losses import Encoding
+
+
+@dataclass(frozen=True)
+class LightSettings:
+    """Environment map optimisation."""
+
+    field: str = "mlp"
+    """`mlp` (directions), `mlp-uv`, `texels`, or `sh`."""
+    height: int = 256
+    """Rows of the field's map: 256 or, in the ablation, 16."""
+    encoding: Encoding = "linear"
+    clipped: bool = False
+    """A rendering brighter than a clipped photo channel is no error."""
+    schedule: Schedule = Schedule()
+    refit_steps: int = 0
+    """Steps of every light fit after the first; 0: the light is fitted once."""
+    slack: float | None = None
+    """If set, every pixel of the light fit may change its albedo within [0, 1] at this L1 price, so that a wrong
+    albedo does not colour the light, and light too dim to reach the photo with any albedo is an error."""
+    smooth: float = 0.0
+    """Weight of total variation of log radiance."""
+    chroma: float = 0.0
+    """Weight of the colourfulness of log radiance."""
+
+
+@dataclass(frozen=True)
+class MaterialStage:
+    """One run of the optimiser over some of the materials."""
+
+    targets: tuple[str, ...]
+    schedule: Schedule
+
+
+@dataclass(frozen=True)
+class MaterialSettings:
+    """Material properties optimisation."""
+
+    field: str = "mlp"
+    """`mlp`, `maps` or `unet`."""
+    remap: bool = True
+    """Start roughness and metallic from 0.7 x + 0.2 (paper, Default Automatic Optimization Schedule)."""
+    encoding: Encoding = "linear"
+    clipped: bool = False
+    delta: float = 0.5
+    """Scale of L_cons."""
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Weights of albedo, roughness and metallic in L_cons."""
+    smooth: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Weights of the edge-aware total variation of the change of albedo, roughness and metallic."""
+    stages: tuple[MaterialStage, ...] = ()
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Everything that a preset fixes."""
+
+    light: LightSettings
+    materials: MaterialSettings
+    rounds: int = 1
+    """Alternations of light and materials; between them, what surfaces send to each other is updated."""
+    corrections: int = 0
+    """Fixed-point corrections of the material fit against the path tracer."""
+    correction_spp: int = 16
+    light_grid: int = 32
+    """Rows of the envmap that the transport engine's light matrix resolves."""
+
+
+_MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
+
+PAPER = FitSettings(
+    light=LightSettings(),
+    materials=MaterialSettings(
+        stages=(
+            MaterialStage(("roughness", "metallic"), _MATERIAL),
+            MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
+        )
+    ),
+)
+"""The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
+
+_FAST = Schedule(learning_rate=0.02, max_steps=60, decay_every=40, decay=0.6, patience=0)
+
+DEFAULT = FitSettings(
+    light=LightSettings(
+        field="texels",
+        height=16,
+        encoding="srgb",
+        clipped=True,
+        schedule=Schedule(learning_rate=0.05, max_steps=200, decay_every=80, decay=0.6, patience=0),
+        refit_steps=60,
+        slack=0.1,
+        smooth=0.01,
+        chroma=0.05,
+    ),
+    materials=MaterialSettings(
+        field="maps",
+        remap=False,
+        encoding="srgb",
+        clipped=True,
+        delta=1.0,
+        weights=(0.05, 0.02, 0.01),
+        smooth=(0.0, 0.02, 0.01),
+        stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
+    ),
+    rounds=2,
+    corrections=2,
+    light_grid=16,
+)
+"""Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
+
+PRESETS = {"paper": PAPER, "default": DEFAULT}
+
+
+def preset(name: str, *, hdr: bool = False) -> FitSettings:
+    """Settings by name; for HDR photos the loss compares log(1 + x) (paper, Handling HDR Images)."""
+    if name not in PRESETS:
+        raise InputError(f"Preset is '{name}'; choose one of {', '.join(PRESETS)}.")
+    settings = PRESETS[name]
+    if not hdr:
+        return settings
+    return replace(
+        settings,
+        light=replace(settings.light, encoding="log1p", clipped=False),
+        materials=replace(settings.materials, encoding="log1p", clipped=False),
+    )

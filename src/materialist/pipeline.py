@@ -1,0 +1,228 @@
+"""The main job, end to end: photo -> prior -> geometry -> light and materials -> scene."""
+
+from __future__ import annotations
+
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist import metrics
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError
+from materialist.types import Array, FitReport, Materials, Photo, Prediction, Scene
+
+FINAL_SPP = 128
+"""Samples per pixel of the re-rendering that a scene is judged by."""
+STRATEGIES = ("default", "white-light-first")
+ENGINES = ("transport", "path")
+
+
+def invert(
+    photo: str | Path | Photo,
+    *,
+    predictor: str = "auto",
+    engine: str = "transport",
+    preset: str = "default",
+    fov: float | str | None = "auto",
+    size: int = 512,
+    envmap_size: tuple[int, int] = (512, 256),
+    completion: str = "planes",
+    tau: float = 6.0,
+    mask: Array | None = None,
+    strategy: str = "default",
+    seed: int = 0,
+    device: str = "auto",
+    progress=None,
+    **overrides: Any,
+) -> Scene:
+    """Decompose a photograph into geometry, materials and light.
+
+    Args:
+        photo: a file, `example:NAME`, or a Photo already read.
+        predictor: `auto`, `classical`, or `maps:DIR`.
+        engine: `transport` (cached transport) or `path` (Mitsuba PRB, as the paper).
+        preset: `default` or `paper`; the path engine always follows the paper.
+        fov: horizontal field of view in degrees, or `auto`: from EXIF, else 35.
+        size: longer side of the working image, pixels.
+        envmap_size: (width, height) of the environment map; width = 2 * height.
+        completion: `planes` continues dominant planes beyond what the photo shows; `none` does not.
+        tau: grazing angle of the boundary duplication, degrees.
+        mask: [H, W] bool at working size: roughness and metallic take one value inside.
+        strategy: `default`, or `white-light-first` (paper, Material Editing Settings).
+        seed: equal seeds give equal scenes on one machine.
+        progress: called as progress(stage, done, total).
+        overrides: `settings=FitSettings(...)` replaces the preset; `prior=Prediction(...)` replaces the predictor;
+            `spp=N` sets the samples of the final re-rendering.
+
+    Raises:
+        InputError, SetupError: see docs/inputs.md; nothing is written.
+    """
+    start = time.perf_counter()
+    preset = "paper" if engine == "path" else preset
+    tick = progress or (lambda *_: None)
+    _check(engine, strategy, envmap_size, seed)
+    tick("read", 0, 1)
+    picture = _read(photo, size=size, fov=fov)
+    tick("predict", 0, 1)
+    stages: list[dict] = []
+    prior = overrides.get("prior") or _timed(stages, "predict", lambda: _predict(picture, predictor, seed))
+    _check_mask(mask, picture)
+
+    from materialist.geometry.build import build_geometry
+    from materialist.render.variant import setup
+
+    setup(device)
+    tick("geometry", 0, 1)
+    geometry = _timed(
+        stages,
+        "geometry",
+        lambda: build_geometry(prior.depth, prior.normal, picture.camera, tau=tau, completion=completion, seed=seed),
+    )
+    fit, judge = _problem(picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages)
+    state = fit.run()
+    materials = fit.materials(state)
+    tick("rerender", 0, 1)
+    spp = overrides.get("spp", FINAL_SPP)
+    rerender = _timed(stages, "rerender", lambda: judge(materials, state.envmap, spp, seed + 1))
+    report = _report(picture, prior, materials, rerender, (*stages[:-1], *state.stages, stages[-1]), start)
+    return Scene(
+        camera=picture.camera, photo=picture, prior=prior, materials=materials, normal=prior.normal, depth=prior.depth,
+        geometry=geometry, envmap=state.envmap, rerender=rerender, report=report,
+        provenance={
+            "predictor": prior.predictor, "engine": engine, "preset": preset,
+            "completion": completion, "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
+            "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
+        },
+    )  # fmt: skip
+
+
+def render_scene(
+    scene: Scene, *, spp: int = 64, denoise: bool = False, max_depth: int = 6, seed: int = 0, device: str = "auto"
+) -> Array:
+    """Path-trace a scene from the photo's camera: [H, W, 3] float32 linear. Denoising is for pictures only."""
+    from materialist.render.scene import RenderScene
+
+    if spp < 1:
+        raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")
+    renderer = RenderScene(scene.geometry, scene.camera, device=device)
+    renderer.set_materials(scene.materials)
+    renderer.set_envmap(scene.envmap)
+    image = renderer.render(spp=spp, seed=seed, max_depth=max_depth)
+    if denoise:
+        from materialist.render.denoise import denoise as clean
+
+        image = clean(image, albedo=scene.materials.albedo, normal=scene.normal)
+    return image
+
+
+def _problem(picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages):
+    """The inverse problem, with its engine and its judge."""
+    from materialist.fit.engine import PathEngine, TransportEngine
+    from materialist.fit.inverse import Fit
+    from materialist.fit.settings import preset as named
+    from materialist.render.scene import RenderScene
+
+    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
+    renderer = _timed(stages, "scene", lambda: RenderScene(geometry, picture.camera, device=device))
+
+    def judge(materials: Materials, envmap: Array, spp: int, seed: int = seed) -> Array:
+        renderer.set_materials(materials)
+        renderer.set_envmap(envmap)
+        return renderer.render(spp=spp, seed=seed)
+
+    if engine == "path":
+        pixels = np.flatnonzero(prior.depth.reshape(-1) > 0)
+        problem: Any = PathEngine(renderer, picture.camera, pixels, envmap_height=envmap_size[1], seed=seed)
+    else:
+        problem = _timed(
+            stages,
+            "trace",
+            lambda: TransportEngine(
+                geometry, picture.camera, picture.linear, seed=seed, light_height=settings.light_grid, progress=progress
+            ),
+        )
+    fit = Fit(
+        picture, prior.materials, problem, settings, envmap_height=envmap_size[1], judge=judge, mask=mask,
+        strategy=strategy, seed=seed, progress=progress,
+    )  # fmt: skip
+    return fit, judge
+
+
+def _report(picture: Photo, prior: Prediction, materials: Materials, rerender: Array, stages, start: float) -> FitReport:
+    surface = prior.depth > 0
+    distance = {
+        f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
+        for name in ("albedo", "roughness", "metallic")
+    }
+    residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
+    clipped = float((picture.linear >= 0.99).any(-1).mean())
+    notes = [*picture.warnings, *prior.warnings]
+    if clipped > 0.01:
+        notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
+    poor = float((residual > 0.1).mean())
+    if poor > 0.05:
+        notes.append(f"The re-rendering is off by more than 0.1 (sRGB) on {poor:.0%} of the pixels; see overview.png.")
+    return FitReport(
+        stages=tuple(stages),
+        metrics={
+            "rerender_psnr_path": metrics.psnr(rerender, picture.linear),
+            "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
+            **distance,
+            "clipped_fraction": clipped,
+            "poor_fraction": poor,
+            "total_seconds": time.perf_counter() - start,
+            "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        },
+        warnings=tuple(notes),
+    )
+
+
+def _timed(stages: list[dict], name: str, work):
+    start = time.perf_counter()
+    result = work()
+    stages.append({"name": name, "seconds": round(time.perf_counter() - start, 3)})
+    return result
+
+
+def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
+    if isinstance(photo, Photo):
+        return photo
+    from materialist.io.photo import read_photo
+
+    return read_photo(photo, size=size, fov=fov)
+
+
+def _predict(picture: Photo, spec: str, seed: int) -> Prediction:
+    from materialist.predict.base import get_predictor
+
+    prediction = get_predictor(spec).predict(picture, seed=seed)
+    if not (prediction.depth > 0).any():
+        raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
+    return prediction
+
+
+def _check(engine: str, strategy: str, envmap_size: tuple[int, int], seed: int) -> None:
+    if engine not in ENGINES:
+        raise InputError(f"Engine is '{engine}'; choose one of {', '.join(ENGINES)}.")
+    if strategy not in STRATEGIES:
+        raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
+    width, height = envmap_size
+    if width != 2 * height or not 8 <= height <= 4096:
+        raise InputError(f"Envmap size is {width}x{height}; the width must be twice the height, and the height 8 to 4096.")
+    if seed < 0:
+        raise InputError(f"Seed is {seed}; give 0 or more.")
+
+
+def _check_mask(mask: Array | None, picture: Photo) -> None:
+    if mask is None:
+        return
+    if mask.shape != picture.linear.shape[:2]:
+        raise InputError(f"Mask is {mask.shape}, the photo at working size is {picture.linear.shape[:2]} (rows, columns).")
+    if not mask.any():
+        raise InputError("The mask is empty; mark at least one pixel.")
+
+
+__all__ = ["FINAL_SPP", "invert", "render_scene"]

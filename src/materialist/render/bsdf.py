@@ -1,0 +1,129 @@
+"""The paper's simplified Disney BRDF as a Mitsuba plugin (`materialist_disney`)."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from materialist.transport.light import DIELECTRIC_R0
+from materialist.transport.sampling import (
+    MIN_ALPHA,
+    cosine_direction,
+    diffuse_polynomial,
+    schlick,
+    smith_g1,
+    visible_normal,
+)
+
+PLUGIN = "materialist_disney"
+
+
+def ggx(cos_h, alpha):
+    """GGX normal distribution D(h) for the cosine of h to the normal."""
+    a2 = alpha * alpha
+    d = cos_h * cos_h * (a2 - 1) + 1
+    return a2 / (dr.pi * d * d)
+
+
+def _define():
+    class SimplifiedDisney(mi.BSDF):
+        """f_r = f_s + (1 - M) f_d (paper, Preliminary); both sides shade alike.
+
+        Textures: base_color (RGB), roughness (perceptual, alpha = r^2), metallic.
+        """
+
+        def __init__(self, props: mi.Properties):
+            mi.BSDF.__init__(self, props)
+            self.base_color = props["base_color"]
+            self.roughness = props["roughness"]
+            self.metallic = props["metallic"]
+            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+            self.m_components = [
+                mi.BSDFFlags.DiffuseReflection | sides,
+                mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.SpatiallyVarying | sides,
+            ]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+
+        def traverse(self, cb):
+            cb.put("base_color", self.base_color, mi.ParamFlags.Differentiable)
+            cb.put("roughness", self.roughness, mi.ParamFlags.Differentiable)
+            cb.put("metallic", self.metallic, mi.ParamFlags.Differentiable)
+
+        def _materials(self, si, active):
+            albedo = mi.Color3f(self.base_color.eval(si, active))
+            return albedo, self.roughness.eval_1(si, active), self.metallic.eval_1(si, active)
+
+        def _specular_share(self, cos_i, albedo, metallic):
+            """Probability of the specular lobe: its share of the reflectance at normal-mirror incidence."""
+            luma = mi.luminance(albedo)
+            c0 = DIELECTRIC_R0 * (1 - metallic) + metallic * luma
+            specular = c0 + (1 - c0) * schlick(cos_i)
+            diffuse = (1 - metallic) * luma
+            return dr.detach(dr.clip(specular / dr.maximum(specular + diffuse, 1e-6), 0.1, 1))
+
+        def _value(self, wi, wo, albedo, roughness, metallic):
+            """f_r cos(theta_o) for directions above the surface."""
+            alpha = dr.maximum(roughness * roughness, MIN_ALPHA)
+            h = dr.normalize(wi + wo)
+            cos_d = dr.dot(h, wo)
+            c0, c1, c2 = diffuse_polynomial(wo.z, wi.z, cos_d)
+            diffuse = albedo * (1 - metallic) * dr.inv_pi * (c0 + roughness * (c1 + roughness * c2)) * wo.z
+            base = DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
+            fresnel = base + (1 - base) * schlick(cos_d)
+            shape = ggx(h.z, alpha) * smith_g1(wi.z, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
+            return diffuse + fresnel * shape
+
+        def _pdf(self, wi, wo, share, roughness):
+            alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
+            h = dr.normalize(wi + wo)
+            specular = ggx(h.z, alpha) * smith_g1(wi.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
+            return share * specular + (1 - share) * wo.z * dr.inv_pi
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            albedo, roughness, metallic = self._materials(si, active)
+            wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
+            share = self._specular_share(wi.z, albedo, metallic)
+            alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
+            take_specular = sample1 < share
+            mirrored = mi.reflect(wi, visible_normal(wi, alpha, sample2))
+            wo = dr.select(take_specular, mirrored, cosine_direction(sample2))
+            active = active & (wi.z > 0) & (wo.z > 0)
+            bs = mi.BSDFSample3f()
+            bs.pdf = dr.select(active, self._pdf(wi, wo, share, roughness), 0)
+            active = active & (bs.pdf > 0)
+            value = self._value(wi, wo, albedo, roughness, metallic)
+            bs.wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
+            bs.eta = 1.0
+            bs.sampled_type = dr.select(
+                take_specular, mi.UInt32(+mi.BSDFFlags.GlossyReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection)
+            )
+            bs.sampled_component = dr.select(take_specular, mi.UInt32(1), mi.UInt32(0))
+            return bs, dr.select(active, value / dr.maximum(bs.pdf, 1e-20), mi.Color3f(0))
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            albedo, roughness, metallic = self._materials(si, active)
+            active = active & (si.wi.z * wo.z > 0)
+            wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
+            wo = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
+            share = self._specular_share(wi.z, albedo, metallic)
+            value = dr.select(active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0))
+            return value, dr.select(active, self._pdf(wi, wo, share, roughness), 0)
+
+        def eval(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def eval_diffuse_reflectance(self, si, active=True):
+            return self._materials(si, active)[0]
+
+        def to_string(self):
+            return f"SimplifiedDisney[{self.base_color}, {self.roughness}, {self.metallic}]"
+
+    return SimplifiedDisney
+
+
+def register() -> None:
+    """Make the plugin known to the active variant."""
+    mi.register_bsdf(PLUGIN, _define())

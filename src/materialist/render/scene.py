@@ -1,0 +1,196 @@
+"""A scene that is built once and rendered many times: geometry fixed, materials and light exchanged."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.render.variant import setup
+from materialist.types import Array, Camera, Geometry, Materials, Mesh
+
+
+class RenderScene:
+    """Path tracing of one geometry from one camera.
+
+    Args:
+        geometry: the depth surface carries the per-pixel maps; the continuation of a plane carries the mean of the
+            maps over the plane's pixels.
+        camera: pinhole at the origin.
+        device: `auto`, `cpu` or `cuda`.
+    """
+
+    def __init__(self, geometry: Geometry, camera: Camera, *, device: str = "auto"):
+        self.mi = mi = setup(device)
+        self.camera = camera
+        self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
+        self._members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
+        height, width = camera.height, camera.width
+        description = {
+            "type": "scene",
+            "sensor": _sensor(mi, camera),
+            "light": {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": _half_turn(mi)},
+            "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
+        }
+        for k in self.planes:
+            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _constant_bsdf(mi))
+        self.mi_scene = mi.load_dict(description)
+        self.params = mi.traverse(self.mi_scene)
+        self.params.keep([k for k in self.params.keys() if _exchanged(k)])
+
+    def set_materials(self, materials: Materials) -> None:
+        """Take other maps; their size must be the camera's."""
+        size = (self.camera.height, self.camera.width)
+        if materials.roughness.shape != size:
+            raise InputError(f"Material maps are {materials.roughness.shape}, the camera is {size} (rows, columns).")
+        tensor = self.mi.TensorXf
+        self._assign(
+            tensor(np.ascontiguousarray(materials.albedo, np.float32)),
+            tensor(np.ascontiguousarray(materials.roughness[..., None], np.float32)),
+            tensor(np.ascontiguousarray(materials.metallic[..., None], np.float32)),
+        )
+        self.params.update()
+
+    def set_envmap(self, envmap: Array) -> None:
+        """Take another light: [h, 2h, 3] linear radiance in the project's convention."""
+        self.params["light.data"] = self.mi.TensorXf(_padded(np.asarray(envmap, np.float32), np))
+        self.params.update()
+
+    def render(self, *, spp: int, seed: int = 0, max_depth: int = 6, hide_emitters: bool = False) -> Array:
+        """[H, W, 3] float32 linear radiance with `spp` samples per pixel; `max_depth=2` is direct light alone."""
+        mi = self.mi
+        integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
+        total = np.zeros((self.camera.height, self.camera.width, 3), np.float64)
+        done, k = 0, 0
+        while done < spp:
+            # Bounded wavefronts: memory stays the same for any number of samples.
+            now = min(spp - done, max(1, _WAVEFRONT // (self.camera.width * self.camera.height)))
+            image = mi.render(self.mi_scene, integrator=integrator, spp=now, seed=(seed * 9973 + k) & 0xFFFFFFFF)
+            total += np.array(image)[..., :3] * now
+            done, k = done + now, k + 1
+        return (total / spp).astype(np.float32)
+
+    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = 4):
+        """Differentiable rendering by path replay backpropagation; torch tensors in and out.
+
+        Args:
+            albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3].
+            spp: samples per pixel of the image; its gradient uses as many, with another seed.
+
+        Returns:
+            [H, W, 3] linear radiance.
+        """
+        import drjit as dr
+        import torch
+
+        integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
+
+        @dr.wrap(source="torch", target="drjit")
+        def run(a, r, m, e):
+            self._assign(a, r, m)
+            self.params["light.data"] = e
+            self.params.update()
+            return self.mi.render(
+                self.mi_scene, self.params, integrator=integrator, spp=spp, seed=seed, seed_grad=seed + 1
+            )
+
+        return run(albedo, roughness[..., None], metallic[..., None], _padded(envmap, torch))
+
+    def _assign(self, albedo, roughness, metallic) -> None:
+        import drjit as dr
+
+        p = self.params
+        p["surface.bsdf.base_color.data"] = albedo
+        p["surface.bsdf.roughness.data"] = roughness
+        p["surface.bsdf.metallic.data"] = metallic
+        mi = self.mi
+        for k, members in self._members.items():
+            index = mi.UInt32(members.astype(np.uint32))
+            mean = lambda t, i: dr.mean(dr.gather(mi.Float, t.array, i))  # noqa: E731
+            p[f"plane{k}.bsdf.base_color.value"] = mi.Color3f(*[mean(albedo, index * 3 + c) for c in range(3)])
+            p[f"plane{k}.bsdf.roughness.value"] = mean(roughness, index)
+            p[f"plane{k}.bsdf.metallic.value"] = mean(metallic, index)
+
+
+_WAVEFRONT = 2**22
+"""Camera paths traced at a time."""
+
+
+def part(mesh: Mesh, plane: int) -> Mesh:
+    """The faces of one plane's continuation, or (-1) of the depth surface, with the vertices they use."""
+    chosen = mesh.face_plane == plane
+    faces = mesh.faces[chosen]
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return Mesh(
+        mesh.vertices[used], renumbered.reshape(faces.shape).astype(np.int32), mesh.normals[used], mesh.uv[used],
+        mesh.face_pixel[chosen], mesh.face_plane[chosen],
+    )  # fmt: skip
+
+
+def _exchanged(name: str) -> bool:
+    return name == "light.data" or (".bsdf." in name and name.endswith((".data", ".value")))
+
+
+def _sensor(mi, camera: Camera) -> dict:
+    transform = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
+    return {
+        "type": "perspective", "fov": camera.fov, "fov_axis": "x", "to_world": transform,
+        "near_clip": 1e-4, "far_clip": 1e7,
+        "film": {
+            "type": "hdrfilm", "width": camera.width, "height": camera.height, "rfilter": {"type": "box"},
+            "pixel_format": "rgb", "component_format": "float32",
+        },
+        "sampler": {"type": "independent"},
+    }  # fmt: skip
+
+
+def _half_turn(mi):
+    """Mitsuba's map has -Z at its left edge, ours in its centre."""
+    return mi.ScalarTransform4f().rotate([0, 1, 0], 180)
+
+
+def _padded(envmap, xp):
+    """Our texel-centre map [h, w, 3] on Mitsuba's grid: [2h + 1, w + 2, 3], for numpy or torch.
+
+    Mitsuba's rows run from pole to pole inclusive; at 2h + 1 rows every second one is a texel centre of ours and the
+    rest lie midway, so that its bilinear lookup equals ours. Its columns are padded by one on either side.
+    """
+    first, last = envmap[:1], envmap[-1:]
+    middle = (envmap[:-1] + envmap[1:]) / 2
+    h = envmap.shape[0]
+    stacked = xp.concatenate([xp.stack([envmap[:-1], middle], 1).reshape(2 * (h - 1), *envmap.shape[1:]), last], 0)
+    rows = xp.concatenate([first, stacked, last], 0)
+    return xp.concatenate([rows[:, -1:], rows, rows[:, :1]], 1)
+
+
+def _maps_bsdf(mi, height: int, width: int) -> dict:
+    def texture(channels: int, value: float) -> dict:
+        data = mi.TensorXf(np.full((height, width, channels), value, np.float32))
+        return {"type": "bitmap", "data": data, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
+
+    return {
+        "type": "materialist_disney",
+        "base_color": texture(3, 0.5), "roughness": texture(1, 0.5), "metallic": texture(1, 0.0),
+    }  # fmt: skip
+
+
+def _constant_bsdf(mi) -> dict:
+    return {
+        "type": "materialist_disney",
+        "base_color": {"type": "rgb", "value": [0.5, 0.5, 0.5]},
+        "roughness": {"type": "uniform", "value": 0.5}, "metallic": {"type": "uniform", "value": 0.0},
+    }  # fmt: skip
+
+
+def _shape(mi, mesh: Mesh, bsdf: dict):
+    props = mi.Properties()
+    props["mesh_bsdf"] = mi.load_dict(bsdf)
+    shape = mi.Mesh(
+        "part", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, has_vertex_texcoords=True, props=props
+    )
+    params = mi.traverse(shape)
+    params["vertex_positions"] = mi.Float(np.ascontiguousarray(mesh.vertices, np.float32).ravel())
+    params["vertex_normals"] = mi.Float(np.ascontiguousarray(mesh.normals, np.float32).ravel())
+    params["vertex_texcoords"] = mi.Float(np.ascontiguousarray(mesh.uv, np.float32).ravel())
+    params["faces"] = mi.UInt32(mesh.faces.ravel().astype(np.uint32))
+    params.update()
+    return shape
