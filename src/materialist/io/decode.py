@@ -107,8 +107,9 @@ def _picture(path: Path) -> Decoded:
             check_size(*image.size, path)
             image.load()  # finds truncation, also for files whose pixels OpenCV reads below
             warnings = []
-            if getattr(image, "n_frames", 1) > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
-                warnings.append(f"The file holds {image.n_frames} pictures; the first is used.")
+            frames = getattr(image, "n_frames", 1)
+            if frames > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
+                warnings.append(f"The file holds {frames} pictures; the first is used.")
             tags = _exif(image)
             if _is_deep(image, path):
                 linear, scene_linear = _deep(image, path, warnings)
@@ -168,21 +169,21 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     """16-bit integers and floats, which Pillow would cut to 8 bits, through OpenCV; (linear, scene_linear)."""
     import cv2
 
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None:
+    decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if decoded is None:
         raise InputError(f"{path} has an unusual pixel layout; save it as 8- or 16-bit RGB.")
-    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    pixels = np.atleast_3d(np.asarray(decoded))
+    scale = {"uint8": 255, "uint16": 65535}.get(pixels.dtype.name, 1)
     grey, alpha = pixels.shape[2] <= 2, None
     if pixels.shape[2] in (2, 4):
-        scale = np.iinfo(pixels.dtype).max if pixels.dtype.kind == "u" else 1
         alpha = pixels[..., -1:].astype(np.float32) / np.float32(scale)
     colour = np.repeat(pixels[..., :1], 3, -1) if grey else pixels[..., 2::-1]
     if pixels.dtype.kind == "f":
         linear, scene_linear = np.ascontiguousarray(colour, np.float32), True
     elif pixels.dtype in (np.uint8, np.uint16):
-        levels, scene_linear = np.iinfo(pixels.dtype).max + 1, False
+        scene_linear = False
         matrix = matrix_profile(image.info.get("icc_profile") or b"")
-        linear = _srgb(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour, levels)
+        linear = _srgb(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour, scale + 1)
     else:
         raise InputError(f"{path} holds {pixels.dtype} pixels; save it as 8- or 16-bit RGB.")
     return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear

@@ -75,12 +75,13 @@ def read_map(path: str | Path) -> Array:
 
     if not path.is_file():
         raise InputError(f"There is no map at {path}.")
-    array = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
-    if array is None:
+    decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
+    if decoded is None:
         raise InputError(f"{path} is not a readable image (use EXR, or 8- or 16-bit PNG).")
+    array = np.asarray(decoded)
     if array.ndim == 3:
         array = array[..., 2::-1] if array.shape[2] >= 3 else array[..., 0]
-    scale = np.iinfo(array.dtype).max if array.dtype.kind in "ui" else 1
+    scale = {"uint8": 255, "uint16": 65535}.get(array.dtype.name, 1)
     return np.ascontiguousarray(array, np.float32) / np.float32(scale)
 
 

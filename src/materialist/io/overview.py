@@ -95,7 +95,7 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
     """Lines of text under the pictures: how it was made, how good it is, what to beware of."""
     metrics = scene.report.metrics
     parts = [f"Predictor {scene.prior.predictor}"]
-    options = scene.provenance.get("options", {})
+    options = scene.provenance
     parts += [f"{key} {options[key]}" for key in ("engine", "preset", "completion") if key in options]
     for key, text in (
         ("rerender_psnr_path", "PSNR {:.2f} dB"),
