@@ -17,6 +17,8 @@ EXTRAPOLATION = 2.0
 """Inverse depth at a pixel's corner stays within this factor of the pixel's own."""
 BEHIND = 1e-3
 """A continued background lies at least this fraction of the depth behind the foreground that hides it."""
+OVERLAP = 0.02
+"""Pixels by which a tuck that had to leave the background's vertex reaches under the background instead."""
 LEAST_FACING = 0.02
 """Shading normals keep n . v of at least this (89 degrees), so that every visible point can be shaded."""
 
@@ -173,7 +175,7 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     On the shared edge a tuck takes the background's own vertices, so that the two join without a seam.
     """
     width = surface.shape[1]
-    front, back, offset = _cut_pairs(reach.mean(-1), cuts)
+    front, back, offset = _parted_pairs(surface, cuts, reach.mean(-1))
     flat_vertex, flat_reach = vertex.reshape(-1, 4), reach.reshape(-1, 4)
     corner = np.arange(4)
     # Corner c of the front pixel lies at this corner of the back pixel when it is shared, else beyond it.
@@ -193,28 +195,39 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     front_vertex = flat_vertex[front]  # [T, 4]
     tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
     limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - BEHIND)
-    inverse = np.minimum(inverse, limit)
+    loose = shared & (inverse > limit)  # the background comes in front at this corner: pass under it
+    # Moved by OVERLAP, such a corner must stay behind the front face carried on to there, whose slope is at most this.
+    slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
+    inverse = np.minimum(inverse, limit - 2 * OVERLAP * slope * loose)
     torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
     screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
+    screen = screen - OVERLAP * loose[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
 
-def _cut_pairs(inverse: Array, cuts: Cuts) -> tuple[Array, Array, Array]:
-    """Row-major nearer and farther pixel [T] of every cut pair, and the step from farther to nearer [T, 2] (x, y)."""
-    height, width = inverse.shape
+def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Array, Array]:
+    """Nearer and farther pixel [T] (row-major) of pairs whose surfaces may part, and the step between them [T, 2].
+
+    All cut pairs, and the diagonal pairs next to a cut: without these, round-off opens a pinhole where the foreground's
+    rim turns a corner. Steps are (x, y) from the farther to the nearer pixel.
+    """
+    height, width = surface.shape
     index = np.arange(height * width).reshape(height, width)
-    flat = inverse.ravel()
-    ends = [
+    cut = np.zeros((height - 1, width - 1), bool)  # 2x2 blocks with a cut in them
+    cut |= cuts.cut_x[:-1] | cuts.cut_x[1:] | cuts.cut_y[:, :-1] | cuts.cut_y[:, 1:]
+    falling = cut & surface[:-1, :-1] & surface[1:, 1:]
+    rising = cut & surface[:-1, 1:] & surface[1:, :-1]
+    pairs = [
         (index[:, :-1][cuts.cut_x], index[:, 1:][cuts.cut_x], (1, 0)),
         (index[:-1][cuts.cut_y], index[1:][cuts.cut_y], (0, 1)),
+        (index[:-1, :-1][falling], index[1:, 1:][falling], (1, 1)),
+        (index[:-1, 1:][rising], index[1:, :-1][rising], (-1, 1)),
     ]
-    front, back, offset = [], [], []
-    for first, second, step in ends:
-        second_nearer = flat[second] > flat[first]
-        front.append(np.where(second_nearer, second, first))
-        back.append(np.where(second_nearer, first, second))
-        offset.append(np.where(second_nearer[:, None], 1, -1) * np.array(step))
-    return np.concatenate(front), np.concatenate(back), np.concatenate(offset)
+    first, second = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
+    step = np.concatenate([np.tile(pair[2], (len(pair[0]), 1)) for pair in pairs])
+    nearer = inverse.ravel()[second] > inverse.ravel()[first]
+    front, back = np.where(nearer, second, first), np.where(nearer, first, second)
+    return front, back, np.where(nearer[:, None], step, -step)
 
 
 def _unproject_corners(screen: Array, inverse: Array, camera: Camera) -> Array:

@@ -142,14 +142,14 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     reach = sheet.plane.inverse_depth(rays)  # [h+1, w+1]
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
-    allowed &= np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.half_size
-    reach4, allowed4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
-        np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2) for g in (reach, allowed, points)
+    close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.half_size)
+    reach4, allowed4, close4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
+        np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2) for g in (reach, allowed, close, points)
     )
     hidden = np.where(sheet.plane.mask, 0, farthest)  # on the plane's own pixels there is nothing to add
     hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)  # [h, w] farthest in the cell
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
-    keep = (reach4 > 0).all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - BEHIND) * hidden)
+    keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - BEHIND) * hidden)
     if not sheet.bounding:
         keep &= _within_hull(sheet.pixels, (xs[:-1] + xs[1:]) / 2, (ys[:-1] + ys[1:]) / 2, width)
     return points4[keep]

@@ -21,8 +21,12 @@ BENT = 0.08
 a table top that the network has bent stays one plane instead of three."""
 STEP = 0.01
 """Change of that error between neighbours that ends the growth: the rim of a book, not the bend of a table."""
+SMALL_PICTURE = 150
+"""Pixels along the longer side below which the bend itself makes larger steps, and `STEP` grows in proportion."""
 SAME_NORMAL = np.cos(np.radians(25.0))
 """Predicted normals of a plane's pixels agree with their own mean within this angle."""
+FLAT = np.cos(np.radians(10.0))
+"""Half of them even within this angle; on a patch of a ball or a jug they spread evenly up to the bound above."""
 LIKE_GEOMETRY = np.cos(np.radians(55.0))
 """Their mean agrees with the plane through the points within this angle. Loose: a depth network's relief is not metric,
 so that a plane's slope in depth can be far off while its predicted normals are right."""
@@ -73,7 +77,8 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, m
         fit, grown = _grow(small, free, fit)
         if grown.sum() < least:
             break
-        if _unit(-fit.coefficients) @ fit.facing > LIKE_GEOMETRY:
+        flat = np.median(small.normal[grown] @ fit.facing) > FLAT
+        if flat and _unit(-fit.coefficients) @ fit.facing > LIKE_GEOMETRY:
             found.append(fit)
         free &= ~grown
     return _label(_Maps(rays, normal.astype(np.float64), depth), found)
@@ -157,7 +162,8 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     alike = free & maps.alike(fit)
     core = alike & (np.abs(error) < TOLERANCE)
     wide = alike & (np.abs(error) < BENT)
-    jump_x, jump_y = np.abs(np.diff(error, axis=1)) > STEP, np.abs(np.diff(error, axis=0)) > STEP
+    step = STEP * max(1.0, SMALL_PICTURE / max(error.shape))
+    jump_x, jump_y = np.abs(np.diff(error, axis=1)) > step, np.abs(np.diff(error, axis=0)) > step
     calm = wide.copy()
     calm[:, 1:] &= ~jump_x
     calm[1:] &= ~jump_y
