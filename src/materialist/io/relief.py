@@ -7,8 +7,13 @@ import numpy as np
 from materialist.types import Array, Camera, Mesh
 
 _TURN, _TILT = np.radians(24.0), np.radians(12.0)
+_STEP_BACK = 1.12
+"""The depth is stretched by this, so that the turned surface stays in frame."""
+_PER_PIXEL = 5
+"""Samples for each pixel that a face covers: few holes, and those are closed from their neighbours."""
+_LIMIT = 1_500_000
 _CLAY = np.array([214, 208, 198], np.float32)
-_CONTINUED = np.array([104, 134, 168], np.float32)
+_CONTINUED = np.array([92, 122, 158], np.float32)
 _GROUND = (36, 38, 42)
 
 
@@ -19,42 +24,66 @@ def relief(mesh: Mesh, camera: Camera, side: int = 280) -> Array:
     """
     scale = side / max(camera.width, camera.height)
     width, height = max(1, round(camera.width * scale)), max(1, round(camera.height * scale))
-    picture = np.full((height, width, 3), _GROUND, np.uint8)
     surface = mesh.faces[mesh.face_plane < 0]
     if not len(surface):
-        return picture
-    points, normals, plane = _samples(mesh)
+        return np.full((height, width, 3), _GROUND, np.uint8)
     pivot = np.median(mesh.vertices[surface[:, 0]], 0)
-    turned = (points - pivot) @ _rotation().T + pivot
-    shade = 0.25 + 0.75 * np.clip(normals @ _rotation().T @ np.array([-0.35, 0.5, 0.79], np.float32), 0, 1)
-    colour = np.where(plane[:, None] < 0, _CLAY, _CONTINUED) * shade[:, None]
-    depth = -turned[:, 2] * 1.12  # a step back, so that the turned surface stays in frame
-    focal = 0.5 * width / np.tan(np.radians(camera.fov) / 2)
-    ahead = depth > 1e-6
-    column = np.floor(turned[:, 0] / np.where(ahead, depth, 1) * focal + width / 2)
-    row = np.floor(-turned[:, 1] / np.where(ahead, depth, 1) * focal + height / 2)
-    inside = ahead & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    index = (row[inside] * width + column[inside]).astype(np.int64)
+    view = Camera(width, height, camera.fov)
+    vertices = (mesh.vertices - pivot) @ _rotation().T + pivot
+    face, points = _samples(vertices, mesh.faces, view)
+    screen, depth = _project(points, view)
+    light = np.clip(mesh.normals @ _rotation().T @ np.array([-0.35, 0.5, 0.79], np.float32), 0, 1)  # [V]
+    shade = 0.25 + 0.75 * light[mesh.faces[face, 0]]
+    colour = np.where(mesh.face_plane[face][:, None] < 0, _CLAY, _CONTINUED) * shade[:, None]
+    inside = (depth > 0) & (screen >= 0).all(-1) & (screen < (width, height)).all(-1)
+    index = screen[inside].astype(np.int64) @ np.array([1, width])
     order = np.argsort(-depth[inside], kind="stable")  # nearest last, so that it stays
-    picture.reshape(-1, 3)[index[order]] = colour[inside][order].astype(np.uint8)
-    return picture
+    picture = np.full((height * width, 3), -1, np.float32)
+    picture[index[order]] = colour[inside][order]
+    return _closed(picture.reshape(height, width, 3)).astype(np.uint8)
 
 
-def _samples(mesh: Mesh, limit: int = 400_000) -> tuple[Array, Array, Array]:
-    """Points, normals and planes spread over the faces by area, at most about `limit`; the same ones every time."""
-    corners = mesh.vertices[mesh.faces]  # [F, 3, 3]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    # A far face covers fewer pixels: what counts is its area over its distance squared.
-    area = area / np.maximum((corners.mean(1) ** 2).sum(-1), 1e-12)
-    count = np.ceil(area / max(area.sum(), 1e-30) * limit / 2).astype(np.int64)
-    face = np.repeat(np.arange(len(mesh.faces)), np.minimum(count, limit // 4))
-    rng = np.random.default_rng(0)
-    u, v = rng.random((2, len(face)), np.float32)
-    over = u + v > 1
-    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
-    weight = np.stack([1 - u - v, u, v], -1)[..., None]  # [N, 3, 1]
-    points = (corners[face] * weight).sum(1)
-    return points, mesh.normals[mesh.faces[face, 0]], mesh.face_plane[face]
+def _samples(vertices: Array, faces: Array, view: Camera) -> tuple[Array, Array]:
+    """Faces [N] and points [N, 3] on them, as dense as the pixels they cover; the same ones every time."""
+    screen, depth = _project(vertices, view)
+    corners, ahead = screen[faces], (depth[faces] > 0).all(-1)  # [F, 3, 2], [F]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    low = np.clip(corners.min(1), 0, (view.width, view.height))
+    high = np.clip(corners.max(1), 0, (view.width, view.height))
+    # A face that reaches far out of the picture is worth the samples of its whole area, up to a bound.
+    area = np.where((high - low).min(-1) > 0, np.minimum(area, 8 * view.width * view.height), 0)
+    area = np.where(ahead, area, 0)
+    count = np.ceil(area * _PER_PIXEL)
+    count = np.ceil(count * min(1.0, _LIMIT / max(float(count.sum()), 1.0))).astype(np.int64)
+    face = np.repeat(np.arange(len(faces)), count)
+    u, v = np.random.default_rng(0).random((2, len(face)), np.float32)
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    # Even on the screen, not on the surface: weights are divided by depth and normalised.
+    weight = np.stack([1 - u - v, u, v], -1) * depth[faces[face]]
+    weight /= weight.sum(-1, keepdims=True)
+    return face, np.einsum("nk,nkc->nc", weight, vertices[faces[face]])
+
+
+def _project(points: Array, view: Camera) -> tuple[Array, Array]:
+    """Screen position [N, 2] and stretched depth [N] of turned points."""
+    depth = -points[..., 2] * _STEP_BACK
+    safe = np.where(depth > 1e-6, depth, 1.0)
+    x = points[..., 0] / safe * view.focal + view.width / 2
+    y = -points[..., 1] / safe * view.focal + view.height / 2
+    return np.stack([x, y], -1), np.where(depth > 1e-6, depth, 0)
+
+
+def _closed(picture: Array) -> Array:
+    """Fill single empty pixels (negative) from at least five full neighbours; the rest becomes the ground."""
+    import cv2
+
+    full = (picture[..., 0] >= 0).astype(np.float32)
+    weight = cv2.boxFilter(full, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    total = cv2.boxFilter(picture * full[..., None], -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    mean = total / np.maximum(weight, 1)[..., None]
+    ground = np.array(_GROUND, np.float32)
+    return np.where(full[..., None] > 0, picture, np.where(weight[..., None] >= 5, mean, ground))
 
 
 def _rotation() -> Array:
