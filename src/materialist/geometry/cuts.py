@@ -11,9 +11,13 @@ from materialist.types import Array, Camera
 
 SUPPORT_PIXELS = 3
 """A slope counts as the surface's own only if it holds over this many pixels beside the pair."""
+STEADY_FACTOR = 2.0
+"""Where the slope is steady, as on a plane, a step up to this many times as large still belongs to the surface."""
+BENDING_FACTOR = 3.0
+"""A slope that grows towards the pair by a share s raises that allowance by this times s ..."""
 SUPPORT_FACTOR = 5.0
-"""A step is a cut only if it exceeds the surface's own slope by this factor. The steepest smooth case is the rim of a
-sphere, whose last step is up to 4.2 times the smallest of the three before it wherever tau = 6 calls it grazing."""
+"""... but never above this many times the smallest slope. The steepest smooth case is the rim of a sphere, whose last
+step is up to 4.2 times the smallest of the three before it wherever tau = 6 calls it grazing."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +43,8 @@ def find_cuts(depth: Array, camera: Camera, tau: float) -> Cuts:
     2. the leg itself is grazing: it makes an angle below sqrt(2) tau with the view ray. A triangle's plane is at least
        as grazing as any of its edges, and its steeper leg is at most about sqrt(2) times less so: every grazing
        triangle is cut, and only across its slope, not along the boundary;
-    3. its step in inverse depth exceeds `SUPPORT_FACTOR` times the slope that either side shows over `SUPPORT_PIXELS`
-       pixels. Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut.
+    3. its step in inverse depth exceeds what the slope on either side, over `SUPPORT_PIXELS` pixels, lets expect.
+       Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut.
 
     depth: [H, W] planar scene units, 0 = no surface. tau: degrees. The arrays in the result are described there.
     """
@@ -48,8 +52,8 @@ def find_cuts(depth: Array, camera: Camera, tau: float) -> Cuts:
     points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
     inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
-    steep_x = _exceeds_support(inverse, surface)
-    steep_y = _exceeds_support(inverse.T, surface.T).T
+    steep_x = _exceeds_slope(inverse, surface)
+    steep_y = _exceeds_slope(inverse.T, surface.T).T
     pair_x = surface[:, :-1] & surface[:, 1:]
     pair_y = surface[:-1] & surface[1:]
     cut_x, cut_y = pair_x & grazing_x & steep_x, pair_y & grazing_y & steep_y
@@ -97,25 +101,26 @@ def _edge_angle(a: Array, b: Array) -> Array:
     return np.arctan2(cross, np.abs((edge * view).sum(-1)))
 
 
-def _exceeds_support(inverse: Array, surface: Array) -> Array:
+def _exceeds_slope(inverse: Array, surface: Array) -> Array:
     """Condition 3 for horizontal pairs: [H, W-1] bool, from inverse depth [H, W] and its validity [H, W]."""
     width = inverse.shape[1]
     pair = surface[:, :-1] & surface[:, 1:]  # [H, W-1]
     step = np.where(pair, inverse[:, 1:] - inverse[:, :-1], 0.0)  # [H, W-1] 1 / (scene unit pixel)
-    best = np.zeros_like(step)
+    allowed = np.zeros_like(step)
     for side in (-1, 1):
-        slope = np.full_like(step, np.inf)
+        least, first = np.full_like(step, np.inf), np.zeros_like(step)  # smallest slope, and the one next to the pair
         held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
-        for reach in range(1, SUPPORT_PIXELS + 1):
-            if reach >= width - 1:
-                break
+        for reach in range(1, min(SUPPORT_PIXELS, width - 2) + 1):
             here, there = (slice(reach, None), slice(None, -reach))[::side]
             reached = np.zeros(step.shape, bool)
             reached[:, here] = pair[:, there]
             held &= reached
             beside = np.zeros_like(step)  # slope at this reach, counted along the pair's own sign
             beside[:, here] = np.sign(step[:, here]) * step[:, there]
-            slope = np.where(held, np.minimum(slope, beside), slope)
-        slope[~np.isfinite(slope)] = 0
-        best = np.maximum(best, slope)
-    return np.abs(step) > SUPPORT_FACTOR * best
+            least = np.where(held, np.minimum(least, beside), least)
+            first = np.where(held & (reach == 1), beside, first)
+        steady = np.isfinite(least) & (least > 0)
+        least = np.where(steady, least, 1)
+        bending = first * (STEADY_FACTOR + BENDING_FACTOR * (first / least - 1))
+        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, SUPPORT_FACTOR * least), 0))
+    return np.abs(step) > allowed
