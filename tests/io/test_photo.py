@@ -7,6 +7,7 @@ import zlib
 import cv2
 import numpy as np
 import pytest
+from made_dng import write_dng
 from PIL import Image, ImageCms
 
 from materialist.color import linear_to_srgb, srgb_to_linear
@@ -352,3 +353,16 @@ def test_odd_inputs_all_work(shared):
 
 def test_16_bit_photo_has_more_than_256_levels(shared):
     assert len(np.unique(read_photo(shared / "odd_inputs/rgb16_car_interior.png").original[..., 0])) > 1000
+
+
+def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):
+    """A grey ramp in a colour filter array comes back as the same grey ramp, up to one exposure factor."""
+    pytest.importorskip("rawpy", reason="needs rawpy")
+    ramp = np.broadcast_to(np.linspace(2000, 60000, 96), (64, 96))
+    write_dng(tmp_path / "a.dng", ramp, focal_35mm=50)
+    photo = read_photo(tmp_path / "a.dng")
+    middle = photo.linear[8:-8, 8:-8]
+    ratio = middle.mean(-1) / (ramp[8:-8, 8:-8] / 65535)
+    assert photo.linear.shape == (64, 96, 3) and np.ptp(middle, axis=-1).max() < 0.02
+    np.testing.assert_allclose(ratio, np.median(ratio), rtol=0.02)
+    assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(39.598, abs=0.01)
