@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from geometry_scenes import plane_depth, room, sphere_depth
+from scipy import ndimage
 
 from materialist.geometry.cuts import find_cuts
 from materialist.types import Camera
@@ -99,3 +100,20 @@ def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
         np.testing.assert_array_equal(cuts.cut_x ^ cuts.link_x, pair)
     assert (large.cut_x | ~small.cut_x).all() and (large.cut_y | ~small.cut_y).all()
     assert large.cut_x.sum() > small.cut_x.sum()
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 5, 7, 12])
+@pytest.mark.parametrize("tau", [1.0, 6.0, 12.0])
+def test_the_resolution_limit_is_that_of_the_depth_map(width, tau):
+    # docs/geometry.md, "Resolution limit": edges smeared over 3 pixels part, over 7 pixels only those of thin bars do.
+    camera = Camera(256, 16, 18.0)
+    inverse = np.full((16, 256), 1 / 4)
+    inverse[:, 120 : 120 + width] = 1 / 2
+    for smear, least, most in ((1, 1, 1), (3, 1, 1), (7, 0, 1)):
+        smeared = ndimage.uniform_filter1d(inverse, smear, axis=1)
+        cut = find_cuts(1 / smeared, camera, tau).cut_x[8, : 120 + width // 2]
+        step = np.abs(np.diff(smeared[8]))[: 120 + width // 2]
+        share = step[cut].sum() / step.sum()
+        assert least - 1e-9 <= share <= most + 1e-9
+        if smear == 7 and width >= 7:
+            assert share == 0
