@@ -27,7 +27,7 @@ def is_blue(picture):
 
 
 def test_a_near_object_hides_the_wall_behind_it_without_holes():
-    picture = relief(mesh_of(quad(3.0, 0.4, -1), quad(6.0, 5.0, 0)), CAMERA, side=120)
+    picture = relief(mesh_of(quad(3.0, 0.4, -1), quad(6.0, 6.5, 0)), CAMERA, side=120)
     assert picture.shape == (80, 120, 3)
     assert not is_blue(picture[38:42, 58:62]).any()  # the object, about which the camera turns
     assert is_blue(picture[[0, 0, -1, -1], [0, -1, 0, -1]]).all()
@@ -35,13 +35,13 @@ def test_a_near_object_hides_the_wall_behind_it_without_holes():
     rows, columns = np.nonzero(clay)
     box = clay[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     assert box.mean() > 0.6  # a convex quadrilateral fills its box; a sieve would not
-    assert (relief(mesh_of(quad(3.0, 0.4, -1), quad(6.0, 5.0, 0)), CAMERA, side=120) == picture).all()
+    assert (relief(mesh_of(quad(3.0, 0.4, -1), quad(6.0, 6.5, 0)), CAMERA, side=120) == picture).all()
 
 
 def test_the_order_of_faces_does_not_matter():
-    near, far = quad(3.0, 0.4, -1), quad(6.0, 5.0, 0)
+    near, far = quad(3.0, 0.4, -1), quad(6.0, 6.5, 0)
     one, two = relief(mesh_of(near, far), CAMERA, side=60), relief(mesh_of(far, near), CAMERA, side=60)
-    assert np.mean(is_blue(one) != is_blue(two)) < 0.01
+    assert np.mean(is_blue(one) != is_blue(two)) < 0.02
 
 
 def test_faces_behind_the_camera_are_left_out():

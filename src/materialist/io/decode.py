@@ -266,22 +266,28 @@ def _raw_tags(path: Path) -> dict[str, Any]:
     """EXIF of a RAW file; most are TIFF inside, the others give none."""
     from PIL import Image
 
+    exif = Image.Exif()
     try:
-        with Image.open(path) as image:
-            return _exif(image)
+        with path.open("rb") as file:
+            exif.load_from_fp(file)
+            return _named(exif)
     except Exception:  # no EXIF is no error: the field of view then falls back
         return {}
 
 
 def _exif(image: Image.Image) -> dict[str, Any]:
-    """EXIF tags by name, of the main and the Exif directory."""
-    from PIL import ExifTags
-
+    """EXIF tags of an image by name."""
     try:
-        exif = image.getexif()
-        tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+        return _named(image.getexif())
     except Exception:  # damaged EXIF does not make a photo unreadable
         return {}
+
+
+def _named(exif: Image.Exif) -> dict[str, Any]:
+    """Tags by name, of the main and the Exif directory."""
+    from PIL import ExifTags
+
+    tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
     return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}
 
 

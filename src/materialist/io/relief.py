@@ -27,7 +27,7 @@ def relief(mesh: Mesh, camera: Camera, side: int = 280) -> Array:
     surface = mesh.faces[mesh.face_plane < 0]
     if not len(surface):
         return np.full((height, width, 3), _GROUND, np.uint8)
-    pivot = np.median(mesh.vertices[surface[:, 0]], 0)
+    pivot = np.median(mesh.vertices[surface].mean(1), 0)
     view = Camera(width, height, camera.fov)
     vertices = (mesh.vertices - pivot) @ _rotation().T + pivot
     face, points = _samples(vertices, mesh.faces, view)
