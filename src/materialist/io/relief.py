@@ -79,8 +79,8 @@ def _closed(picture: Array) -> Array:
     import cv2
 
     full = (picture[..., 0] >= 0).astype(np.float32)
-    weight = cv2.boxFilter(full, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    total = cv2.boxFilter(picture * full[..., None], -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    weight = cv2.boxFilter(full, -1, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
+    total = cv2.boxFilter(picture * full[..., None], -1, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
     mean = total / np.maximum(weight, 1)[..., None]
     ground = np.array(_GROUND, np.float32)
     return np.where(full[..., None] > 0, picture, np.where(weight[..., None] >= 5, mean, ground))
