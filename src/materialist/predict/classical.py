@@ -1,0 +1,39 @@
+"""The built-in predictor: no weights, no learning, a guess from colour, edges and a ground plane."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS
+from materialist.predict.layout import guess_depth
+from materialist.predict.normals import normals_from_depth
+from materialist.predict.retinex import separate
+from materialist.types import Materials, Photo, Prediction
+
+WARNING = (
+    "The built-in classical predictor ran: geometry is a guess (ground plane, back wall, upright objects), albedo is a "
+    "colour Retinex estimate, roughness and metallic are neutral; maps of a trained network do better "
+    "(--predictor maps:DIR)."
+)
+
+
+class ClassicalPredictor:
+    """Colour Retinex for albedo, a ground-and-objects layout for depth, the paper's neutral roughness and metallic."""
+
+    name = "classical"
+
+    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
+        """Maps of the photo's working size; deterministic, `seed` changes nothing. Works on any photo."""
+        depth = guess_depth(photo.linear, photo.camera)
+        albedo, _ = separate(photo.linear)
+        size = photo.linear.shape[:2]
+        materials = Materials(
+            albedo=albedo,
+            roughness=np.full(size, NEUTRAL_ROUGHNESS, np.float32),
+            metallic=np.full(size, NEUTRAL_METALLIC, np.float32),
+        )
+        warnings = [WARNING]
+        if (depth == 0).any():
+            warnings.append(f"{(depth == 0).mean():.0%} of the picture was taken for sky and has no surface.")
+        normal = normals_from_depth(depth, photo.camera, radius=2)
+        return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))
