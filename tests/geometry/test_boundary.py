@@ -191,7 +191,7 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     assume(np.isfinite(depth).all())
     inverse = np.pad(1 / depth, 1, mode="reflect", reflect_type="odd")  # linear on a plane
     assume((2 * inverse[:-2] > inverse[1:-1]).all() and inverse.min() > 0)  # the horizon is not in the picture
-    mesh = depth_to_mesh(depth, towards(depth.shape), camera)
+    mesh = depth_to_mesh(depth, np.broadcast_to(normal, (*depth.shape, 3)), camera)
     assert len(mesh.vertices) == (width + 1) * (height + 1)  # one sheet
     np.testing.assert_allclose(mesh.vertices @ normal, -distance, rtol=2e-5)
 

@@ -104,16 +104,31 @@ def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
 
 @pytest.mark.parametrize("width", [1, 2, 3, 5, 7, 12])
 @pytest.mark.parametrize("tau", [1.0, 6.0, 12.0])
-def test_the_resolution_limit_is_that_of_the_depth_map(width, tau):
-    # docs/geometry.md, "Resolution limit": edges smeared over 3 pixels part, over 7 pixels only those of thin bars do.
+def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, tau):
+    # docs/geometry.md, "Resolution limit"
     camera = Camera(256, 16, 18.0)
     inverse = np.full((16, 256), 1 / 4)
     inverse[:, 120 : 120 + width] = 1 / 2
-    for smear, least, most in ((1, 1, 1), (3, 1, 1), (7, 0, 1)):
+    facing, sideways = np.zeros((16, 256, 3)), np.zeros((16, 256, 3))
+    facing[..., 2], sideways[..., 0] = 1, 1
+    for smear in (1, 3, 7):
         smeared = ndimage.uniform_filter1d(inverse, smear, axis=1)
-        cut = find_cuts(1 / smeared, camera, tau).cut_x[8, : 120 + width // 2]
-        step = np.abs(np.diff(smeared[8]))[: 120 + width // 2]
-        share = step[cut].sum() / step.sum()
-        assert least - 1e-9 <= share <= most + 1e-9
-        if smear == 7 and width >= 7:
-            assert share == 0
+        step = np.abs(np.diff(smeared[8]))
+        cut = find_cuts(1 / smeared, camera, tau, facing).cut_x[8]
+        np.testing.assert_array_equal(cut, step > 1e-9)
+        if smear == 7 and width >= 7:  # by depth alone, this is a slanted surface
+            for normal in (None, sideways):
+                assert not find_cuts(1 / smeared, camera, tau, normal).cut_x.any()
+
+
+def test_true_normals_keep_a_grazing_floor_and_a_sphere_whole():
+    camera = Camera(100, 100, 40.0)
+    floor = plane_depth(camera, (0, 1, 0), -1.0)
+    floor = np.where(floor < 1e3, floor, 0)
+    cuts = find_cuts(floor, camera, 6.0, np.broadcast_to([0.0, 1, 0], (100, 100, 3)))
+    assert not cuts.cut_x.any() and not cuts.cut_y.any()
+    sphere, outward = sphere_depth(camera, (0.3, 0.1, -10), 2.5)
+    ball = np.isfinite(sphere)
+    normal = np.where(ball[..., None], outward, [0, 0, 1])
+    cuts = find_cuts(np.minimum(sphere, 40.0), camera, 6.0, normal)
+    np.testing.assert_array_equal(cuts.cut_x, ball[:, :-1] != ball[:, 1:])

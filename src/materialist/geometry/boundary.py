@@ -42,7 +42,7 @@ def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6
     depth, normal = check_maps(depth, normal, camera)
     if not 0 < tau < 90:
         raise InputError(f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6).")
-    cuts = find_cuts(depth, camera, tau)
+    cuts = find_cuts(depth, camera, tau, normal)
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)  # [H, W] 1 / scene unit
     vertex = corner_vertices(depth > 0, cuts)  # [H, W, 4] vertex of each pixel's corners, -1 without surface
     reach = corner_inverse_depth(inverse, cuts)  # [H, W, 4] 1 / scene unit

@@ -11,6 +11,9 @@ from materialist.types import Array, Camera
 
 SUPPORT_PIXELS = 3
 """A slope counts as the surface's own only if it holds over this many pixels beside the pair."""
+SLANTED = 25.0
+"""Degrees. Only where the predicted normal is at least this grazing can a steep slope be a surface seen from the side;
+where it faces the camera, the slope is an edge that the depth network has smeared."""
 STEADY_FACTOR = 2.0
 """Where the slope is steady, as on a plane, a step up to this many times as large still belongs to the surface."""
 BENDING_FACTOR = 3.0
@@ -34,7 +37,7 @@ class Cuts:
     """[H-1, W] bool: likewise for vertical pairs."""
 
 
-def find_cuts(depth: Array, camera: Camera, tau: float) -> Cuts:
+def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = None) -> Cuts:
     """Cut the pixel grid at occlusion boundaries.
 
     A pair of 4-neighbours is cut when all of these hold:
@@ -44,20 +47,28 @@ def find_cuts(depth: Array, camera: Camera, tau: float) -> Cuts:
        as grazing as any of its edges, and its steeper leg is at most about sqrt(2) times less so: every grazing
        triangle is cut, and only across its slope, not along the boundary;
     3. its step in inverse depth exceeds what the slope on either side, over `SUPPORT_PIXELS` pixels, lets expect.
-       Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut.
+       Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut. This exception
+       holds only where the predicted normals, if given, agree that the surface is slanted (`SLANTED`).
 
-    depth: [H, W] planar scene units, 0 = no surface. tau: degrees. The arrays in the result are described there.
+    depth: [H, W] planar scene units, 0 = no surface. tau: degrees. normal: [H, W, 3] predicted unit normals or None.
     """
     surface = depth > 0  # [H, W]
     points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
     inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
-    steep_x = _exceeds_slope(inverse, surface)
-    steep_y = _exceeds_slope(inverse.T, surface.T).T
+    slanted = np.ones(depth.shape, bool) if normal is None else _slanted(normal, points)  # [H, W]
+    steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
+    steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
     pair_x = surface[:, :-1] & surface[:, 1:]
     pair_y = surface[:-1] & surface[1:]
     cut_x, cut_y = pair_x & grazing_x & steep_x, pair_y & grazing_y & steep_y
     return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
+
+
+def _slanted(normal: Array, points: Array) -> Array:
+    """[H, W] bool: predicted normal [H, W, 3] within `SLANTED` of grazing, seen from the camera at points [H, W, 3]."""
+    length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(points, axis=-1)
+    return np.abs((normal * points).sum(-1)) <= np.sin(np.radians(SLANTED)) * length
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:
