@@ -35,6 +35,7 @@ def test_a_near_object_hides_the_wall_behind_it_without_holes():
     rows, columns = np.nonzero(clay)
     box = clay[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     assert box.mean() > 0.6  # a convex quadrilateral fills its box; a sieve would not
+    assert (picture == (36, 38, 42)).all(-1).mean() < 1e-3  # the wall reaches over the whole picture, evenly sampled
     assert (relief(mesh_of(quad(3.0, 0.4, -1), quad(6.0, 6.5, 0)), CAMERA, side=120) == picture).all()
 
 

@@ -60,7 +60,7 @@ def _samples(vertices: Array, faces: Array, view: Camera) -> tuple[Array, Array]
     u, v = np.random.default_rng(0).random((2, len(face)), np.float32)
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     # Even on the screen, not on the surface: weights are divided by depth and normalised.
-    weight = np.stack([1 - u - v, u, v], -1) * depth[faces[face]]
+    weight = np.stack([1 - u - v, u, v], -1) / depth[faces[face]]
     weight /= weight.sum(-1, keepdims=True)
     return face, np.einsum("nk,nkc->nc", weight, vertices[faces[face]])
 
