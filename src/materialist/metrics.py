@@ -76,7 +76,8 @@ def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
         for m in range(-l, l + 1):
             k = abs(m)
             norm = np.sqrt((2 * l + 1) / (4 * np.pi) * factorial(l - k) / factorial(l + k))
-            legendre = norm * (np.sqrt(2) if k else 1) * lpmv(k, l, cos_theta)  # [h]
+            # Without the Condon-Shortley sign of lpmv: degree 1 is then (x, y, -z).
+            legendre = norm * (np.sqrt(2) if k else 1) * (-1) ** k * lpmv(k, l, cos_theta)  # [h]
             coefficients.append((legendre * weight) @ (rows_sin[k] if m < 0 else rows[k]))
     return np.stack(coefficients)
 

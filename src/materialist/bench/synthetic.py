@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from materialist.bench import lights, scenes
-from materialist.metrics import resample_envmap
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
 """Samples a pixel of a reference picture: two seeds then agree to about 40 dB. A square, for the stratified sampler."""
 MAX_DEPTH = 6
 """Path length of the reference pictures: five bounces."""
+WAVEFRONT = 2**24
+"""Paths traced at a time."""
 EXPOSED = 0.85
 """Luminance at which the brightest two hundredths of the surfaces are exposed."""
 
@@ -103,9 +104,23 @@ class TrueScene:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
         import mitsuba as mi
 
-        _set_envmap(self._params, envmap)
+        from materialist.render.scene import _padded as on_mitsuba_grid
+
+        self._params["light.data"] = mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+        self._params.update()
         integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH})
-        return np.array(mi.render(self._scene, integrator=integrator, spp=spp, seed=seed), np.float32)[..., :3]
+        # Whole squares suit the stratified sampler; batches bound the memory.
+        total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
+        for k, part in enumerate(batches):
+            picture = mi.render(self._scene, integrator=integrator, spp=part, seed=(seed * 7919 + k) & 0xFFFFFFFF)
+            total += np.array(picture)[..., :3] * part
+        return (total / sum(batches)).astype(np.float32)
+
+    def _batches(self, spp: int) -> list[int]:
+        """Samples a pixel of each pass: squares, together at least spp, each within WAVEFRONT paths."""
+        most = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
+        count = -(-spp // most)
+        return [int(np.ceil(np.sqrt(spp / count))) ** 2] * count
 
     def _true_maps(self, sub: int = 4) -> Prediction:
         """Depth and normal at pixel centres; albedo averaged over sub x sub places on the object at the centre."""
@@ -189,7 +204,7 @@ def _mesh(item: scenes.Item, number: int) -> Any:
     maps = {"base_color": texture(item.albedo)}
     maps |= {name: texture(np.full((1, 1, 1), getattr(item, name))) for name in ("roughness", "metallic")}
     props = mi.Properties()
-    props["bsdf"] = mi.load_dict({"type": "twosided", "inner": {"type": "principled", **maps}})
+    props["bsdf"] = mi.load_dict({"type": "materialist_disney", **maps})
     solid = item.solid
     mesh = mi.Mesh(
         f"item{number:02d}",
@@ -230,20 +245,5 @@ def _emitter() -> dict[str, Any]:
     """An envmap emitter whose centre column looks along -Z; Mitsuba's own convention has it along +Z."""
     import mitsuba as mi
 
-    placeholder = mi.Bitmap(np.full((lights.HEIGHT, 2 * lights.HEIGHT, 3), 1.0, np.float32))
+    placeholder = mi.Bitmap(np.ones((9, 8, 3), np.float32))
     return {"type": "envmap", "bitmap": placeholder, "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180)}
-
-
-def _set_envmap(params: Any, envmap: Array) -> None:
-    """Replaces the light of a scene by envmap [h, 2h, 3]."""
-    import mitsuba as mi
-
-    rows = resample_envmap(envmap, lights.HEIGHT)
-    # Mitsuba puts its first and last row at the poles, not half a texel away: look up where its rows are.
-    y = np.clip(np.arange(lights.HEIGHT) * lights.HEIGHT / (lights.HEIGHT - 1) - 0.5, 0, lights.HEIGHT - 1)
-    low = np.minimum(y.astype(int), lights.HEIGHT - 2)
-    part = (y - low)[:, None, None]
-    rows = rows[low] * (1 - part) + rows[low + 1] * part
-    # Its last column repeats the first.
-    params["light.data"] = mi.TensorXf(np.concatenate([rows, rows[:, :1]], axis=1).astype(np.float32))
-    params.update()

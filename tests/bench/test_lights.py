@@ -1,0 +1,72 @@
+"""Environments of the benchmark: sane, different, and turned into the camera's frame."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from materialist.bench import lights
+from materialist.errors import InputError
+from materialist.metrics import sh_coefficients
+
+SHARED = Path(__file__).parents[3] / "shared" / "data"
+IDENTITY = np.eye(3)
+
+
+def test_directions_follow_the_envmap_convention():
+    d = lights.directions(64)
+    assert np.allclose(d[32, 64], [0, 0, -1], atol=0.05)  # the centre column looks along -Z
+    assert np.allclose(d[32, 96], [1, 0, 0], atol=0.05)  # to the right it turns towards +X
+    assert d[0, 0, 1] > 0.99  # the top row is +Y
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_procedural_lights_are_positive_and_come_from_above(index):
+    envmap = lights.envmap(lights.environment(index, seed=0, data=None), IDENTITY)
+    assert envmap.shape == (256, 512, 3) and envmap.dtype == np.float32
+    assert np.isfinite(envmap).all() and envmap.min() > 0
+    assert envmap[:128].mean() > envmap[128:].mean()
+
+
+def test_contrast_ranges_from_moderate_to_strong():
+    ratio = []
+    for index in range(8):
+        envmap = lights.envmap(lights.environment(index, seed=0, data=None), IDENTITY)
+        ratio.append(envmap.max() / np.median(envmap))
+    assert min(ratio) < 10 and max(ratio) > 100
+
+
+def test_light_is_the_same_for_the_same_numbers_only():
+    make = lambda i, s: lights.envmap(lights.environment(i, seed=s, data=None), IDENTITY)  # noqa: E731
+    assert np.array_equal(make(1, 0), make(1, 0))
+    assert not np.array_equal(make(1, 0), make(5, 0)) and not np.array_equal(make(1, 0), make(1, 1))
+
+
+def test_a_tilted_camera_sees_the_sky_tilted():
+    """Degree-1 harmonics are a vector: it must turn with the frame."""
+    radiance = lambda d: np.repeat(1 + d[..., 1:2], 3, axis=-1)  # noqa: E731
+    angle = 0.5
+    c, s = np.cos(angle), np.sin(angle)
+    looking_down = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])  # camera -> scene: -Z goes down
+    up_in_camera = looking_down.T @ [0, 1, 0]
+    assert (looking_down @ [0, 0, -1])[1] < 0
+    _, first, second, third = sh_coefficients(lights.envmap(radiance, looking_down))[:4, 0]
+    found = np.array([first, second, third]) / np.linalg.norm([first, second, third])
+    # Orders -1, 0, 1 go with sin, pole, cos of the azimuth from -Z: x, y, -z.
+    assert np.allclose(found, [up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
+
+
+def test_a_data_folder_without_captures_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no \.exr"):
+        lights.environment(0, seed=0, data=tmp_path)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
+def test_captures_are_turned_but_keep_their_power():
+    from materialist.io.exr import read_exr
+
+    files = sorted((SHARED / "envmaps").glob("*.exr"))
+    chosen = np.random.default_rng([0, 4]).permutation(len(files))[0]
+    power = sh_coefficients(read_exr(files[chosen])[..., :3])[0]
+    turned = lights.envmap(lights.environment(0, seed=0, data=SHARED), IDENTITY)
+    assert np.allclose(sh_coefficients(turned)[0], power, rtol=0.02)

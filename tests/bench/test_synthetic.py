@@ -1,0 +1,109 @@
+"""Synthetic samples: the truth must be true of the picture."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist.bench import scenes
+from materialist.bench.synthetic import make_sample
+from materialist.camera import pixel_rays, unproject
+from materialist.errors import InputError
+
+SHARED = Path(__file__).parents[3] / "shared" / "data"
+
+
+def test_maps_are_complete_and_in_range(sample):
+    truth, shape = sample.truth, (40, 56)
+    assert sample.photo.linear.shape == (*shape, 3) and sample.envmap.shape == (256, 512, 3)
+    assert truth.depth.shape == truth.materials.roughness.shape == truth.materials.metallic.shape == shape
+    surface = truth.depth > 0
+    assert 0.3 < surface.mean() < 1
+    assert truth.materials.albedo[surface].min() > 0.02 and truth.materials.albedo.max() <= 0.9
+    assert np.allclose(np.linalg.norm(truth.normal, axis=-1), 1, atol=1e-4)
+    assert sample.photo.linear.min() >= 0 and sample.photo.linear.max() <= 1
+    assert 0.05 < sample.photo.linear.mean() < 0.8
+
+
+def test_the_same_numbers_give_the_same_sample(sample):
+    again = make_sample(0, 0, 0, size=(40, 56), seed=0, spp=64)
+    assert np.array_equal(again.photo.linear, sample.photo.linear)
+    assert np.array_equal(again.truth.depth, sample.truth.depth)
+    other = make_sample(0, 1, 0, size=(40, 56), seed=0, spp=4)
+    assert not np.array_equal(other.truth.depth, sample.truth.depth)
+
+
+def test_the_sky_of_the_photo_is_the_envmap(sample):
+    """Where there is no surface the photo shows the light: this pins the frame of the envmap and the exposure."""
+    rays = pixel_rays(sample.photo.camera).astype(np.float64)
+    d = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    column = ((np.arctan2(d[..., 0], -d[..., 2]) / (2 * np.pi) + 0.5) * 512).astype(int) % 512
+    row = np.clip((np.arccos(d[..., 1]) / np.pi * 256).astype(int), 0, 255)
+    sky = sample.truth.depth == 0
+    sky[:, 1:] &= sky[:, :-1]
+    sky[1:] &= sky[:-1]
+    sky[:-1] &= sky[1:]
+    assert sky.sum() > 50
+    expected = np.clip(sample.envmap[row, column], 0, 1)
+    assert np.abs(expected - sample.photo.linear)[sky].mean() < 0.02
+
+
+def test_render_repeats_the_photo_and_is_linear_in_the_light(sample):
+    again = sample.render(sample.envmap, spp=64, seed=5)
+    assert metrics.psnr(again, sample.photo.linear) > 25
+    twice = sample.render(2 * sample.envmap, spp=64, seed=5)
+    assert np.allclose(twice, 2 * again, rtol=1e-3, atol=1e-4)
+
+
+def test_depth_and_normals_agree_on_the_floor(sample):
+    """The floor is one plane of the camera frame: its points lie on the plane of its normal."""
+    normal, depth = sample.truth.normal, sample.truth.depth
+    floor_normal = normal[-1, 0]
+    floor = (depth > 0) & (normal @ floor_normal > 0.9999)
+    assert floor.sum() > 200 and floor_normal[1] > 0.7
+    distance = unproject(depth, sample.photo.camera)[floor] @ floor_normal
+    assert np.ptp(distance) < 1e-3
+
+
+def test_white_furnace(mitsuba):
+    """Under white light a diffuse white world would be white; ours stays below, and albedo is what is missing."""
+    picture = make_sample(0, 0, 0, size=(16, 24), spp=4)
+    lit = picture.render(np.ones((8, 16, 3), np.float32), spp=256)
+    surface = picture.truth.depth > 0
+    assert (lit[surface] < 1.15).all()
+    assert np.corrcoef(lit[surface].ravel(), picture.truth.materials.albedo[surface].ravel())[0, 1] > 0.65
+    assert np.allclose(lit[~surface & np.roll(~surface, 1, 0) & np.roll(~surface, -1, 0)], 1, atol=0.15)
+
+
+@pytest.mark.parametrize("index", range(10))
+def test_every_scene_has_objects_that_do_not_touch(index):
+    items = scenes.arrangement(index, seed=0, data=None)
+    things = items[1 + index % 3 :]
+    assert 1 <= len(things) <= 7
+    for item in items:
+        assert 0 <= item.roughness <= 1 and item.metallic in (0, 1)
+    low = [t.solid.vertices[:, 1].min() for t in things]
+    assert np.abs(low).max() < 1e-9
+
+
+@pytest.mark.parametrize("index", range(10))
+def test_cameras_look_down_onto_the_objects(index):
+    for k in range(5):
+        view = scenes.view(index, k, seed=0)
+        forward = view.to_scene @ [0, 0, -1]
+        assert 9.9 < np.degrees(-np.arcsin(forward[1])) < 35.1 and 35 <= view.fov <= 60
+        assert np.allclose(view.to_scene @ view.to_scene.T, np.eye(3)) and np.linalg.det(view.to_scene) > 0
+        assert view.position[1] > 0.3
+
+
+def test_data_without_meshes_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no \.ply"):
+        scenes.arrangement(0, seed=0, data=tmp_path)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
+def test_meshes_and_captures_of_a_data_folder_are_used(mitsuba):
+    sample = make_sample(4, 4, 4, size=(24, 32), data=SHARED, spp=4)
+    assert np.isfinite(sample.photo.linear).all() and (sample.truth.depth > 0).mean() > 0.5
+    assert max(len(i.solid.vertices) for i in scenes.arrangement(4, seed=0, data=SHARED)) > 1000
