@@ -100,7 +100,7 @@ def invert(
 
 
 def render_scene(
-    scene: Scene, *, spp: int = 64, denoise: bool = False, max_depth: int = 6, seed: int = 0, device: str = "auto"
+    scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto"
 ) -> Array:
     """Path-trace a scene from the photo's camera: [H, W, 3] float32 linear. Denoising is for pictures only."""
     from materialist.render.scene import RenderScene
@@ -110,7 +110,7 @@ def render_scene(
     renderer = RenderScene(scene.geometry, scene.camera, device=device)
     renderer.set_materials(scene.materials)
     renderer.set_envmap(scene.envmap)
-    image = renderer.render(spp=spp, seed=seed, max_depth=max_depth)
+    image = renderer.render(spp=spp, seed=seed)
     if denoise:
         from materialist.render.denoise import denoise as clean
 

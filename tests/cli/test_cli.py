@@ -42,7 +42,7 @@ def test_invert_passes_every_option_on_and_writes_the_scene(run, photo, tmp_path
     Image.fromarray(np.pad(np.full((8, 8), 255, np.uint8), ((8, 16), (10, 30)))).save(mask)
     place = tmp_path / "a.scene"
     options = "--predictor maps:x --engine path --preset paper --fov 50 --size 24 --envmap-size 64x32 --completion none"
-    more = f"--tau 8 --mask {mask} --strategy materials-first --seed 7 --device cpu"
+    more = f"--tau 8 --mask {mask} --strategy white-light-first --seed 7 --device cpu"
     code, out, err = run("invert", photo, "-o", place, *options.split(), *more.split())
     assert code == 0, err
     (call,) = calls
@@ -56,7 +56,7 @@ def test_invert_passes_every_option_on_and_writes_the_scene(run, photo, tmp_path
         "envmap_size": (64, 32),
         "completion": "none",
         "tau": 8.0,
-        "strategy": "materials-first",
+        "strategy": "white-light-first",
         "seed": 7,
         "device": "cpu",
     }

@@ -45,7 +45,7 @@ class Strategy(StrEnum):
 
     default = "default"
     white_light_first = "white-light-first"
-    materials_first = "materials-first"
+
 
 
 Seed = Annotated[int, typer.Option(help="Random seed: the same seed on the same machine gives the same result.")]

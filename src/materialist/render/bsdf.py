@@ -18,10 +18,13 @@ from materialist.transport.sampling import (
 PLUGIN = "materialist_disney"
 
 
-def ggx(cos_h, alpha):
-    """GGX normal distribution D(h) for the cosine of h to the normal."""
+def ggx(h, alpha):
+    """GGX normal distribution D(h) of a local unit vector h.
+
+    The squared sine comes from h.x and h.y: 1 - h.z^2 would lose all its digits where alpha is small.
+    """
     a2 = alpha * alpha
-    d = cos_h * cos_h * (a2 - 1) + 1
+    d = h.x * h.x + h.y * h.y + a2 * h.z * h.z
     return a2 / (dr.pi * d * d)
 
 
@@ -34,9 +37,9 @@ def _define():
 
         def __init__(self, props: mi.Properties):
             mi.BSDF.__init__(self, props)
-            self.base_color = props["base_color"]
-            self.roughness = props["roughness"]
-            self.metallic = props["metallic"]
+            self.base_color = props.get_texture("base_color")
+            self.roughness = props.get_texture("roughness")
+            self.metallic = props.get_texture("metallic")
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             self.m_components = [
                 mi.BSDFFlags.DiffuseReflection | sides,
@@ -70,13 +73,13 @@ def _define():
             diffuse = albedo * (1 - metallic) * dr.inv_pi * (c0 + roughness * (c1 + roughness * c2)) * wo.z
             base = DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
             fresnel = base + (1 - base) * schlick(cos_d)
-            shape = ggx(h.z, alpha) * smith_g1(wi.z, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
+            shape = ggx(h, alpha) * smith_g1(wi.z, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
             return diffuse + fresnel * shape
 
         def _pdf(self, wi, wo, share, roughness):
             alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
             h = dr.normalize(wi + wo)
-            specular = ggx(h.z, alpha) * smith_g1(wi.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
+            specular = ggx(h, alpha) * smith_g1(wi.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
             return share * specular + (1 - share) * wo.z * dr.inv_pi
 
         def sample(self, ctx, si, sample1, sample2, active=True):

@@ -8,6 +8,11 @@ from materialist.errors import InputError
 from materialist.render.variant import setup
 from materialist.types import Array, Camera, Geometry, Materials, Mesh
 
+MAX_DEPTH = 4
+"""Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
+_WAVEFRONT = 2**24
+"""Camera paths traced at a time: bounds the memory."""
+
 
 class RenderScene:
     """Path tracing of one geometry from one camera.
@@ -27,15 +32,16 @@ class RenderScene:
         height, width = camera.height, camera.width
         description = {
             "type": "scene",
+            "embree_use_robust_intersections": True,
             "sensor": _sensor(mi, camera),
             "light": {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": _half_turn(mi)},
             "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
         for k in self.planes:
-            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _constant_bsdf(mi))
+            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 1, 1))
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
-        self.params.keep([k for k in self.params.keys() if _exchanged(k)])
+        self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
 
     def set_materials(self, materials: Materials) -> None:
         """Take other maps; their size must be the camera's."""
@@ -55,7 +61,7 @@ class RenderScene:
         self.params["light.data"] = self.mi.TensorXf(_padded(np.asarray(envmap, np.float32), np))
         self.params.update()
 
-    def render(self, *, spp: int, seed: int = 0, max_depth: int = 6, hide_emitters: bool = False) -> Array:
+    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
         """[H, W, 3] float32 linear radiance with `spp` samples per pixel; `max_depth=2` is direct light alone."""
         mi = self.mi
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
@@ -69,7 +75,7 @@ class RenderScene:
             done, k = done + now, k + 1
         return (total / spp).astype(np.float32)
 
-    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = 4):
+    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
         """Differentiable rendering by path replay backpropagation; torch tensors in and out.
 
         Args:
@@ -96,23 +102,22 @@ class RenderScene:
         return run(albedo, roughness[..., None], metallic[..., None], _padded(envmap, torch))
 
     def _assign(self, albedo, roughness, metallic) -> None:
-        import drjit as dr
-
         p = self.params
         p["surface.bsdf.base_color.data"] = albedo
         p["surface.bsdf.roughness.data"] = roughness
         p["surface.bsdf.metallic.data"] = metallic
-        mi = self.mi
         for k, members in self._members.items():
-            index = mi.UInt32(members.astype(np.uint32))
-            mean = lambda t, i: dr.mean(dr.gather(mi.Float, t.array, i))  # noqa: E731
-            p[f"plane{k}.bsdf.base_color.value"] = mi.Color3f(*[mean(albedo, index * 3 + c) for c in range(3)])
-            p[f"plane{k}.bsdf.roughness.value"] = mean(roughness, index)
-            p[f"plane{k}.bsdf.metallic.value"] = mean(metallic, index)
+            for name, maps in (("base_color", albedo), ("roughness", roughness), ("metallic", metallic)):
+                p[f"plane{k}.bsdf.{name}.data"] = self._mean(maps, members)
 
+    def _mean(self, maps, members: Array):
+        """[1, 1, C] mean of a tensor [H, W, C] over the pixels `members`; differentiable."""
+        import drjit as dr
 
-_WAVEFRONT = 2**22
-"""Camera paths traced at a time."""
+        channels = maps.shape[2]
+        index = self.mi.UInt32(members.astype(np.uint32)) * channels
+        means = [dr.mean(dr.gather(self.mi.Float, maps.array, index + c)) for c in range(channels)]
+        return self.mi.TensorXf(dr.ravel(self.mi.Color3f(means) if channels == 3 else means[0]), (1, 1, channels))
 
 
 def part(mesh: Mesh, plane: int) -> Mesh:
@@ -127,7 +132,7 @@ def part(mesh: Mesh, plane: int) -> Mesh:
 
 
 def _exchanged(name: str) -> bool:
-    return name == "light.data" or (".bsdf." in name and name.endswith((".data", ".value")))
+    return name == "light.data" or (".bsdf." in name and name.endswith(".data"))
 
 
 def _sensor(mi, camera: Camera) -> dict:
@@ -139,7 +144,7 @@ def _sensor(mi, camera: Camera) -> dict:
             "type": "hdrfilm", "width": camera.width, "height": camera.height, "rfilter": {"type": "box"},
             "pixel_format": "rgb", "component_format": "float32",
         },
-        "sampler": {"type": "independent"},
+        "sampler": {"type": "multijitter"},
     }  # fmt: skip
 
 
@@ -170,14 +175,6 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     return {
         "type": "materialist_disney",
         "base_color": texture(3, 0.5), "roughness": texture(1, 0.5), "metallic": texture(1, 0.0),
-    }  # fmt: skip
-
-
-def _constant_bsdf(mi) -> dict:
-    return {
-        "type": "materialist_disney",
-        "base_color": {"type": "rgb", "value": [0.5, 0.5, 0.5]},
-        "roughness": {"type": "uniform", "value": 0.5}, "metallic": {"type": "uniform", "value": 0.0},
     }  # fmt: skip
 
 
