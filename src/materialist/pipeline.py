@@ -81,7 +81,9 @@ def invert(
         "geometry",
         lambda: build_geometry(prior.depth, prior.normal, picture.camera, tau=tau, completion=completion, seed=seed),
     )
-    fit, judge = _problem(picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages)
+    fit, judge = _problem(
+        picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages
+    )
     state = fit.run()
     materials = fit.materials(state)
     tick("rerender", 0, 1)
@@ -99,9 +101,7 @@ def invert(
     )  # fmt: skip
 
 
-def render_scene(
-    scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto"
-) -> Array:
+def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
     """Path-trace a scene from the photo's camera: [H, W, 3] float32 linear. Denoising is for pictures only."""
     from materialist.render.scene import RenderScene
 
@@ -118,7 +118,9 @@ def render_scene(
     return image
 
 
-def _problem(picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages):
+def _problem(
+    picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages
+):
     """The inverse problem, with its engine and its judge."""
     from materialist.fit.engine import PathEngine, TransportEngine
     from materialist.fit.inverse import Fit
@@ -151,7 +153,9 @@ def _problem(picture, prior, geometry, engine, preset, envmap_size, mask, strate
     return fit, judge
 
 
-def _report(picture: Photo, prior: Prediction, materials: Materials, rerender: Array, stages, start: float) -> FitReport:
+def _report(
+    picture: Photo, prior: Prediction, materials: Materials, rerender: Array, stages, start: float
+) -> FitReport:
     surface = prior.depth > 0
     distance = {
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
@@ -211,7 +215,9 @@ def _check(engine: str, strategy: str, envmap_size: tuple[int, int], seed: int) 
         raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
     width, height = envmap_size
     if width != 2 * height or not 8 <= height <= 4096:
-        raise InputError(f"Envmap size is {width}x{height}; the width must be twice the height, and the height 8 to 4096.")
+        raise InputError(
+            f"Envmap size is {width}x{height}; the width must be twice the height, and the height 8 to 4096."
+        )
     if seed < 0:
         raise InputError(f"Seed is {seed}; give 0 or more.")
 
@@ -220,7 +226,9 @@ def _check_mask(mask: Array | None, picture: Photo) -> None:
     if mask is None:
         return
     if mask.shape != picture.linear.shape[:2]:
-        raise InputError(f"Mask is {mask.shape}, the photo at working size is {picture.linear.shape[:2]} (rows, columns).")
+        raise InputError(
+            f"Mask is {mask.shape}, the photo at working size is {picture.linear.shape[:2]} (rows, columns)."
+        )
     if not mask.any():
         raise InputError("The mask is empty; mark at least one pixel.")
 

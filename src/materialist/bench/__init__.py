@@ -1,0 +1,32 @@
+"""Benchmarks: each measures the project with numbers that a reader can repeat, and writes a report folder."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import InputError
+
+BENCHMARKS = ("light",)
+
+
+def run(name: str, *, output: str | Path, data: str | Path | None = None, force: bool = False, **options: Any) -> Path:
+    """Run benchmark `name` and write report.json, report.md and plot.png into the folder `output`.
+
+    `options` are those of the benchmark's own `run` (materialist.bench.NAME). Returns the folder. Raises InputError
+    for an unknown name or option, OutputError when `output` holds something and `force` is not given.
+    """
+    from materialist.bench.report import claim
+
+    if name not in BENCHMARKS:
+        raise InputError(f"There is no benchmark '{name}'; choose one of {', '.join(BENCHMARKS)}.")
+    benchmark = import_module(f"materialist.bench.{name}").run
+    known = [p for p in inspect.signature(benchmark).parameters if p not in ("data", "output")]
+    for option in options:
+        if option not in known:
+            raise InputError(f"Benchmark '{name}' has no option '{option}'; it takes {', '.join(known)}.")
+    folder = claim(Path(output), force=force)
+    benchmark(data=None if data is None else Path(data), output=folder, **options)
+    return folder

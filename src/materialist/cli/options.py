@@ -47,7 +47,6 @@ class Strategy(StrEnum):
     white_light_first = "white-light-first"
 
 
-
 Seed = Annotated[int, typer.Option(help="Random seed: the same seed on the same machine gives the same result.")]
 DeviceOption = Annotated[Device, typer.Option(help="Where to compute; auto takes the GPU when there is one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]

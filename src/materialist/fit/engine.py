@@ -128,7 +128,17 @@ class PathEngine:
 
     name = "path"
 
-    def __init__(self, scene, camera: Camera, pixels: Array, *, spp: int = 64, max_depth: int = 4, envmap_height: int = 256, seed: int = 0):
+    def __init__(
+        self,
+        scene,
+        camera: Camera,
+        pixels: Array,
+        *,
+        spp: int = 64,
+        max_depth: int = 4,
+        envmap_height: int = 256,
+        seed: int = 0,
+    ):
         self.scene, self.camera, self.spp, self.max_depth = scene, camera, spp, max_depth
         self.pixels = torch.from_numpy(pixels.astype(np.int64))
         self.envmap_height, self.seed, self._step = envmap_height, seed, 0
@@ -140,7 +150,10 @@ class PathEngine:
         )
 
     def light_problem(self, materials: Materials) -> LightProblem:
-        maps = [torch.from_numpy(np.ascontiguousarray(m)) for m in (materials.albedo, materials.roughness, materials.metallic)]
+        maps = [
+            torch.from_numpy(np.ascontiguousarray(m))
+            for m in (materials.albedo, materials.roughness, materials.metallic)
+        ]
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
 
@@ -150,7 +163,9 @@ class PathEngine:
 
         def render(maps: torch.Tensor) -> torch.Tensor:
             full = torch.zeros(h * w, 5).index_copy(0, self.pixels, maps).view(h, w, 5)
-            image = self._render(full[..., :3].contiguous(), full[..., 3].contiguous(), full[..., 4].contiguous(), light)
+            image = self._render(
+                full[..., :3].contiguous(), full[..., 3].contiguous(), full[..., 4].contiguous(), light
+            )
             return image.reshape(-1, 3)[self.pixels]
 
         return render

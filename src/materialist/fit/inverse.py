@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 
-from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.fields import EnvmapTexels
@@ -76,9 +75,7 @@ class Fit:
             with torch.no_grad():
                 light.log.copy_(state_log(state.envmap, settings.height))
         steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
-        result = fit_light(
-            problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress
-        )
+        result = fit_light(problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress)
         state.stages.append(result.summary())
         state.envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
         state.envmap = paste_visible_sky(state.envmap, self.photo.linear, self._surface(), self.photo.camera)
@@ -97,7 +94,9 @@ class Fit:
         held = remapped(prior) if settings.remap else prior
         start = held if not state.stages or settings.field != "maps" else state.maps
         inside = None if self.mask is None else torch.from_numpy(self.mask.reshape(-1)[self.engine.pixels.numpy()])
-        pairs = neighbours(self.engine.pixels.numpy(), linear_to_srgb(self.photo.linear)) if any(settings.smooth) else None
+        pairs = (
+            neighbours(self.engine.pixels.numpy(), linear_to_srgb(self.photo.linear)) if any(settings.smooth) else None
+        )
         photo = self._photo()[self.engine.pixels]
         model = material_field(
             start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
@@ -133,9 +132,7 @@ class Fit:
         start._materials(state, stages=(MaterialStage(("roughness", "metallic"), schedule),))
         refined = replace(start, prior=self._as_materials(state.maps))
         refined._light(state)
-        refined._materials(
-            state, stages=(MaterialStage(("albedo",), schedule),), corrections=self.settings.corrections
-        )
+        refined._materials(state, stages=(MaterialStage(("albedo",), schedule),), corrections=self.settings.corrections)
         return state
 
     # -- conversions ---------------------------------------------------------------------------------------------------

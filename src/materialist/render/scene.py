@@ -34,7 +34,11 @@ class RenderScene:
             "type": "scene",
             "embree_use_robust_intersections": True,
             "sensor": _sensor(mi, camera),
-            "light": {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": _half_turn(mi)},
+            "light": {
+                "type": "envmap",
+                "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
+                "to_world": _half_turn(mi),
+            },
             "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
         for k in self.planes:
