@@ -42,7 +42,7 @@ class RenderScene:
             "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
         for k in self.planes:
-            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 1, 1))
+            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
@@ -115,13 +115,14 @@ class RenderScene:
                 p[f"plane{k}.bsdf.{name}.data"] = self._mean(maps, members)
 
     def _mean(self, maps, members: Array):
-        """[1, 1, C] mean of a tensor [H, W, C] over the pixels `members`; differentiable."""
+        """[2, 2, C] of the mean of a tensor [H, W, C] over the pixels `members`; differentiable."""
         import drjit as dr
 
         channels = maps.shape[2]
         index = self.mi.UInt32(members.astype(np.uint32)) * channels
         means = [dr.mean(dr.gather(self.mi.Float, maps.array, index + c)) for c in range(channels)]
-        return self.mi.TensorXf(dr.ravel(self.mi.Color3f(means) if channels == 3 else means[0]), (1, 1, channels))
+        # Mitsuba takes no texture below 2 x 2.
+        return self.mi.TensorXf(dr.concat(means * 4), (2, 2, channels))
 
 
 def part(mesh: Mesh, plane: int) -> Mesh:
