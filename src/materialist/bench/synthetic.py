@@ -97,6 +97,7 @@ class TrueScene:
         shapes = {f"item{k:02d}": _mesh(item, k) for k, item in enumerate(items)}
         self._scene = mi.load_dict({"type": "scene", "sensor": _sensor(self.camera), "light": _emitter(), **shapes})
         self._params = mi.traverse(self._scene)
+        self._params.keep(["light.data"])
         self._item_of_shape = _registry(list(shapes.values()))
         self.truth = self._true_maps()
 
@@ -202,7 +203,7 @@ def _mesh(item: scenes.Item, number: int) -> Any:
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat"}
 
     maps = {"base_color": texture(item.albedo)}
-    maps |= {name: texture(np.full((1, 1, 1), getattr(item, name))) for name in ("roughness", "metallic")}
+    maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
     props = mi.Properties()
     props["bsdf"] = mi.load_dict({"type": "materialist_disney", **maps})
     solid = item.solid
