@@ -9,21 +9,26 @@ import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from glob import glob
-from pathlib import Path
 
 from materialist.errors import InputError, SetupError
 
-MINIMUM_LLVM = 16
-"""Dr.Jit aborts the process with LLVM 14 and 15."""
+MINIMUM_LLVM = 17
+"""Dr.Jit refuses LLVM 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
+
+PREFERRED_LLVM = 19
+"""The version this package is tested with: later ones are used only where no version up to this one is found."""
 
 _PATTERNS = (
     "/usr/lib/*-linux-gnu/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
     "/usr/lib64/libLLVM*.so*",
+    "/usr/lib64/llvm*/lib*/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
+    "/usr/lib/llvm/*/lib*/libLLVM*.so*",
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-    str(Path(sys.prefix) / "lib" / "libLLVM*"),
+    "/home/linuxbrew/.linuxbrew/opt/llvm*/lib/libLLVM*.so*",
+    "C:/Program Files/LLVM/bin/LLVM-C.dll",
 )
 
 
@@ -37,72 +42,114 @@ class LLVM:
 
 
 def find_llvm() -> LLVM:
-    """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the newest of the usual places.
+    """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the best of the usual places.
+
+    The best is the newest up to `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded into this process.
 
     Raises:
-        SetupError: none of version 16 or later is found; the message names the package to install.
+        SetupError: none of version 17 or later is found; the message names the package to install.
     """
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
     if chosen:
-        version = llvm_version(chosen)
-        if version is None:
-            raise SetupError(f"DRJIT_LIBLLVM_PATH is {chosen}, which is no LLVM library; unset it, or {_remedy()}")
-        if version < MINIMUM_LLVM:
-            raise SetupError(
-                f"DRJIT_LIBLLVM_PATH is LLVM {version}, and {MINIMUM_LLVM} or later is needed; unset it, or {_remedy()}"
-            )
-        return LLVM(chosen, version)
-    found = []
-    for path in {os.path.realpath(p) for pattern in _PATTERNS for p in glob(pattern)}:
-        version = llvm_version(path)
-        if version is not None:
-            found.append(LLVM(path, version))
+        return _named(chosen)
+    versions = {path: llvm_version(path) for path in {os.path.realpath(p) for p in _candidates()}}
+    found = [LLVM(path, version) for path, version in versions.items() if version is not None]
     usable = [f for f in found if f.version >= MINIMUM_LLVM]
     if usable:
-        return max(usable, key=lambda f: (f.version, f.path))
-    seen = ", ".join(sorted({str(f.version) for f in found}, key=int))
+        return min(usable, key=lambda f: (f.version > PREFERRED_LLVM, abs(f.version - PREFERRED_LLVM), f.path))
+    seen = ", ".join(map(str, sorted({f.version for f in found})))
     raise SetupError(f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}")
+
+
+def _named(path: str) -> LLVM:
+    """The library that the user chose, asked for its version whatever its name says."""
+    version = _ask(path)
+    by_name = llvm_version(path)
+    if version is None and by_name is not None and by_name < MINIMUM_LLVM:
+        version = by_name
+    if version is None:
+        raise SetupError(f"DRJIT_LIBLLVM_PATH is {path}, which is no LLVM library; unset it, or {_remedy()}")
+    if version < MINIMUM_LLVM:
+        raise SetupError(
+            f"DRJIT_LIBLLVM_PATH is LLVM {version}, and {MINIMUM_LLVM} or later is needed; unset it, or {_remedy()}"
+        )
+    return LLVM(path, version)
+
+
+def _candidates() -> list[str]:
+    """Paths that may be LLVM libraries: what the dynamic linker knows, the usual folders, this Python's environment."""
+    prefixes = {sys.prefix, os.environ.get("CONDA_PREFIX", sys.prefix)}
+    own = [f"{prefix}/lib/libLLVM*{end}" for prefix in prefixes for end in (".so*", ".dylib")]
+    return [path for pattern in (*_PATTERNS, *own) for path in glob(pattern)] + _linker_cache()
+
+
+def _linker_cache() -> list[str]:
+    try:
+        listing = subprocess.run(["ldconfig", "-p"], capture_output=True, text=True, timeout=10).stdout
+    except (OSError, subprocess.TimeoutExpired):
+        return []
+    return re.findall(r"^\s*libLLVM\S*\.so\S* .*=> (\S+)$", listing, re.MULTILINE)
 
 
 def _remedy() -> str:
     if sys.platform == "darwin":
-        return "install it with: brew install llvm"
+        return "install one with: brew install llvm@19"
     if sys.platform == "win32":
-        return "install it from https://github.com/llvm/llvm-project/releases"
-    return "install it with: sudo apt install libllvm19 (Fedora: sudo dnf install llvm-libs)"
+        return "install one from https://github.com/llvm/llvm-project/releases"
+    return "install one with: sudo apt install libllvm19 (Fedora: sudo dnf install llvm-libs)"
 
 
-@lru_cache(maxsize=64)
 def llvm_version(path: str) -> int | None:
     """Major version of an LLVM library by its file name, else by asking it in a process of its own; None if neither."""
     if not os.path.exists(path):
         return None
     for name in (os.path.basename(path), os.path.basename(os.path.realpath(path))):
-        match = re.search(r"LLVM[-.](?:so\.)?(\d+)", name)
+        match = re.fullmatch(r"libLLVM(?:-|\.so\.|\.)(\d+)\b.*", name)
         if match:
             return int(match.group(1))
-    probe = (
-        "import ctypes,sys; l=ctypes.CDLL(sys.argv[1]); v=[ctypes.c_uint() for _ in range(3)];"
-        "l.LLVMGetVersion(*map(ctypes.byref,v)); sys.stdout.write(str(v[0].value))"
-    )
-    result = subprocess.run([sys.executable, "-c", probe, path], capture_output=True, text=True, timeout=30)
+    return _ask(path)
+
+
+_QUESTION = (
+    "import ctypes, sys; l = ctypes.CDLL(sys.argv[1]); v = [ctypes.c_uint() for _ in range(3)];"
+    "l.LLVMGetVersion(*map(ctypes.byref, v)); sys.stdout.write(str(v[0].value))"
+)
+
+
+@lru_cache(maxsize=64)
+def _ask(path: str) -> int | None:
+    """Major version that a library reports to another process (LLVM 16 and later can), else None."""
+    try:
+        command = [sys.executable, "-I", "-S", "-c", _QUESTION, path]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
     return int(result.stdout) if result.returncode == 0 and result.stdout.isdigit() else None
 
 
 def cuda_usable() -> bool:
-    """Whether an NVIDIA driver is present (asked of the driver library, without starting Mitsuba)."""
+    """Whether an NVIDIA driver answers and has OptiX, which traces Mitsuba's rays; Mitsuba itself is not started."""
     import ctypes
 
+    windows = sys.platform == "win32"
     try:
-        driver = ctypes.CDLL("libcuda.so.1" if sys.platform != "win32" else "nvcuda.dll")
-        count = ctypes.c_int()
-        return driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
+        driver = ctypes.CDLL("nvcuda.dll" if windows else "libcuda.so.1")
+        if not windows:
+            ctypes.CDLL(os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1"))
     except OSError:
         return False
+    count = ctypes.c_int()
+    return driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
+
+
+_VARIANTS = {"cpu": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 
 
 def setup(device: str = "auto"):
-    """Choose the variant (`llvm_ad_rgb` or `cuda_ad_rgb`) and return the `mitsuba` module.
+    """Choose the variant (`llvm_ad_rgb` or `cuda_ad_rgb`) and return the `mitsuba` module, with our BSDF registered.
+
+    The first call decides for the whole process; later calls with the same device, or `auto`, return at once. The CPU
+    variant runs on the processors this process may use, or on OMP_NUM_THREADS of them, as torch does.
 
     Args:
         device: `auto` (CUDA where a driver answers), `cpu` or `cuda`.
@@ -116,18 +163,41 @@ def setup(device: str = "auto"):
 
     current = mi.variant()
     if device == "auto":
-        device = {"llvm_ad_rgb": "cpu", "cuda_ad_rgb": "cuda"}.get(current) or ("cuda" if cuda_usable() else "cpu")
-    wanted = "cuda_ad_rgb" if device == "cuda" else "llvm_ad_rgb"
-    if current == wanted:
-        return mi
-    if current in ("llvm_ad_rgb", "cuda_ad_rgb"):
-        raise SetupError(f"This process already renders with {current}; start a new one for --device {device}.")
+        running = {variant: name for name, variant in _VARIANTS.items()}.get(current)
+        device = running or ("cuda" if cuda_usable() else "cpu")
+    wanted = _VARIANTS[device]
+    if current != wanted:
+        if current in _VARIANTS.values():
+            raise SetupError(f"This process already renders with {current}; start a new one for --device {device}.")
+        _start(mi, device)
+    _register_bsdf(wanted)
+    return mi
+
+
+def _start(mi, device: str) -> None:
     if device == "cuda" and not cuda_usable():
-        raise SetupError("No CUDA driver answers; use --device cpu, or install the NVIDIA driver.")
+        raise SetupError("No CUDA driver with OptiX answers; use --device cpu, or install the NVIDIA driver.")
     if device == "cpu":
         os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm().path
-    mi.set_variant(wanted)
+    try:
+        mi.set_variant(_VARIANTS[device])
+    except ImportError as error:
+        raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}); {_remedy()}") from error
+    if device == "cpu":
+        _limit_threads()
+
+
+def _limit_threads() -> None:
+    import drjit as dr
+
+    asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
+    if asked.isdigit() and 0 < int(asked) < dr.thread_count():
+        dr.set_thread_count(int(asked))
+
+
+@lru_cache(maxsize=2)
+def _register_bsdf(variant: str) -> None:
+    """Once for each variant: Mitsuba keeps plugins by variant."""
     from materialist.render import bsdf
 
     bsdf.register()
-    return mi
