@@ -13,7 +13,7 @@ from glob import glob
 from materialist.errors import InputError, SetupError
 
 MINIMUM_LLVM = 17
-"""Dr.Jit refuses LLVM 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
+"""Dr.Jit refuses 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
 
 PREFERRED_LLVM = 19
 """The version this package is tested with: later ones are used only where no version up to this one is found."""
@@ -159,6 +159,7 @@ def setup(device: str = "auto"):
     """
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")
+    _point_to_llvm(device)
     import mitsuba as mi
 
     current = mi.variant()
@@ -174,15 +175,33 @@ def setup(device: str = "auto"):
     return mi
 
 
+def _point_to_llvm(device: str) -> None:
+    """Dr.Jit loads LLVM when it is first imported, whatever device is used later: choose before that."""
+    if "drjit" in sys.modules:
+        return
+    try:
+        os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm().path
+    except SetupError:
+        if device == "cpu" or not cuda_usable():
+            raise
+
+
 def _start(mi, device: str) -> None:
+    import drjit as dr
+
     if device == "cuda" and not cuda_usable():
         raise SetupError("No CUDA driver with OptiX answers; use --device cpu, or install the NVIDIA driver.")
     if device == "cpu":
-        os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm().path
+        loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0
+        if loaded < MINIMUM_LLVM:
+            raise SetupError(
+                f"Dr.Jit was imported before materialist could choose its LLVM, and found {loaded or 'none'}; "
+                f"set DRJIT_LIBLLVM_PATH to LLVM {MINIMUM_LLVM} or later, or {_remedy()}"
+            )
     try:
         mi.set_variant(_VARIANTS[device])
     except ImportError as error:
-        raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}); {_remedy()}") from error
+        raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}).") from error
     if device == "cpu":
         _limit_threads()
 
