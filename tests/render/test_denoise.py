@@ -1,0 +1,64 @@
+"""Denoising: noise goes, edges of the guides and the level of the light stay."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from materialist.errors import InputError, SetupError
+from materialist.render.denoise import denoise
+
+
+def noisy_step(sigma=0.3):
+    """A picture of two flat halves with HDR values, its noisy version, and guides [48, 64, 3] that know the edge."""
+    albedo = np.full((48, 64, 3), 0.2, np.float32)
+    albedo[:, 30:] = 0.8
+    clean = albedo * np.float32([4.0, 3.0, 2.0])
+    noise = np.random.default_rng(0).gamma(1 / sigma**2, sigma**2, clean.shape)  # mean 1
+    normal = np.zeros_like(albedo)
+    normal[..., 2] = 1
+    return clean, (clean * noise).astype(np.float32), albedo, normal
+
+
+def rms(difference):
+    return float(np.sqrt((difference**2).mean()))
+
+
+def test_noise_goes_and_the_edge_stays():
+    pytest.importorskip("pyoidn")
+    clean, noisy, albedo, normal = noisy_step()
+    result = denoise(noisy, albedo=albedo, normal=normal)
+    assert result.dtype == np.float32 and result.shape == noisy.shape and (result >= 0).all()
+    assert rms(result - clean) < 0.15 * rms(noisy - clean)
+    assert abs(result.mean() / clean.mean() - 1) < 0.02
+    step = result[:, 30].mean() - result[:, 29].mean()
+    assert step > 0.9 * (clean[0, 30] - clean[0, 29]).mean()
+    assert np.array_equal(result, denoise(noisy, albedo=albedo, normal=normal))
+
+
+def test_inputs_stay_as_they_are_and_may_be_views():
+    pytest.importorskip("pyoidn")
+    _, noisy, albedo, normal = noisy_step()
+    before = noisy.copy()
+    flipped = denoise(noisy[:, ::-1], albedo=albedo[:, ::-1].astype(np.float64), normal=normal[:, ::-1])
+    assert np.array_equal(noisy, before)
+    assert np.isfinite(flipped).all() and flipped[:, :30].mean() > flipped[:, 36:].mean()
+
+
+def test_one_pixel():
+    pytest.importorskip("pyoidn")
+    one = np.full((1, 1, 3), 0.5, np.float32)
+    assert denoise(one, albedo=one, normal=one) == pytest.approx(0.5, abs=0.05)
+
+
+def test_guides_of_another_size():
+    image = np.ones((4, 6, 3), np.float32)
+    with pytest.raises(InputError, match=r"albedo guide is \(6, 4, 3\), the image is \(4, 6, 3\)"):
+        denoise(image, albedo=np.ones((6, 4, 3), np.float32), normal=image)
+
+
+def test_missing_package_names_the_command(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    image = np.ones((4, 6, 3), np.float32)
+    with pytest.raises(SetupError, match="-m pip install pyoidn"):
+        denoise(image, albedo=image, normal=image)
