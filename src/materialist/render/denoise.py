@@ -22,7 +22,8 @@ def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
         [H, W, 3] float32 linear radiance, >= 0. Equal inputs give equal pictures on one machine.
 
     Raises:
-        InputError: the guides are not of the image's size. SetupError: the optional package pyoidn is missing or broken.
+        InputError: the guides are not of the image's size.
+        SetupError: the optional package pyoidn is missing or broken.
     """
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide.shape != image.shape:
@@ -34,12 +35,23 @@ def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
             f"Denoising needs the package pyoidn ({error}); install it with: {sys.executable} -m pip install pyoidn, "
             "or render with --no-denoise."
         ) from error
+    height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
     clean = pyoidn.denoise(
-        np.ascontiguousarray(image, np.float32),
-        np.clip(albedo, 0, 1).astype(np.float32),
-        np.clip(normal, -1, 1).astype(np.float32),
+        _at_least(image, _SMALLEST),
+        _at_least(np.clip(albedo, 0, 1), _SMALLEST),
+        _at_least(np.clip(normal, -1, 1), _SMALLEST),
         hdr=True,
         clean_aux=True,
     )
-    return np.maximum(clean, 0)
+    return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
+
+
+_SMALLEST = 32
+"""Pixels a side below which the filter invents light (a constant 1x1 picture comes out at a quarter of its value)."""
+
+
+def _at_least(image: Array, size: int) -> Array:
+    """float32 copy of [H, W, 3], its last row and column repeated until it has `size` of each."""
+    missing = [max(0, size - n) for n in image.shape[:2]]
+    return np.pad(np.asarray(image, np.float32), ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge")
