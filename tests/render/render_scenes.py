@@ -1,0 +1,59 @@
+"""Small scenes made by hand for the renderer's tests."""
+
+import numpy as np
+
+from materialist.types import Camera, Geometry, Materials, Mesh
+
+
+def wall(camera: Camera, depth: float = 2.0, holes=None) -> Geometry:
+    """A wall at planar `depth` that fills the picture: one quad a pixel, none where `holes` [H, W] is true."""
+    h, w = camera.height, camera.width
+    row, col = np.meshgrid(np.arange(h + 1), np.arange(w + 1), indexing="ij")
+    x, y = (col - w / 2) / camera.focal * depth, -(row - h / 2) / camera.focal * depth
+    vertices = np.stack([x, y, np.full_like(x, -depth)], -1).reshape(-1, 3)
+    uv = np.stack([col / w, row / h], -1).reshape(-1, 2)
+    corner = (row * (w + 1) + col)[:-1, :-1].reshape(-1)
+    pixels = np.arange(h * w) if holes is None else np.flatnonzero(~holes.reshape(-1))
+    a = corner[pixels]
+    faces = np.concatenate([np.stack([a, a + w + 1, a + 1], 1), np.stack([a + 1, a + w + 1, a + w + 2], 1)])
+    mesh = Mesh(
+        vertices.astype(np.float32), faces.astype(np.int32), np.tile(np.float32([0, 0, 1]), (len(vertices), 1)),
+        uv.astype(np.float32), np.tile(pixels, 2).astype(np.int32), np.full(len(faces), -1, np.int16),
+    )  # fmt: skip
+    return Geometry(mesh, np.full((h, w), -1, np.int8))
+
+
+def empty(camera: Camera) -> Geometry:
+    """One triangle behind the camera: every ray sees the sky."""
+    vertices = np.float32([[0, 0, 5], [1, 0, 5], [0, 1, 5]])
+    mesh = Mesh(
+        vertices, np.int32([[0, 1, 2]]), np.tile(np.float32([0, 0, -1]), (3, 1)), np.zeros((3, 2), np.float32),
+        np.int32([0]), np.int16([-1]),
+    )  # fmt: skip
+    return Geometry(mesh, np.full((camera.height, camera.width), -1, np.int8))
+
+
+def with_floor(geometry: Geometry, label, height: float = -1.5, size: float = 40.0) -> Geometry:
+    """`geometry` and, as plane 0, a floor at y = `height`; `label` [H, W] says which pixels give it its material."""
+    mesh, count = geometry.mesh, len(geometry.mesh.vertices)
+    floor = np.float32([[-size, height, size], [size, height, size], [size, height, -size], [-size, height, -size]])
+    faces = np.int32([[0, 1, 2], [0, 2, 3]]) + count
+    joined = Mesh(
+        np.concatenate([mesh.vertices, floor]),
+        np.concatenate([mesh.faces, faces]),
+        np.concatenate([mesh.normals, np.tile(np.float32([0, 1, 0]), (4, 1))]),
+        np.concatenate([mesh.uv, np.zeros((4, 2), np.float32)]),
+        np.concatenate([mesh.face_pixel, np.zeros(2, np.int32)]),
+        np.concatenate([mesh.face_plane, np.zeros(2, np.int16)]),
+    )
+    return Geometry(joined, np.asarray(label, np.int8))
+
+
+def uniform(camera: Camera, albedo=0.5, roughness: float = 1.0, metallic: float = 0.0) -> Materials:
+    """The same material everywhere."""
+    size = (camera.height, camera.width)
+    return Materials(
+        np.broadcast_to(np.float32(albedo), (*size, 3)).copy(),
+        np.full(size, roughness, np.float32),
+        np.full(size, metallic, np.float32),
+    )

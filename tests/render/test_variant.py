@@ -1,0 +1,98 @@
+"""LLVM is found and judged without being loaded, and one process keeps one variant."""
+
+import subprocess
+import sys
+
+import pytest
+
+from materialist.errors import InputError, SetupError
+from materialist.render import variant
+from materialist.render.variant import LLVM, MINIMUM_LLVM, find_llvm, llvm_version, setup
+
+
+@pytest.fixture
+def libraries(tmp_path, monkeypatch):
+    """Make empty files of these names the only libraries of the machine."""
+    monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+
+    def make(*names):
+        for name in names:
+            (tmp_path / name).write_bytes(b"")
+        monkeypatch.setattr(variant, "_candidates", lambda: [str(tmp_path / name) for name in names])
+        return tmp_path
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [
+        ("libLLVM.so.19.1", 19),
+        ("libLLVM-17.so.1", 17),
+        ("libLLVM-14.0.6.so.1", 14),
+        ("libLLVM-18.dylib", 18),
+        ("libLLVM.20.dylib", 20),
+        ("libLLVM.so", None),
+    ],
+)
+def test_version_from_the_file_name(libraries, name, version):
+    assert llvm_version(str(libraries(name) / name)) == version
+
+
+def test_a_missing_library_has_no_version(tmp_path):
+    assert llvm_version(str(tmp_path / "libLLVM.so.19.1")) is None
+
+
+@pytest.mark.parametrize(
+    ("names", "best"),
+    [
+        (["libLLVM-14.so.1", "libLLVM-17.so.1", "libLLVM.so.19.1"], 19),
+        (["libLLVM-17.so.1", "libLLVM-18.so.1", "libLLVM.so.22.1"], 18),
+        (["libLLVM.so.21.1", "libLLVM.so.20.1", "libLLVM-15.so.1"], 20),
+    ],
+)
+def test_the_best_library_is_taken(libraries, names, best):
+    libraries(*names)
+    assert find_llvm().version == best
+
+
+def test_only_old_ones_name_the_package(libraries):
+    libraries("libLLVM-14.so.1", "libLLVM-15.so.1", "libLLVM-16.so.1")
+    with pytest.raises(SetupError, match=r"only 14, 15, 16.*libllvm19|llvm@19|releases"):
+        find_llvm()
+
+
+@pytest.mark.parametrize(("name", "says"), [("libLLVM-15.so.1", "LLVM 15"), ("libLLVM-19.so.1", "no LLVM library")])
+def test_a_wrong_choice_of_the_user_is_explained(libraries, monkeypatch, name, says):
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(libraries(name) / name))
+    with pytest.raises(SetupError, match=says):
+        find_llvm()
+
+
+def test_this_machine_has_one():
+    found = find_llvm()
+    assert isinstance(found, LLVM) and found.version >= MINIMUM_LLVM
+
+
+def test_a_wrong_library_never_aborts(libraries, tmp_path):
+    """The whole start in a process of its own, with a library that Dr.Jit could not use."""
+    name = libraries("libLLVM-15.so.1") / "libLLVM-15.so.1"
+    program = (
+        "import sys\nfrom materialist.errors import SetupError\nfrom materialist.render.variant import setup\n"
+        "try: setup('cpu')\nexcept SetupError as error: sys.exit('SetupError: ' + str(error))"
+    )
+    for start in ("", "import drjit\n"):
+        result = subprocess.run(
+            [sys.executable, "-c", start + program], env={"DRJIT_LIBLLVM_PATH": str(name), "PATH": "/usr/bin"},
+            capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+        assert result.returncode == 1 and "SetupError: " in result.stderr, result.stderr
+
+
+def test_setup_again_is_the_same_and_another_device_is_refused():
+    mi = setup("cpu")
+    assert setup("auto") is mi and setup("cpu") is mi and mi.variant() == "llvm_ad_rgb"
+    with pytest.raises(SetupError, match="llvm_ad_rgb"):
+        setup("cuda")
+    with pytest.raises(InputError, match="tpu"):
+        setup("tpu")
