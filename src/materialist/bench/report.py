@@ -1,0 +1,145 @@
+"""Reports of benchmarks: all rows as JSON, the means as a Markdown table, and one plot."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.errors import OutputError
+
+
+@dataclass(frozen=True)
+class Column:
+    """One figure of a benchmark."""
+
+    key: str
+    """Its name in the rows."""
+    title: str
+    better: str = ""
+    """'higher', 'lower', or '' where neither is."""
+    digits: int = 3
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a benchmark measured: one row a sample and method."""
+
+    title: str
+    note: str
+    """What was done and how to read the figures: the text above the table."""
+    settings: dict[str, Any]
+    columns: tuple[Column, ...]
+    rows: Sequence[dict[str, Any]]
+    """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
+    plotted: tuple[str, ...] = ()
+    """Keys of the columns in the plot."""
+
+
+def claim(folder: Path, *, force: bool = False) -> Path:
+    """Make the folder for a report; raises OutputError when it holds something, unless `force`."""
+    try:
+        if folder.is_dir() and any(folder.iterdir()) and not force:
+            raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from error
+    return folder
+
+
+def write(report: Report, folder: Path) -> None:
+    """Write report.json, report.md and plot.png; a report of the same run that is there already is replaced."""
+    try:
+        _replace(folder / "report.json", json.dumps(as_dict(report), indent=1, default=float).encode())
+        _replace(folder / "report.md", markdown(report).encode())
+        if report.plotted and report.rows:
+            _plot(report, folder / "plot.png")
+    except OSError as error:
+        raise OutputError(f"The report cannot be written to {folder}: {error.strerror or error}.") from error
+
+
+def as_dict(report: Report) -> dict[str, Any]:
+    """The content of report.json."""
+    return {
+        "title": report.title,
+        "settings": report.settings,
+        "machine": {"cores": os.cpu_count(), "processor": platform.machine(), "python": platform.python_version()},
+        "means": means(report),
+        "rows": [{k: _plain(v) for k, v in row.items()} for row in report.rows],
+    }
+
+
+def means(report: Report) -> dict[str, dict[str, float]]:
+    """Mean of every column by method, in the order the methods were first met; infinite figures are left out."""
+    result: dict[str, dict[str, float]] = {}
+    for method in dict.fromkeys(row["method"] for row in report.rows):
+        rows = [row for row in report.rows if row["method"] == method]
+        result[method] = {"samples": len(rows)}
+        for column in report.columns:
+            values = [row[column.key] for row in rows if np.isfinite(row.get(column.key, np.nan))]
+            if values:
+                result[method][column.key] = float(np.mean(values))
+    return result
+
+
+def markdown(report: Report) -> str:
+    """The content of report.md: the note and the table of means, the best figure of each column in bold."""
+    table = means(report)
+    arrow = {"higher": " ↑", "lower": " ↓", "": ""}
+    head = ["method", "samples", *(c.title + arrow[c.better] for c in report.columns)]
+    lines = [f"# {report.title}", "", report.note, "", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    best = {}
+    for c in report.columns:
+        values = [f[c.key] for f in table.values() if c.key in f]
+        if c.better and len(values) > 1:
+            best[c.key] = max(values) if c.better == "higher" else min(values)
+    for method, figures in table.items():
+        cells = [method, str(int(figures["samples"]))]
+        for c in report.columns:
+            text = f"{figures[c.key]:.{c.digits}f}" if c.key in figures else "–"
+            cells.append(f"**{text}**" if c.key in figures and figures[c.key] == best.get(c.key) else text)
+        lines.append("| " + " | ".join(cells) + " |")
+    settings = ", ".join(f"{k} {v}" for k, v in report.settings.items() if v is not None)
+    return "\n".join([*lines, "", f"Settings: {settings}.", ""])
+
+
+def _plot(report: Report, path: Path) -> None:
+    """One panel a plotted column: a dot for every sample, a bar for the mean of each method."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    table = means(report)
+    titles = {c.key: c.title for c in report.columns}
+    figure = Figure(figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = np.atleast_1d(figure.subplots(1, len(report.plotted), sharey=True))
+    for axis, key in zip(axes, report.plotted, strict=True):
+        for y, method in enumerate(table):
+            values = [r[key] for r in report.rows if r["method"] == method and np.isfinite(r.get(key, np.nan))]
+            axis.barh(y, table[method].get(key, 0), color="#9db8d9", height=0.6)
+            axis.plot(values, [y] * len(values), "o", color="#1f3b5c", markersize=3, alpha=0.6)
+        axis.set_title(titles[key], fontsize=9)
+        axis.set_yticks(range(len(table)), list(table))
+        axis.invert_yaxis()
+        axis.tick_params(labelsize=8)
+    figure.savefig(path, dpi=110)
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    temporary = path.with_suffix(path.suffix + ".part")
+    temporary.write_bytes(content)
+    temporary.replace(path)
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON holds: infinite and undefined figures become None."""
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value

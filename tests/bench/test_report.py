@@ -1,0 +1,69 @@
+"""Reports of benchmarks, and the dispatcher."""
+
+import json
+
+import pytest
+
+from materialist import bench
+from materialist.bench.report import Column, Report, claim, markdown, means, write
+from materialist.errors import InputError, OutputError
+
+REPORT = Report(
+    title="Trial",
+    note="What was done.",
+    settings={"size": 64, "data": None},
+    columns=(Column("psnr", "PSNR", "higher", 1), Column("seconds", "s", "lower", 0)),
+    rows=[
+        {"method": "fast", "sample": "a", "psnr": 20.0, "seconds": 1},
+        {"method": "fast", "sample": "b", "psnr": 30.0, "seconds": 3},
+        {"method": "slow", "sample": "a", "psnr": 26.0, "seconds": 50},
+        {"method": "slow", "sample": "b", "psnr": float("inf"), "seconds": 50},
+        {"method": "ceiling", "sample": "a", "psnr": 24.0},
+    ],
+    plotted=("psnr", "seconds"),
+)
+
+
+def test_means_are_by_method_and_leave_out_what_is_not_there():
+    assert means(REPORT) == {
+        "fast": {"samples": 2, "psnr": 25.0, "seconds": 2.0},
+        "slow": {"samples": 2, "psnr": 26.0, "seconds": 50.0},
+        "ceiling": {"samples": 1, "psnr": 24.0},
+    }
+
+
+def test_the_table_marks_the_best_figure_of_each_column():
+    text = markdown(REPORT)
+    assert "| method | samples | PSNR ↑ | s ↓ |" in text
+    assert "| fast | 2 | 25.0 | **2** |" in text
+    assert "| slow | 2 | **26.0** | 50 |" in text
+    assert "| ceiling | 1 | 24.0 | – |" in text
+    assert "What was done." in text and "size 64" in text and "None" not in text
+
+
+def test_a_report_is_three_files_of_valid_content(tmp_path):
+    write(REPORT, tmp_path)
+    content = json.loads((tmp_path / "report.json").read_text())
+    assert content["rows"][3]["psnr"] is None and content["means"]["fast"]["psnr"] == 25
+    assert (tmp_path / "report.md").read_text() == markdown(REPORT)
+    assert (tmp_path / "plot.png").read_bytes()[:4] == b"\x89PNG"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["plot.png", "report.json", "report.md"]
+
+
+def test_a_folder_with_something_in_it_is_kept(tmp_path):
+    assert claim(tmp_path / "new" / "deep").is_dir()
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(OutputError, match="--force"):
+        claim(tmp_path)
+    assert claim(tmp_path, force=True) == tmp_path
+    with pytest.raises(OutputError, match="cannot be made"):
+        claim(tmp_path / "file" / "below")
+
+
+def test_unknown_benchmarks_and_options_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no benchmark 'nonsense'"):
+        bench.run("nonsense", output=tmp_path)
+    with pytest.raises(InputError, match=r"no option 'colour'.*scenes"):
+        bench.run("light", output=tmp_path / "out", colour=3)
+    with pytest.raises(InputError, match=r"no method 'magic'.*paper path"):
+        bench.run("light", output=tmp_path / "out", methods="default,magic")
