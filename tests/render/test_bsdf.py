@@ -1,0 +1,151 @@
+"""`materialist_disney` against the paper's formulas in numpy, Mitsuba's chi-squared test, and finite differences."""
+
+import numpy as np
+import pytest
+from disney import ALBEDO, NORMAL, directions, evaluate, interaction, make, mi, pairs, tilted, vector
+
+from materialist.render import brdf, bsdf
+from materialist.transport import light, sampling
+
+GRID = [(r, m) for r in (0.04, 0.1, 0.2, 0.5, 1.0) for m in (0.0, 0.4, 1.0)]
+
+
+def test_constants_are_the_papers_in_every_copy():
+    assert [brdf.DIELECTRIC_R0, light.DIELECTRIC_R0] == pytest.approx([0.04, 0.04])
+    assert brdf.MIN_ALPHA == sampling.MIN_ALPHA
+
+
+@pytest.mark.parametrize(("roughness", "metallic"), GRID)
+def test_eval_is_the_papers_formula(roughness, metallic):
+    wi, wo = pairs(4000, 3, roughness)
+    expected = brdf.evaluate(np.array(ALBEDO), roughness, metallic, NORMAL, wi, wo) * wo[:, 2:]
+    for flip in ([1, 1, 1], [1, 1, -1]):  # both sides shade alike
+        value = evaluate(make(roughness=roughness, metallic=metallic), wi * flip, wo * flip)
+        assert np.abs(value - expected).max() < 2e-3 * np.maximum(expected, 1e-2).max()
+        assert np.median(np.abs(value / expected - 1)) < 1e-5
+    through = evaluate(make(roughness=roughness, metallic=metallic), wi, wo * [1, 1, -1])
+    assert (through == 0).all()
+
+
+@pytest.mark.parametrize(("roughness", "metallic"), [(0.02, 0.5), *GRID])
+def test_sample_and_eval_pdf_agree(roughness, metallic):
+    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
+    rng = np.random.default_rng(0)
+    wi = directions(4000, 5)
+    wi[::2, 2] *= -1
+    si = interaction(wi)
+    u1, u2 = mi.Float(rng.random(4000).astype(np.float32)), mi.Point2f(rng.random((2, 4000)).astype(np.float32))
+    sample, weight = surface.sample(ctx, si, u1, u2)
+    value, pdf = surface.eval_pdf(ctx, si, sample.wo)
+    assert np.array_equal(np.array(value), np.array(surface.eval(ctx, si, sample.wo)))
+    assert np.array_equal(np.array(pdf), np.array(surface.pdf(ctx, si, sample.wo)))
+    drawn = np.array(sample.pdf) > 0
+    assert drawn.mean() > 0.5
+    assert (np.array(sample.wo)[2][drawn] * wi[drawn, 2] > 0).all()
+    assert np.array(pdf)[drawn] == pytest.approx(np.array(sample.pdf)[drawn], rel=1e-3)
+    ratio = (np.array(value) / np.maximum(np.array(pdf), 1e-20))[:, drawn]
+    assert np.array(weight)[:, drawn] == pytest.approx(ratio, rel=1e-3, abs=1e-6)
+    assert (np.array(weight)[:, ~drawn] == 0).all()
+    assert np.isfinite(np.array(weight)).all() and np.array(weight).max() < 12
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("roughness", "metallic", "degrees"),
+    [(0.3, 0, 5), (0.3, 1, 40), (0.45, 0.5, 60), (0.6, 0, 80), (0.6, 1, 80), (1, 0, 0), (1, 0.5, 40), (1, 1, 80)],
+)
+def test_chi_squared(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
+    """Mitsuba's own test that directions are drawn with the density that `pdf` states."""
+    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
+
+    monkeypatch.chdir(tmp_path)  # the test leaves its histogram in the current folder when it fails
+    parameters = (
+        f'<rgb name="base_color" value="0.6, 0.4, 0.2"/><float name="roughness" value="{roughness}"/>'
+        f'<float name="metallic" value="{metallic}"/>'
+    )
+    draw, density = BSDFAdapter("materialist_disney", parameters, wi=tilted(degrees, side).tolist())
+    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
+    assert test.run(significance_level=0.001), capsys.readouterr().out
+
+
+def test_chi_squared_notices_a_wrong_density(capsys, tmp_path, monkeypatch):
+    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
+
+    monkeypatch.chdir(tmp_path)
+    xml = '<rgb name="base_color" value="0.5"/><float name="roughness" value="{}"/><float name="metallic" value="1"/>'
+    draw, _ = BSDFAdapter("materialist_disney", xml.format(0.6), wi=tilted(40).tolist())
+    _, density = BSDFAdapter("materialist_disney", xml.format(0.7), wi=tilted(40).tolist())
+    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
+    assert not test.run(significance_level=0.001)
+
+
+@pytest.mark.parametrize(("name", "step"), [("base_color", 0.02), ("roughness", 0.004), ("metallic", 0.02)])
+@pytest.mark.parametrize(("roughness", "metallic"), [(0.3, 0.35), (0.7, 0.8)])
+def test_gradients_are_finite_differences_of_the_formula(name, step, roughness, metallic):
+    """Forward derivative of eval against central differences of the float64 reference, in every parameter."""
+    import drjit as dr
+
+    surface = make(roughness=roughness, metallic=metallic)
+    params = mi.traverse(surface)
+    key = next(k for k in params.keys() if k.startswith(name))  # noqa: SIM118 - not a dict
+    wi, wo = pairs(500, 8, roughness)
+    dr.enable_grad(params[key])
+    dr.set_grad(params[key], 1.0)
+    params.update()
+    value = surface.eval(mi.BSDFContext(), interaction(wi), vector(wo))
+    gradient = np.array(dr.forward_to(value)).T
+
+    def reference(shift):
+        at = {"base_color": np.array(ALBEDO), "roughness": roughness, "metallic": metallic}
+        at[name] = at[name] + shift
+        return brdf.evaluate(at["base_color"], at["roughness"], at["metallic"], NORMAL, wi, wo) * wo[:, 2:]
+
+    expected = (8 * (reference(step) - reference(-step)) - (reference(2 * step) - reference(-2 * step))) / (12 * step)
+    scale = np.abs(expected).max()
+    assert scale > 0
+    assert np.abs(gradient - expected).max() < 2e-3 * scale
+
+
+def white_furnace(roughness, metallic, degrees, count=200_000):
+    """Reflectance (green) of a white surface under constant light from everywhere."""
+    rng = np.random.default_rng(1)
+    wi = np.broadcast_to(tilted(degrees), (count, 3))
+    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
+    _, weight = make((1, 1, 1), roughness, metallic).sample(mi.BSDFContext(), interaction(wi), u1, u2)
+    return float(np.array(weight)[1].mean())
+
+
+FURNACE = {
+    # metallic, roughness: reflectance at 0, 45, 75 degrees
+    (0, 0.05): (1.019, 1.021, 1.137),
+    (0, 0.3): (1.034, 1.036, 1.160),
+    (0, 0.6): (1.045, 1.046, 1.131),
+    (0, 1.0): (1.049, 1.050, 1.213),
+    (1, 0.05): (1.000, 1.000, 1.000),
+    (1, 0.3): (0.991, 0.985, 0.934),
+    (1, 0.6): (0.824, 0.793, 0.785),
+    (1, 1.0): (0.306, 0.359, 0.487),
+}
+"""The paper's formulas, as they are: single scattering loses energy in metals, and the sum of lobes gains some."""
+
+
+@pytest.mark.parametrize(("metallic", "roughness"), FURNACE)
+def test_white_furnace(metallic, roughness):
+    measured = [white_furnace(roughness, metallic, degrees) for degrees in (0, 45, 75)]
+    assert measured == pytest.approx(FURNACE[metallic, roughness], abs=0.005)
+    assert metallic == 0 or max(measured) < 1.0005
+
+
+def test_white_furnace_equals_quadrature():
+    """Sampling against a plain sum over the hemisphere of the reference."""
+    n = 400
+    z, phi = np.meshgrid((np.arange(n) + 0.5) / n, 2 * np.pi * (np.arange(n) + 0.5) / n)
+    s = np.sqrt(1 - z**2)
+    wo = np.stack([s * np.cos(phi), s * np.sin(phi), z], -1)
+    value = brdf.evaluate(np.ones(3), 0.6, 0.4, NORMAL, tilted(45), wo)[..., 1] * z
+    assert white_furnace(0.6, 0.4, 45) == pytest.approx(value.mean() * 2 * np.pi, rel=3e-3)
+
+
+def test_it_prints_its_parameters():
+    assert bsdf.PLUGIN == "materialist_disney"
+    assert "SimplifiedDisney" in str(make())
