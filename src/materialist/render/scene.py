@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.render.envmap import check_envmap, half_turn, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Camera, Geometry, Materials, Mesh
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
+_padded = on_mitsuba_grid
+"""The name under which the synthetic benchmark takes it."""
+
 _WAVEFRONT = 2**24
 """Camera paths traced at a time: bounds the memory."""
 
@@ -17,18 +21,30 @@ _WAVEFRONT = 2**24
 class RenderScene:
     """Path tracing of one geometry from one camera.
 
+    `mi_scene` is Mitsuba's scene. Its shapes are `surface`, with the faces that `geometry.mesh` gives the depth
+    surface in their order, and `plane0`, `plane1`, ...: the continued planes likewise (see `part`).
+
     Args:
         geometry: the depth surface carries the per-pixel maps; the continuation of a plane carries the mean of the
             maps over the plane's pixels.
         camera: pinhole at the origin.
         device: `auto`, `cpu` or `cuda`.
+
+    Raises:
+        InputError: a picture below 2 x 2 pixels, or a mesh without a depth surface. SetupError: see `variant.setup`.
     """
 
     def __init__(self, geometry: Geometry, camera: Camera, *, device: str = "auto"):
+        if min(camera.width, camera.height) < 2:
+            raise InputError(f"The picture is {camera.width} x {camera.height}; rendering needs 2 x 2 pixels or more.")
+        if not (geometry.mesh.face_plane == -1).any():
+            raise InputError("The mesh has no depth surface to render; give a depth map with some values above 0.")
         self.mi = mi = setup(device)
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
-        self._members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
+        members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
+        # A plane that no pixel lies on keeps the neutral material it starts with.
+        self._members = {k: pixels for k, pixels in members.items() if len(pixels)}
         height, width = camera.height, camera.width
         description = {
             "type": "scene",
@@ -37,7 +53,7 @@ class RenderScene:
             "light": {
                 "type": "envmap",
                 "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
-                "to_world": _half_turn(mi),
+                "to_world": half_turn(mi),
             },
             "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
@@ -48,10 +64,11 @@ class RenderScene:
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
 
     def set_materials(self, materials: Materials) -> None:
-        """Take other maps; their size must be the camera's."""
+        """Take other maps; their size must be the camera's, else InputError."""
         size = (self.camera.height, self.camera.width)
-        if materials.roughness.shape != size:
-            raise InputError(f"Material maps are {materials.roughness.shape}, the camera is {size} (rows, columns).")
+        for name, shape in (("albedo", (*size, 3)), ("roughness", size), ("metallic", size)):
+            if getattr(materials, name).shape != shape:
+                raise InputError(f"The {name} map is {getattr(materials, name).shape}, the camera needs {shape}.")
         tensor = self.mi.TensorXf
         self._assign(
             tensor(np.ascontiguousarray(materials.albedo, np.float32)),
@@ -61,12 +78,23 @@ class RenderScene:
         self.params.update()
 
     def set_envmap(self, envmap: Array) -> None:
-        """Take another light: [h, 2h, 3] linear radiance in the project's convention."""
-        self.params["light.data"] = self.mi.TensorXf(_padded(np.asarray(envmap, np.float32), np))
+        """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
+        check_envmap(envmap)
+        self.params["light.data"] = self.mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
     def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
-        """[H, W, 3] float32 linear radiance with `spp` samples per pixel; `max_depth=2` is direct light alone."""
+        """Path-trace the picture.
+
+        Args:
+            spp: samples per pixel. seed: equal seeds give equal pictures.
+            max_depth: path length; 2 is direct light alone, 1 the sky alone.
+            hide_emitters: leave pixels of the sky black.
+
+        Returns:
+            [H, W, 3] float32 linear radiance.
+        """
+        _check_options(spp, max_depth)
         mi = self.mi
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
         total = np.zeros((self.camera.height, self.camera.width, 3), np.float64)
@@ -79,20 +107,27 @@ class RenderScene:
             done, k = done + now, k + 1
         return (total / spp).astype(np.float32)
 
-    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
-        """Differentiable rendering by path replay backpropagation; torch tensors in and out.
+    def render_torch(
+        self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH,
+        hide_emitters: bool = False,
+    ):  # fmt: skip
+        """Differentiable rendering by path replay backpropagation (the paper's engine; section Implementation Details).
+
+        Continued planes follow the means of the maps, and so do their gradients.
 
         Args:
-            albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3].
+            albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors.
             spp: samples per pixel of the image; its gradient uses as many, with another seed.
+            max_depth, hide_emitters: as in `render`.
 
         Returns:
-            [H, W, 3] linear radiance.
+            [H, W, 3] linear radiance, a torch tensor; its scene keeps these materials and this light.
         """
         import drjit as dr
         import torch
 
-        integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
+        _check_options(spp, max_depth)
+        integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth, "hide_emitters": hide_emitters})
 
         @dr.wrap(source="torch", target="drjit")
         def run(a, r, m, e):
@@ -103,7 +138,7 @@ class RenderScene:
                 self.mi_scene, self.params, integrator=integrator, spp=spp, seed=seed, seed_grad=seed + 1
             )
 
-        return run(albedo, roughness[..., None], metallic[..., None], _padded(envmap, torch))
+        return run(albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch))
 
     def _assign(self, albedo, roughness, metallic) -> None:
         p = self.params
@@ -123,6 +158,13 @@ class RenderScene:
         means = [dr.mean(dr.gather(self.mi.Float, maps.array, index + c)) for c in range(channels)]
         # Mitsuba takes no texture below 2 x 2.
         return self.mi.TensorXf(dr.concat(means * 4), (2, 2, channels))
+
+
+def _check_options(spp: int, max_depth: int) -> None:
+    if spp < 1:
+        raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")
+    if max_depth < 1:
+        raise InputError(f"max_depth is {max_depth}; give at least 1 (2 for direct light).")
 
 
 def part(mesh: Mesh, plane: int) -> Mesh:
@@ -151,25 +193,6 @@ def _sensor(mi, camera: Camera) -> dict:
         },
         "sampler": {"type": "multijitter"},
     }  # fmt: skip
-
-
-def _half_turn(mi):
-    """Mitsuba's map has -Z at its left edge, ours in its centre."""
-    return mi.ScalarTransform4f().rotate([0, 1, 0], 180)
-
-
-def _padded(envmap, xp):
-    """Our texel-centre map [h, w, 3] on Mitsuba's grid: [2h + 1, w + 2, 3], for numpy or torch.
-
-    Mitsuba's rows run from pole to pole inclusive; at 2h + 1 rows every second one is a texel centre of ours and the
-    rest lie midway, so that its bilinear lookup equals ours. Its columns are padded by one on either side.
-    """
-    first, last = envmap[:1], envmap[-1:]
-    middle = (envmap[:-1] + envmap[1:]) / 2
-    h = envmap.shape[0]
-    stacked = xp.concatenate([xp.stack([envmap[:-1], middle], 1).reshape(2 * (h - 1), *envmap.shape[1:]), last], 0)
-    rows = xp.concatenate([first, stacked, last], 0)
-    return xp.concatenate([rows[:, -1:], rows, rows[:, :1]], 1)
 
 
 def _maps_bsdf(mi, height: int, width: int) -> dict:

@@ -1,0 +1,38 @@
+"""The project's environment map in Mitsuba's terms."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.types import Array
+
+
+def on_mitsuba_grid(envmap, xp):
+    """The data of Mitsuba's `envmap` emitter [2h + 1, 2h + 2, 3] for a map [h, 2h, 3]; `xp` is numpy or torch.
+
+    Mitsuba's rows run from pole to pole inclusive, ours have their centres half a row inside. At 2h + 1 rows every
+    second one is a texel centre of ours and the rest lie midway, so that its bilinear lookup equals ours to rounding.
+    Its columns are padded by one on either side. To be used with `half_turn`.
+    """
+    first, last = envmap[:1], envmap[-1:]
+    middle = (envmap[:-1] + envmap[1:]) / 2
+    h = envmap.shape[0]
+    inner = xp.stack([envmap[:-1], middle], 1).reshape(2 * (h - 1), *envmap.shape[1:])
+    rows = xp.concatenate([first, inner, last, last], 0)
+    return xp.concatenate([rows[:, -1:], rows, rows[:, :1]], 1)
+
+
+def half_turn(mi):
+    """The emitter's `to_world`: Mitsuba's map has -Z at its left edge, ours in its centre."""
+    return mi.ScalarTransform4f().rotate([0, 1, 0], 180)
+
+
+def check_envmap(envmap: Array) -> None:
+    """Raise InputError unless the map is [h, 2h, 3] with h >= 4, finite and >= 0."""
+    shape = np.shape(envmap)
+    if len(shape) != 3 or shape[2] != 3 or shape[0] < 4 or shape[1] != 2 * shape[0]:
+        raise InputError(f"The environment map is {shape}; it must be [h, 2h, 3] with h of at least 4.")
+    low, high = float(np.min(envmap)), float(np.max(envmap))
+    if not (low >= 0 and np.isfinite(high)):
+        raise InputError(f"The environment map has values from {low:g} to {high:g}; they must be finite and >= 0.")

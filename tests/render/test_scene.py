@@ -1,0 +1,263 @@
+"""The Mitsuba scene says what the project's conventions say: camera, maps, light, planes, seeds."""
+
+import numpy as np
+import pytest
+from render_scenes import empty, uniform, wall, with_floor
+
+from materialist.camera import pixel_rays, unproject
+from materialist.errors import InputError
+from materialist.render import brdf
+from materialist.render.scene import RenderScene
+from materialist.types import Camera, Materials
+
+CAMERA = Camera(13, 7, 50.0)
+SIZE = (7, 13)
+WHITE = np.ones((4, 8, 3), np.float32)
+
+
+def scene_of(geometry, materials=None, envmap=WHITE, camera=CAMERA):
+    scene = RenderScene(geometry, camera, device="cpu")
+    scene.set_materials(uniform(camera) if materials is None else materials)
+    scene.set_envmap(envmap)
+    return scene
+
+
+def camera_rays(scene, x, y):
+    """Mitsuba's rays through screen positions x, y [N] in pixels."""
+    mi, camera = scene.mi, scene.camera
+    film = mi.Point2f(np.float32(x / camera.width), np.float32(y / camera.height))
+    return scene.mi_scene.sensors()[0].sample_ray(0, 0, film, mi.Point2f(0.5, 0.5))[0]
+
+
+def inside_pixels(camera, seed=0):
+    """One random position strictly inside each pixel: x [P], y [P], row-major."""
+    rng = np.random.default_rng(seed)
+    row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
+    return col + rng.uniform(0.05, 0.95, row.size), row + rng.uniform(0.05, 0.95, row.size)
+
+
+def random_maps(seed=0, size=SIZE):
+    rng = np.random.default_rng(seed)
+    draw = lambda *shape: rng.uniform(0.05, 0.95, shape).astype(np.float32)  # noqa: E731
+    return Materials(draw(*size, 3), draw(*size), draw(*size))
+
+
+def bilinear(envmap, direction):
+    """Slow twin of the light's lookup: [N, 3] radiance of an [h, 2h, 3] map from directions [N, 3]."""
+    h, w = envmap.shape[:2]
+    x, y, z = (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).T
+    column = (np.arctan2(x, -z) / (2 * np.pi) + 0.5) * w - 0.5
+    row = np.clip(np.arccos(np.clip(y, -1, 1)) / np.pi * h - 0.5, 0, h - 1)
+    c0, r0 = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), h - 2)
+    fc, fr = (column - c0)[:, None], (row - r0)[:, None]
+    top = envmap[r0, c0 % w] * (1 - fc) + envmap[r0, (c0 + 1) % w] * fc
+    return top * (1 - fr) + (envmap[r0 + 1, c0 % w] * (1 - fc) + envmap[r0 + 1, (c0 + 1) % w] * fc) * fr
+
+
+@pytest.mark.parametrize("camera", [CAMERA, Camera(6, 17, 35.0), Camera(8, 8, 100.0)])
+def test_rays_go_through_the_pixels_of_the_camera_model(camera):
+    scene = RenderScene(wall(camera), camera, device="cpu")
+    row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
+    direction = np.array(camera_rays(scene, col + 0.5, row + 0.5).d).T
+    np.testing.assert_allclose(direction / -direction[:, 2:], pixel_rays(camera).reshape(-1, 3), atol=2e-5)
+
+
+def test_hits_are_the_unprojected_depth():
+    scene = RenderScene(wall(CAMERA, depth=3.0), CAMERA, device="cpu")
+    # Just beside the pixel centre: the diagonal of its quad runs through the centre itself.
+    row, col = np.indices(SIZE).reshape(2, -1)
+    si = scene.mi_scene.ray_intersect(camera_rays(scene, col + 0.501, row + 0.502))
+    expected = unproject(np.full(SIZE, 3.0, np.float32), CAMERA).reshape(-1, 3)
+    np.testing.assert_allclose(np.array(si.p).T, expected, atol=3 * 0.003 / CAMERA.focal)
+
+
+def test_every_pixel_shows_its_own_material():
+    """A map that is neither square nor symmetric, read where the camera's rays land."""
+    maps = random_maps()
+    scene = scene_of(wall(CAMERA), maps)
+    for seed in range(3):
+        si = scene.mi_scene.ray_intersect(camera_rays(scene, *inside_pixels(CAMERA, seed)))
+        bsdf = scene.mi_scene.shapes()[0].bsdf()
+        np.testing.assert_allclose(np.array(bsdf.base_color.eval(si)).T, maps.albedo.reshape(-1, 3), atol=1e-6)
+        np.testing.assert_allclose(np.array(bsdf.roughness.eval_1(si)), maps.roughness.reshape(-1), atol=1e-6)
+        np.testing.assert_allclose(np.array(bsdf.metallic.eval_1(si)), maps.metallic.reshape(-1), atol=1e-6)
+
+
+def test_the_picture_is_affine_in_the_albedo_of_its_own_pixel():
+    """Under constant light alone, L = L_0 + A (L_1 - L_0), pixel by pixel: orientation end to end, in the picture."""
+    maps = random_maps(1)
+    scene = scene_of(wall(CAMERA))
+    images = {}
+    for name, albedo in (("black", 0.0), ("white", 1.0), ("maps", maps.albedo)):
+        scene.set_materials(uniform(CAMERA, albedo))
+        images[name] = scene.render(spp=1024, seed=3, max_depth=2)
+    expected = images["black"] + maps.albedo * (images["white"] - images["black"])
+    np.testing.assert_allclose(images["maps"], expected, atol=0.02)
+
+
+def test_faces_keep_the_order_of_the_mesh():
+    geometry = wall(CAMERA)
+    scene = RenderScene(geometry, CAMERA, device="cpu")
+    hit = scene.mi_scene.ray_intersect_preliminary(camera_rays(scene, *inside_pixels(CAMERA)))
+    assert (geometry.mesh.face_pixel[np.array(hit.prim_index)] == np.arange(7 * 13)).all()
+
+
+def test_no_ray_slips_between_the_faces():
+    """Anywhere on a wall, and exactly through its vertices and along its edges."""
+    camera = Camera(48, 32, 40.0)
+    scene = RenderScene(wall(camera), camera, device="cpu")
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(0, 48, 50_000), rng.uniform(0, 32, 50_000)
+    row, col = np.indices((31, 47)).reshape(2, -1) + 1.0
+    x, y = np.concatenate([x, col, col + 0.5, col]), np.concatenate([y, row, row, row + 0.5])
+    hit = np.array(scene.mi_scene.ray_intersect_preliminary(camera_rays(scene, x, y)).is_valid())
+    assert hit.all(), f"{(~hit).sum()} of {len(hit)} rays slip through"
+
+
+@pytest.mark.parametrize("rough", [0.3, 1.0])
+@pytest.mark.parametrize("metallic", [0.0, 0.7])
+def test_direct_light_is_the_integral_of_the_reference(rough, metallic):
+    """A wall under constant light: L = integral of f_r cos, by quadrature of the numpy reference."""
+    albedo = np.float32([0.8, 0.4, 0.1])
+    scene = scene_of(wall(CAMERA), uniform(CAMERA, albedo, rough, metallic))
+    image = scene.render(spp=1024, seed=5, max_depth=2)
+    cosine, azimuth = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(400) + 0.5) / 400 * 2 * np.pi)
+    sine = np.sqrt(1 - cosine**2)
+    wi = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
+    for row, col in ((3, 6), (0, 0), (6, 2)):
+        wo = -pixel_rays(CAMERA)[row, col] / np.linalg.norm(pixel_rays(CAMERA)[row, col])
+        value = brdf.evaluate(albedo, rough, metallic, np.array([0.0, 0, 1]), wi, wo)
+        expected = 2 * np.pi * (value * cosine[..., None]).mean((0, 1))
+        np.testing.assert_allclose(image[row, col], expected, rtol=0.03)
+
+
+@pytest.mark.parametrize("height", [4, 5, 16])
+def test_light_is_the_bilinear_lookup_between_texel_centres(height):
+    """To float precision, all around, poles and seam included."""
+    rng = np.random.default_rng(height)
+    envmap = rng.random((height, 2 * height, 3)).astype(np.float32)
+    scene = scene_of(empty(CAMERA), envmap=envmap)
+    direction = rng.normal(size=(20_000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction[:4] = [[0, 1, 0], [0, -1, 0], [1e-5, 0, 1], [-1e-5, 0, 1]]
+    import drjit as dr
+
+    si = dr.zeros(scene.mi.SurfaceInteraction3f, len(direction))
+    si.wi = -scene.mi.Vector3f(direction.T.astype(np.float32))
+    seen = np.array(scene.mi_scene.environment().eval(si)).T
+    np.testing.assert_allclose(seen, bilinear(envmap, direction.astype(np.float32)), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("row", "col", "where"),
+    [(4, 8, "centre"), (4, 9, "right"), (4, 7, "left"), (3, 8, "above"), (5, 8, "below"), (4, 0, "behind")],
+)
+def test_a_bright_texel_shows_where_the_convention_says(row, col, where):
+    """Centre column along -Z, right columns towards +X, top rows towards +Y; a texel map of 9 rows and 18 columns."""
+    height = 9
+    envmap = np.zeros((height, 2 * height, 3), np.float32)
+    # 18 columns have no middle one: columns 8 and 9 meet at -Z, so light both for the ones that should be centred.
+    columns = [8, 9] if where in ("centre", "above", "below") else [col]
+    envmap[row, columns] = 1
+    camera = Camera(81, 81, 80.0)
+    image = scene_of(empty(camera), envmap=envmap, camera=camera).render(spp=16, seed=1)[..., 0]
+    total = image.sum()
+    if where == "behind":
+        assert total == 0
+        return
+    rows, cols = np.indices(image.shape)
+    x, y = (image * cols).sum() / total - 40, (image * rows).sum() / total - 40
+    side = {"centre": (0, 0), "right": (1, 0), "left": (-1, 0), "above": (0, -1), "below": (0, 1)}[where]
+    for offset, expected in ((x, side[0]), (y, side[1])):
+        assert abs(offset) < 0.5 if expected == 0 else offset * expected > 5
+
+
+def test_sky_pixels_see_the_light_and_can_be_hidden():
+    holes = np.zeros(SIZE, bool)
+    holes[:3, 5:] = True
+    envmap = np.random.default_rng(2).random((6, 12, 3)).astype(np.float32)
+    scene = scene_of(wall(CAMERA, holes=holes), envmap=envmap)
+    image = scene.render(spp=400, seed=1)
+    offsets = (np.stack(np.meshgrid(np.arange(16), np.arange(16)), -1).reshape(-1, 2) + 0.5) / 16 - 0.5
+    expected = np.mean(
+        [
+            bilinear(envmap, (pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal).reshape(-1, 3))
+            for u, v in offsets
+        ],
+        axis=0,
+    ).reshape(*SIZE, 3)
+    np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
+    hidden = scene.render(spp=16, seed=1, hide_emitters=True)
+    assert not hidden[holes].any() and (hidden[~holes] > 0).all()
+
+
+def test_a_continued_plane_carries_the_mean_of_its_pixels():
+    label = np.full(SIZE, -1)
+    label[5:, 2:9] = 0
+    maps = random_maps(4)
+    scene = scene_of(with_floor(wall(CAMERA), label), maps)
+    si = scene.mi_scene.ray_intersect(scene.mi.Ray3f([0.3, 0, -1], [0.1, -1, 0.2]))
+    bsdf = si.shape.bsdf()[0] if isinstance(si.shape.bsdf(), list) else si.bsdf()
+    assert bsdf is not None
+    got = [np.array(scene.params[f"plane0.bsdf.{name}.data"]) for name in ("base_color", "roughness", "metallic")]
+    for value, field in zip(got, (maps.albedo, maps.roughness, maps.metallic)):
+        mean = field[label == 0].mean(0)
+        np.testing.assert_allclose(value, np.broadcast_to(np.atleast_1d(mean), value.shape), rtol=1e-5)
+
+
+def test_the_floor_lights_the_wall():
+    """A white floor against a black one: only by way of the plane can the wall's lower rows change."""
+    label = np.full(SIZE, -1)
+    label[6] = 0
+    images = []
+    for value in (0.0, 1.0):
+        maps = uniform(CAMERA)
+        maps.albedo[6] = value
+        images.append(scene_of(with_floor(wall(CAMERA), label, height=-0.9), maps).render(spp=256, max_depth=3))
+    gain = images[1][:6].mean((1, 2)) - images[0][:6].mean((1, 2))
+    assert (gain > 0.02).all() and gain[5] > gain[0]
+
+
+def test_updates_give_the_picture_of_a_fresh_scene():
+    maps, envmap = random_maps(5), np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
+    label = np.full(SIZE, -1)
+    label[4:] = 0
+    geometry = with_floor(wall(CAMERA), label)
+    fresh = scene_of(geometry, maps, envmap).render(spp=16, seed=9)
+    used = scene_of(geometry, random_maps(7), np.ones((5, 10, 3), np.float32))
+    used.render(spp=4)
+    used.set_envmap(envmap)
+    used.set_materials(maps)
+    np.testing.assert_array_equal(used.render(spp=16, seed=9), fresh)
+
+
+def test_seeds_decide_the_picture():
+    scene = scene_of(wall(CAMERA), random_maps(8), np.random.default_rng(0).random((8, 16, 3)))
+    first = scene.render(spp=4, seed=1)
+    np.testing.assert_array_equal(scene.render(spp=4, seed=1), first)
+    assert np.abs(scene.render(spp=4, seed=2) - first).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("envmap", "says"),
+    [
+        (np.ones((4, 9, 3)), r"\(4, 9, 3\)"),
+        (np.ones((2, 4, 3)), r"\(2, 4, 3\)"),
+        (np.ones((4, 8)), r"\(4, 8\)"),
+        (np.full((4, 8, 3), np.nan), "nan"),
+        (np.full((4, 8, 3), -1.0), "-1"),
+    ],
+)
+def test_bad_light_is_refused(envmap, says):
+    with pytest.raises(InputError, match=says):
+        RenderScene(empty(CAMERA), CAMERA, device="cpu").set_envmap(envmap)
+
+
+def test_bad_maps_and_options_are_refused():
+    scene = RenderScene(wall(CAMERA), CAMERA, device="cpu")
+    with pytest.raises(InputError, match=r"\(7, 12\)"):
+        scene.set_materials(random_maps(size=(7, 12)))
+    with pytest.raises(InputError, match="spp is 0"):
+        scene.render(spp=0)
+    with pytest.raises(InputError, match="max_depth is 0"):
+        scene.render(spp=1, max_depth=0)
