@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics
-from materialist.bench.report import Column, Report, write
+from materialist.bench.report import CEILING, Column, Report, write
 from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.errors import InputError
 from materialist.predict.base import NEUTRAL_METALLIC
@@ -145,7 +145,7 @@ def _measure(
     true_picture = sample.render(sample.envmap, spp=spp, seed=seed + 2)
     relit = metrics.psnr(on_mesh(other), sample.render(other, spp=spp, seed=seed + 3))
     ceiling = metrics.psnr(on_mesh(sample.envmap), true_picture)
-    yield {"method": "ceiling", "sample": sample.name, "mesh_psnr": ceiling, "relit_psnr": relit}
+    yield {"method": CEILING, "sample": sample.name, "mesh_psnr": ceiling, "relit_psnr": relit}
     for name, method in methods.items():
         start = time.perf_counter()
         envmap = fit(sample, geometry, mesh, method, seed=seed)

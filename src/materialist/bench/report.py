@@ -15,6 +15,10 @@ import numpy as np
 from materialist.errors import OutputError
 
 
+CEILING = "ceiling"
+"""The method name of rows that no method can beat: they do not compete for the best figure."""
+
+
 @dataclass(frozen=True)
 class Column:
     """One figure of a benchmark."""
@@ -96,14 +100,15 @@ def markdown(report: Report) -> str:
     lines = [f"# {report.title}", "", report.note, "", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     best = {}
     for c in report.columns:
-        values = [f[c.key] for f in table.values() if c.key in f]
+        values = [f[c.key] for method, f in table.items() if c.key in f and method != CEILING]
         if c.better and len(values) > 1:
             best[c.key] = max(values) if c.better == "higher" else min(values)
     for method, figures in table.items():
         cells = [method, str(int(figures["samples"]))]
         for c in report.columns:
             text = f"{figures[c.key]:.{c.digits}f}" if c.key in figures else "–"
-            cells.append(f"**{text}**" if c.key in figures and figures[c.key] == best.get(c.key) else text)
+            winner = method != CEILING and c.key in figures and figures[c.key] == best.get(c.key)
+            cells.append(f"**{text}**" if winner else text)
         lines.append("| " + " | ".join(cells) + " |")
     settings = ", ".join(f"{k} {v}" for k, v in report.settings.items() if v is not None)
     return "\n".join([*lines, "", f"Settings: {settings}.", ""])
