@@ -121,8 +121,7 @@ def test_two_planes_keep_their_own_materials():
     label = np.full((4, 6), -1)
     label[3], label[0] = 0, 1
     geometry = with_floor(wall(camera), label)
-    mesh = geometry.mesh
-    mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
+    geometry.mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
     scene = RenderScene(geometry, camera, device="cpu")
     maps = uniform(camera)
     maps.albedo[3], maps.albedo[0] = 0.9, 0.1
