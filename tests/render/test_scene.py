@@ -179,13 +179,8 @@ def test_sky_pixels_see_the_light_and_can_be_hidden():
     scene = scene_of(wall(CAMERA, holes=holes), envmap=envmap)
     image = scene.render(spp=400, seed=1)
     offsets = (np.stack(np.meshgrid(np.arange(16), np.arange(16)), -1).reshape(-1, 2) + 0.5) / 16 - 0.5
-    expected = np.mean(
-        [
-            bilinear(envmap, (pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal).reshape(-1, 3))
-            for u, v in offsets
-        ],
-        axis=0,
-    ).reshape(*SIZE, 3)
+    within = [pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal for u, v in offsets]
+    expected = np.mean([bilinear(envmap, rays.reshape(-1, 3)) for rays in within], axis=0).reshape(*SIZE, 3)
     np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
     hidden = scene.render(spp=16, seed=1, hide_emitters=True)
     assert not hidden[holes].any() and (hidden[~holes] > 0).all()
@@ -206,7 +201,7 @@ def test_a_continued_plane_carries_the_mean_of_its_pixels():
 
 
 def test_the_floor_lights_the_wall():
-    """A white floor against a black one: only by way of the plane can the wall's lower rows change."""
+    """A white floor against a black one: half of what the wall sees, so A / 2 = 0.25 more light and a little gloss."""
     label = np.full(SIZE, -1)
     label[6] = 0
     images = []
@@ -215,7 +210,7 @@ def test_the_floor_lights_the_wall():
         maps.albedo[6] = value
         images.append(scene_of(with_floor(wall(CAMERA), label, height=-0.9), maps).render(spp=256, max_depth=3))
     gain = images[1][:6].mean((1, 2)) - images[0][:6].mean((1, 2))
-    assert (gain > 0.02).all() and gain[5] > gain[0]
+    assert (gain > 0.22).all() and (gain < 0.32).all()
 
 
 def test_updates_give_the_picture_of_a_fresh_scene():
@@ -255,7 +250,7 @@ def test_bad_light_is_refused(envmap, says):
 
 def test_bad_maps_and_options_are_refused():
     scene = RenderScene(wall(CAMERA), CAMERA, device="cpu")
-    with pytest.raises(InputError, match=r"\(7, 12\)"):
+    with pytest.raises(InputError, match=r"\(7, 12, 3\)"):
         scene.set_materials(random_maps(size=(7, 12)))
     with pytest.raises(InputError, match="spp is 0"):
         scene.render(spp=0)
