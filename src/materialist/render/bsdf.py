@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from materialist.transport.light import DIELECTRIC_R0
+from materialist.render.brdf import DIELECTRIC_R0
 from materialist.transport.sampling import (
     MIN_ALPHA,
     cosine_direction,
