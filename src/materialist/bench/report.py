@@ -14,7 +14,6 @@ import numpy as np
 
 from materialist.errors import OutputError
 
-
 CEILING = "ceiling"
 """The method name of rows that no method can beat: they do not compete for the best figure."""
 

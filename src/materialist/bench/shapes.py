@@ -26,7 +26,10 @@ class Solid:
 
 def box(size: Array) -> Solid:
     """Sharp box of extent `size` [3]; the texture covers each side once."""
-    corners, faces, normals, uv = [], [], [], []
+    corners: list[Array] = []
+    faces: list[list[list[int]]] = []
+    normals: list[Array] = []
+    uv: list[Array] = []
     quad = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
     for axis in range(3):
         for sign in (-1, 1):

@@ -113,7 +113,9 @@ class TrueScene:
         # Whole squares suit the stratified sampler; batches bound the memory.
         total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
         for k, part in enumerate(batches):
-            picture = mi.render(self._scene, integrator=integrator, spp=part, seed=(seed * 7919 + k) & 0xFFFFFFFF)
+            picture = mi.render(
+                self._scene, integrator=integrator, spp=part, seed=mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
+            )
             total += np.array(picture)[..., :3] * part
         return (total / sum(batches)).astype(np.float32)
 
@@ -188,7 +190,7 @@ def _registry(meshes: list[Any]) -> Array:
     import drjit as dr
     import mitsuba as mi
 
-    numbers = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh))[0] for mesh in meshes]
+    numbers = [int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes]
     table = np.full(max(numbers) + 1, -1)
     table[numbers] = np.arange(len(meshes))
     return table

@@ -128,7 +128,7 @@ def _objects(labels: Array, ground: Array, sky: Array, contact: float) -> list[A
         beneath = np.roll(part, 2, axis=0) & ~part
         beneath[:2] = False
         under = owner[beneath]
-        rests_on = np.bincount(under[under >= 0]).argmax() if (under >= 0).any() else -1
+        rests_on = int(np.bincount(under[under >= 0]).argmax()) if (under >= 0).any() else -1
         if rests_on >= 0 and (under == rests_on).mean() > 0.6 and part.mean() < 0.15:
             things[rests_on] |= part
             owner[part] = rests_on

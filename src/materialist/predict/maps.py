@@ -43,9 +43,9 @@ class MapsPredictor:
         """
         size = photo.linear.shape[:2]
         warnings: list[str] = []
-        depth = self._fitted("depth", size, warnings)
-        albedo = self._fitted("albedo", size, warnings)
-        normal = self._fitted("normal", size, warnings, optional=True)
+        depth = self._needed("depth", size, warnings)
+        albedo = self._needed("albedo", size, warnings)
+        normal = self._fitted("normal", size, warnings)
         materials = Materials(
             albedo=albedo,
             roughness=self._scalar("roughness", NEUTRAL_ROUGHNESS, size, warnings),
@@ -62,19 +62,24 @@ class MapsPredictor:
 
     def _scalar(self, name: str, neutral: float, size: tuple[int, int], warnings: list[str]) -> Array:
         """Roughness or metallic [H, W], or its neutral value where there is no file."""
-        found = self._fitted(name, size, warnings, optional=True)
+        found = self._fitted(name, size, warnings)
         if found is not None:
             return found
         warnings.append(f"There is no {name} map: the neutral {name} {neutral} was used everywhere.")
         return np.full(size, neutral, np.float32)
 
-    def _fitted(self, name: str, size: tuple[int, int], warnings: list[str], optional: bool = False) -> Array | None:
-        """One map, read, checked and brought to the photo's size [H, W]; None when it is missing and optional."""
+    def _needed(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
+        """Albedo or depth, as `_fitted`; raises InputError when it is missing."""
+        found = self._fitted(name, size, warnings)
+        if found is None:
+            raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
+        return found
+
+    def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array | None:
+        """One map, read, checked and brought to the photo's size [H, W]; None when it is missing."""
         path = self._find(name)
         if path is None:
-            if optional:
-                return None
-            raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
+            return None
         values = _CHECKS[name](read_map(path, name), path, warnings)
         if values.shape[:2] != size:
             _check_aspect(values, size, path)
@@ -126,7 +131,7 @@ def _read_png(path: Path) -> Array:
     )
     if pixels is None:
         raise InputError(f"{path} is not a readable PNG file; write the map again.")
-    values = pixels.astype(np.float32) / np.iinfo(pixels.dtype).max
+    values = pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 65535)
     return values if values.ndim == 2 else np.ascontiguousarray(values[..., 2::-1])  # OpenCV reads BGR(A)
 
 

@@ -36,7 +36,7 @@ def separate(linear: Array) -> tuple[Array, Array]:
             _ramp(np.abs(slope), *BRIGHTNESS_EDGE),
         )
         paint.append(slope * edge)
-    reflectance = _integrate(*paint, brightness)  # [H, W] log, up to a constant
+    reflectance = _integrate(paint[0], paint[1], brightness)  # [H, W] log, up to a constant
     shading = np.exp(brightness - reflectance)
     albedo = np.maximum(linear, 0) / shading[..., None]
     scale = BRIGHTEST / max(float(np.percentile(luminance(albedo), 97)), 1e-6)
