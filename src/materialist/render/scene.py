@@ -87,7 +87,7 @@ class RenderScene:
         """Path-trace the picture.
 
         Args:
-            spp: samples per pixel. seed: equal seeds give equal pictures.
+            spp: samples per pixel, rounded up a little for stratification. seed: equal seeds give equal pictures.
             max_depth: path length; 2 is direct light alone, 1 the sky alone.
             hide_emitters: leave pixels of the sky black.
 
@@ -97,15 +97,14 @@ class RenderScene:
         _check_options(spp, max_depth)
         mi = self.mi
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
+        # Bounded wavefronts, all of one size: memory stays the same for any number of samples.
+        passes = min(spp, -(-spp * self.camera.width * self.camera.height // _WAVEFRONT))
+        each = _stratified(-(-spp // passes))
         total = np.zeros((self.camera.height, self.camera.width, 3), np.float64)
-        done, k = 0, 0
-        while done < spp:
-            # Bounded wavefronts: memory stays the same for any number of samples.
-            now = min(spp - done, max(1, _WAVEFRONT // (self.camera.width * self.camera.height)))
-            image = mi.render(self.mi_scene, integrator=integrator, spp=now, seed=(seed * 9973 + k) & 0xFFFFFFFF)
-            total += np.array(image)[..., :3] * now
-            done, k = done + now, k + 1
-        return (total / spp).astype(np.float32)
+        for k in range(passes):
+            image = mi.render(self.mi_scene, integrator=integrator, spp=each, seed=(seed * 9973 + k) & 0xFFFFFFFF)
+            total += np.array(image)[..., :3]
+        return (total / passes).astype(np.float32)
 
     def render_torch(
         self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH,
@@ -135,7 +134,7 @@ class RenderScene:
             self.params["light.data"] = e
             self.params.update()
             return self.mi.render(
-                self.mi_scene, self.params, integrator=integrator, spp=spp, seed=seed, seed_grad=seed + 1
+                self.mi_scene, self.params, integrator=integrator, spp=_stratified(spp), seed=seed, seed_grad=seed + 1
             )
 
         return run(albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch))
@@ -176,6 +175,12 @@ def part(mesh: Mesh, plane: int) -> Mesh:
         mesh.vertices[used], renumbered.reshape(faces.shape).astype(np.int32), mesh.normals[used], mesh.uv[used],
         mesh.face_pixel[chosen], mesh.face_plane[chosen],
     )  # fmt: skip
+
+
+def _stratified(spp: int) -> int:
+    """The least number of samples >= `spp` that the multijitter sampler can lay out in a grid, as it would round."""
+    rows = int(np.sqrt(spp))
+    return rows * -(-spp // rows)
 
 
 def _exchanged(name: str) -> bool:
