@@ -1,0 +1,151 @@
+"""Cached shading and its gradients against the path tracer on the same scene."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from transport_scenes import away_from_edges, furnished_room, windowed_sky
+
+from materialist.camera import project
+from materialist.color import linear_to_srgb
+from materialist.fit.engine import TransportEngine
+from materialist.fit.losses import l1_l2
+from materialist.geometry.build import build_geometry
+from materialist.io.exr import read_exr
+from materialist.render.scene import RenderScene
+from materialist.transport.shading import shade
+from materialist.types import Camera, Materials
+
+OFFICIAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "official_indoor"
+
+
+class Comparison:
+    """One scene, rendered both ways."""
+
+    def __init__(self, camera, geometry, materials, envmap):
+        self.camera, self.materials, self.envmap = camera, materials, envmap
+        self.path = RenderScene(geometry, camera)
+        self.path.set_materials(materials)
+        self.path.set_envmap(envmap)
+        self.engine = TransportEngine(geometry, camera, np.zeros((camera.height, camera.width, 3), np.float32))
+        depth = self.engine.cache.image(project(np.array(self.engine.cache.position).T, camera)[1][:, None])[..., 0]
+        self.surface, self.away = depth > 0, away_from_edges(depth)
+
+    def shaded(self, maps, bounces: int):
+        """[H, W, 3] by gathering and shading once for direct light, and again for every bounce; the last one has
+        gradients in the maps [H, W, C]."""
+        maps = [m.reshape(self.surface.size, -1)[self.engine.pixels] for m in maps]
+        image = None
+        for _ in range(bounces):
+            self.engine.set_radiance(None if image is None else image.detach().numpy())
+            values = shade(self.engine.tables(self.envmap), maps[0], maps[1][:, 0], maps[2][:, 0])
+            image = torch.zeros(self.surface.size, 3).index_copy(0, self.engine.pixels, values)
+            image = image.view(*self.surface.shape, 3)
+        return image
+
+    def cached(self, bounces: int):
+        """[H, W, 3] of the scene's own materials."""
+        return self.shaded(_tensors(self.materials), bounces).numpy()
+
+    def decibels(self, bounces: int, *, spp: int):
+        """PSNR away from depth edges and over all surface pixels, with the noise of the reference taken out."""
+        image = linear_to_srgb(self.cached(bounces))
+        # Errors against two independent references: their noise has mean zero in the product.
+        errors = [image - linear_to_srgb(self.path.render(spp=spp, seed=s, max_depth=bounces + 1)) for s in (1, 2)]
+        square = (errors[0].astype(np.float64) * errors[1]).mean(-1)
+        return [float(-10 * np.log10(max(square[mask].mean(), 1e-9))) for mask in (self.away, self.surface)]
+
+
+def _tensors(materials: Materials):
+    arrays = (materials.albedo, materials.roughness, materials.metallic)
+    return [torch.from_numpy(np.ascontiguousarray(a)) for a in arrays]
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    return Comparison(*furnished_room(96), windowed_sky())
+
+
+@pytest.mark.parametrize(("bounces", "away", "everywhere"), [(1, 38, 32), (3, 34, 30)], ids=["direct", "indirect"])
+def test_cached_shading_equals_path_tracing(comparison, bounces, away, everywhere):
+    assert comparison.surface.mean() > 0.95
+    assert comparison.away.mean() > 0.5
+    measured = comparison.decibels(bounces, spp=144)
+    assert measured[0] >= away
+    assert measured[1] >= everywhere
+
+
+def test_cached_shading_has_no_bias(comparison):
+    reference = comparison.path.render(spp=144, seed=3, max_depth=2)
+    ratio = comparison.cached(1)[comparison.away].mean() / reference[comparison.away].mean()
+    assert ratio == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize("max_depth", [2, 4], ids=["direct", "indirect"])
+def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
+    cosines = gradient_cosines(comparison, max_depth, spp=64)
+    assert min(cosines) >= 0.95, cosines
+
+
+def gradient_cosines(c: Comparison, max_depth: int, *, spp: int) -> list[float]:
+    """Cosines of the gradients of L1 + L2 in albedo, roughness and metallic, noise of the reference taken out."""
+    c.path.set_materials(c.materials)
+    target = torch.from_numpy(c.path.render(spp=4 * spp, seed=7, max_depth=max_depth))
+    # Darker all over: where a rendering meets the photo, the gradient of L1 is a coin toss in both.
+    start = replace(
+        c.materials, albedo=c.materials.albedo * 0.6, roughness=np.clip(c.materials.roughness + 0.15, 0, 1),
+        metallic=c.materials.metallic * 0.6 + 0.2,
+    )  # fmt: skip
+    c.path.set_materials(start)
+    image = torch.from_numpy(c.path.render(spp=4 * spp, seed=9, max_depth=max_depth)).requires_grad_()
+    weight = torch.autograd.grad(l1_l2(image - target), image)[0]
+    leaves = [t.requires_grad_() for t in _tensors(start)]
+    light = torch.from_numpy(c.envmap)
+    first, second = (
+        torch.autograd.grad(
+            (weight * c.path.render_torch(*leaves, light, spp=spp, seed=s, max_depth=max_depth)).sum(), leaves
+        )
+        for s in (11, 21)
+    )
+    c.path.set_materials(c.materials)
+    cached = torch.autograd.grad(l1_l2(c.shaded(leaves, max_depth - 1) - target), leaves)
+    return [
+        # The reference's own noise has mean zero in first . second, so this is the cosine with its expectation.
+        float((g * (a + b)).sum() / 2 / (g.norm() * (a * b).sum().sqrt()))
+        for g, a, b in zip(cached, first, second)
+    ]
+
+
+@pytest.fixture(scope="module")
+def photograph():
+    """The published materials and light of a real photograph, at full size."""
+    if not OFFICIAL.is_dir():
+        pytest.skip(f"{OFFICIAL} is not there")
+    depth, normal = _exr("maps/depth")[..., 0], _exr("maps/normal")
+    camera = Camera(depth.shape[1], depth.shape[0], 35.0)
+    albedo, rest = _exr("official/albedo"), [_exr(f"official/{k}")[..., 0] for k in ("roughness", "metallic")]
+    materials = Materials(*(np.clip(m, 0, 1) for m in (albedo, *rest)))
+    envmap = np.maximum(_exr("official/envmap"), 0)
+    return Comparison(camera, build_geometry(depth, normal, camera), materials, envmap)
+
+
+def _exr(name: str):
+    image = read_exr(OFFICIAL / f"{name}.exr")
+    return np.ascontiguousarray(image.reshape(*image.shape[:2], -1), np.float32)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bounces", "away", "everywhere"), [(1, 38, 32), (3, 34, 30)], ids=["direct", "indirect"])
+def test_cached_shading_equals_path_tracing_on_a_photograph(photograph, bounces, away, everywhere):
+    measured = photograph.decibels(bounces, spp=36)
+    assert measured[0] >= away
+    assert measured[1] >= everywhere
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("max_depth", [2, 4], ids=["direct", "indirect"])
+def test_cached_gradients_on_a_photograph(photograph, max_depth):
+    cosines = gradient_cosines(photograph, max_depth, spp=16)
+    assert min(cosines) >= 0.95, cosines
