@@ -164,7 +164,7 @@ def setup(device: str = "auto"):
 
     current = mi.variant()
     if device == "auto":
-        running = {variant: name for name, variant in _VARIANTS.items()}.get(current)
+        running = {variant: name for name, variant in _VARIANTS.items()}.get(current or "")
         device = running or ("cuda" if cuda_usable() else "cpu")
     wanted = _VARIANTS[device]
     if current != wanted:
