@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.types import Array, FitReport, Materials, Photo, Prediction, Scene
+from materialist.types import Array, FitReport, Geometry, Materials, Photo, Prediction, Scene
 
 FINAL_SPP = 128
 """Samples per pixel of the re-rendering that a scene is judged by."""
@@ -71,19 +72,30 @@ def invert(
     prior = overrides.get("prior") or _timed(stages, "predict", lambda: _predict(picture, predictor, seed))
     _check_mask(mask, picture)
 
-    from materialist.geometry.build import build_geometry
     from materialist.render.variant import setup
 
     setup(device)
+    from materialist.fit.inverse import Fit
+    from materialist.fit.settings import preset as named
+    from materialist.geometry.build import build_geometry
+    from materialist.render.scene import RenderScene
+
     tick("geometry", 0, 1)
     geometry = _timed(
         stages,
         "geometry",
         lambda: build_geometry(prior.depth, prior.normal, picture.camera, tau=tau, completion=completion, seed=seed),
     )
-    fit, judge = _problem(
-        picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages
+    renderer = _timed(stages, "scene", lambda: RenderScene(geometry, picture.camera, device=device))
+    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
+    judge = _judge(renderer)
+    problem = _timed(
+        stages, "engine", lambda: _engine(engine, renderer, geometry, picture, settings, envmap_size[1], seed, progress)
     )
+    fit = Fit(
+        picture, prior.materials, problem, settings, envmap_height=envmap_size[1], judge=judge, mask=mask,
+        strategy=strategy, seed=seed, progress=progress,
+    )  # fmt: skip
     state = fit.run()
     materials = fit.materials(state)
     tick("rerender", 0, 1)
@@ -118,39 +130,27 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return image
 
 
-def _problem(
-    picture, prior, geometry, engine, preset, envmap_size, mask, strategy, seed, device, progress, overrides, stages
-):
-    """The inverse problem, with its engine and its judge."""
-    from materialist.fit.engine import PathEngine, TransportEngine
-    from materialist.fit.inverse import Fit
-    from materialist.fit.settings import preset as named
-    from materialist.render.scene import RenderScene
+def _judge(renderer) -> Callable[..., Array]:
+    """The path tracer as a function (materials, envmap, spp, seed) -> [H, W, 3]."""
 
-    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
-    renderer = _timed(stages, "scene", lambda: RenderScene(geometry, picture.camera, device=device))
-
-    def judge(materials: Materials, envmap: Array, spp: int, seed: int = seed) -> Array:
+    def judge(materials: Materials, envmap: Array, spp: int, seed: int = 0) -> Array:
         renderer.set_materials(materials)
         renderer.set_envmap(envmap)
         return renderer.render(spp=spp, seed=seed)
 
-    if engine == "path":
-        pixels = np.flatnonzero(prior.depth.reshape(-1) > 0)
-        problem: Any = PathEngine(renderer, picture.camera, pixels, envmap_height=envmap_size[1], seed=seed)
-    else:
-        problem = _timed(
-            stages,
-            "trace",
-            lambda: TransportEngine(
-                geometry, picture.camera, picture.linear, seed=seed, light_height=settings.light_grid, progress=progress
-            ),
-        )
-    fit = Fit(
-        picture, prior.materials, problem, settings, envmap_height=envmap_size[1], judge=judge, mask=mask,
-        strategy=strategy, seed=seed, progress=progress,
-    )  # fmt: skip
-    return fit, judge
+    return judge
+
+
+def _engine(name: str, renderer, geometry: Geometry, picture: Photo, settings, envmap_height: int, seed: int, progress):
+    from materialist.fit.engine import PathEngine, TransportEngine
+
+    camera = picture.camera
+    if name == "path":
+        surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
+        return PathEngine(renderer, camera, surface, envmap_height=envmap_height, seed=seed)
+    return TransportEngine(
+        geometry, camera, picture.linear, seed=seed, light_height=settings.light_grid, progress=progress
+    )
 
 
 def _report(

@@ -84,7 +84,7 @@ class Mesh:
     normals: Array
     """[V, 3] float32 unit shading normals."""
     uv: Array
-    """[V, 2] float32 in [0, 1]: u to the right, v DOWN; the centre of pixel (row i, column j) is ((j+.5)/W, (i+.5)/H)."""
+    """[V, 2] float32 in [0, 1]: u to the right, v DOWN; pixel (row i, column j) is centred at ((j+.5)/W, (i+.5)/H)."""
     face_pixel: Array
     """[F] int32 row-major index of the pixel whose surface (or nearest surface) the face carries."""
     face_plane: Array
@@ -97,7 +97,7 @@ class Geometry:
 
     mesh: Mesh
     plane_label: Array
-    """[H, W] int8: plane k that the pixel lies on, -1 for none. A continued plane carries the mean material of its pixels."""
+    """[H, W] int8: plane k that the pixel lies on, -1 for none. Its continuation has the mean material of those."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class Scene:
     """[H, W] float32 planar, scene units, 0 = none."""
     geometry: Geometry
     envmap: Array
-    """[h, 2h, 3] float32 linear radiance, >= 0; centre column looks along -Z, columns to the right turn towards +X, top row is +Y."""
+    """[h, 2h, 3] float32 linear radiance, >= 0; centre column along -Z, columns to the right turn to +X, top row +Y."""
     rerender: Array
     """[H, W, 3] float32 linear: the path-traced re-rendering."""
     report: FitReport = FitReport()

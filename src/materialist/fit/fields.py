@@ -7,6 +7,7 @@ ablations. A field is a torch module; calling it gives the map or the materials.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -26,7 +27,7 @@ def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:
 def mlp(inputs: int, outputs: int, *, width: int, layers: int) -> nn.Sequential:
     """Fully connected network with `layers` hidden ReLU layers of `width`."""
     sizes = [inputs] + [width] * layers
-    hidden = [m for a, b in zip(sizes, sizes[1:]) for m in (nn.Linear(a, b), nn.ReLU())]
+    hidden = [m for a, b in pairwise(sizes) for m in (nn.Linear(a, b), nn.ReLU())]
     return nn.Sequential(*hidden, nn.Linear(width, outputs))
 
 
@@ -175,7 +176,7 @@ def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
 
 
 class Unified(nn.Module):
-    """Mask mode: roughness and metallic take one value, their mean, inside a mask (paper, Material Editing Settings)."""
+    """Mask mode: one roughness and one metallic, their means, inside a mask (paper, Material Editing Settings)."""
 
     def __init__(self, field: nn.Module, inside: torch.Tensor):
         """inside: [P] bool."""

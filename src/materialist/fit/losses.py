@@ -23,7 +23,7 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
 
 
 def residual(radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool) -> torch.Tensor:
-    """Encoded rendering minus encoded photo; with `clipped`, a rendering brighter than a clipped channel is no error."""
+    """Encoded rendering minus encoded photo; with `clipped`, no error where it outshines a clipped channel."""
     error = encode(radiance, encoding) - encode(photo, encoding)
     return torch.where(photo >= CLIPPED, error.clamp_max(0), error) if clipped else error
 

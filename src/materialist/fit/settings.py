@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, replace
 
 from materialist.errors import InputError
@@ -20,7 +21,7 @@ class LightSettings:
     encoding: Encoding = "linear"
     clipped: bool = False
     """A rendering brighter than a clipped photo channel is no error."""
-    schedule: Schedule = Schedule()
+    schedule: Schedule = dataclasses.field(default_factory=Schedule)
     refit_steps: int = 0
     """Steps of every light fit after the first; 0: the light is fitted once."""
     slack: float | None = None

@@ -35,7 +35,7 @@ class EnvmapLevel:
 
 
 class EnvmapPyramid:
-    """The map at full size and, by repeated 2 x 2 averaging, at lower ones, for lookups that stand for a solid angle."""
+    """The map at full size and, halved repeatedly, at lower ones, for lookups that stand for a solid angle."""
 
     def __init__(self, envmap: Array):
         self.maps = [np.asarray(envmap, np.float32)]
