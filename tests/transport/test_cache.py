@@ -1,0 +1,209 @@
+"""The transport tables against numerical integrals of the paper's BRDF, with and without occluders."""
+
+import numpy as np
+import pytest
+
+from materialist.geometry.build import build_geometry
+from materialist.render.brdf import diffuse_coefficients, specular_split
+from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, TransportCache
+from materialist.transport.environment import texel_directions
+from materialist.types import Camera, Geometry, Mesh
+
+CAMERA = Camera(12, 9, 60.0)
+WALL_DISTANCE, WALL_HEIGHT = 6.0, 3.0
+WALL_PIXEL = 5
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def quads(*corners, pixels, planes) -> Geometry:
+    """One quad for each [4, 3] of corners, counter-clockwise seen from its bright side."""
+    corners = np.asarray(corners, np.float32)  # [Q, 4, 3]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    faces = np.concatenate(
+        [[[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]] for q in range(len(corners))]
+    )
+    mesh = Mesh(
+        vertices=corners.reshape(-1, 3), faces=faces.astype(np.int32),
+        normals=np.repeat(normal, 4, 0).astype(np.float32), uv=np.zeros((4 * len(corners), 2), np.float32),
+        face_pixel=np.repeat(pixels, 2).astype(np.int32), face_plane=np.repeat(planes, 2).astype(np.int16),
+    )  # fmt: skip
+    return Geometry(mesh, np.full((CAMERA.height, CAMERA.width), -1, np.int8))
+
+
+def floor(size: float = 400.0):
+    """Corners of the plane y = -1."""
+    return [[-size, -1, size], [size, -1, size], [size, -1, -size], [-size, -1, -size]]
+
+
+def wall(size: float = 400.0):
+    """Corners of a long wall that stands on the floor, before the camera."""
+    low, high, z = -1.0, WALL_HEIGHT - 1, -WALL_DISTANCE
+    return [[-size, low, z], [size, low, z], [size, high, z], [-size, high, z]]
+
+
+@pytest.fixture(scope="module")
+def open_floor():
+    return TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA, diffuse_samples=1024, specular_samples=1024)
+
+
+@pytest.fixture(scope="module")
+def walled_floor():
+    return TransportCache(
+        quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1]),
+        CAMERA,
+        diffuse_samples=4096,
+        specular_samples=16,
+    )
+
+
+def hemisphere(rows: int = 400):
+    """Midpoint directions of the hemisphere above +Y [N, 3], and their cosine-weighted solid angles [N]."""
+    theta, phi = np.meshgrid((np.arange(rows) + 0.5) / rows * np.pi / 2, (np.arange(2 * rows) + 0.5) / rows * np.pi)
+    d = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1).reshape(-1, 3)
+    weight = np.cos(theta) * np.sin(theta) * (np.pi / 2 / rows) * (np.pi / rows)
+    return d, weight.ravel()
+
+
+def floor_rows(cache):
+    """Some rows of the tables, on the floor: index, position [3], direction to the camera [3]."""
+    position = np.array(cache.position).T
+    on_floor = np.flatnonzero((np.abs(position[:, 1] + 1) < 1e-3) & (position[:, 2] > -WALL_DISTANCE + 0.3))
+    for row in on_floor[:: max(1, len(on_floor) // 5)]:
+        p = position[row].astype(np.float64)
+        yield row, p, -p / np.linalg.norm(p)
+
+
+def constant(value: float, height: int = 16):
+    return np.full((height, 2 * height, 3), value, np.float32)
+
+
+def test_pixels_of_the_sky_have_no_row(open_floor):
+    """The horizon is in the middle of the picture: rays are 0.05 pixels below the centres of row 4 of 9."""
+    np.testing.assert_array_equal(open_floor.pixels, np.arange(4 * 12, 9 * 12))
+    image = open_floor.image(np.ones((len(open_floor.pixels), 2)), fill=-1)
+    assert image.shape == (9, 12, 2)
+    assert (image[:4] == -1).all() and (image[4:] == 1).all()
+
+
+def test_open_plane_under_constant_light_has_the_analytic_diffuse_lobe(open_floor):
+    tables = open_floor.gather(constant(2.0), None)
+    d, weight = hemisphere()
+    for row, _, wo in floor_rows(open_floor):
+        expected = 2 * (diffuse_coefficients(UP, d, wo) * weight[:, None]).sum(0) / np.pi
+        np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 1], expected, rtol=2e-3, atol=2e-3)
+
+
+def test_matte_white_looked_at_from_above_is_a_furnace():
+    """D0 + R D1 + R^2 D2 in closed form for wo = n: F_d(wo) = 1 and (h.n)^2 = (1 + cos) / 2."""
+    camera = Camera(9, 9, 2.0)
+    geometry = build_geometry(np.full((9, 9), 2.0, np.float32), _facing(9), camera, completion="none")
+    cache = TransportCache(geometry, camera, diffuse_samples=1024, specular_samples=16)
+    d = cache.gather(constant(1.0), None).diffuse[40].reshape(3, 3)[:, 0]
+    # 1 + (R (1 + c) - 1/2) (1 - c)^5 against 2 c dc: Beta integrals 2 B(2, 6) = 1/21 and 2 B(3, 6) = 1/84.
+    assert d[0] == pytest.approx(1 - 0.5 / 21, abs=1e-3)
+    assert d[1] == pytest.approx(1 / 21 + 1 / 84, abs=1e-3)
+    assert d[2] == pytest.approx(0, abs=1e-3)
+
+
+def _facing(size: int):
+    return np.broadcast_to(np.array([0, 0, 1], np.float32), (size, size, 3)).copy()
+
+
+@pytest.mark.parametrize("level", [2, 4, 6, 7])
+def test_open_plane_under_constant_light_has_the_analytic_specular_lobe(open_floor, level):
+    tables = open_floor.gather(constant(1.0), None)
+    d, weight = hemisphere(500)
+    for row, _, wo in floor_rows(open_floor):
+        if wo[1] < 0.15:
+            continue  # the grid of the reference is too coarse at grazing angles
+        s0, s1 = specular_split(np.full(len(d), ROUGHNESS_LEVELS[level]), UP, d, wo)
+        measured = tables.specular[level, row].reshape(2, 3)[:, 0].numpy()
+        np.testing.assert_allclose(measured, [(s0 * weight).sum(), (s1 * weight).sum()], atol=6e-3)
+        assert measured.sum() <= 1 + 1e-3
+
+
+def test_sharpest_level_is_a_mirror(open_floor):
+    """S0 + S1 of the smallest roughness is the light from the mirrored direction."""
+    height = 64
+    envmap = (texel_directions(height, 2 * height) + 1.5).astype(np.float32)
+    tables = open_floor.gather(envmap, None)
+    for row, _, wo in floor_rows(open_floor):
+        mirrored = 2 * wo[1] * UP - wo
+        both = tables.specular[0, row].reshape(2, 3).sum(0)
+        np.testing.assert_allclose(both, mirrored + 1.5, atol=0.02)
+
+
+def test_wall_hides_the_light_behind_it(walled_floor):
+    """Light from the side of the wall alone; what the wall leaves of it is a form factor in closed form."""
+    height = 128
+    directions = texel_directions(height, 2 * height)
+    envmap = np.repeat(directions[..., 2:] < 0, 3, -1).astype(np.float32)
+    tables = walled_floor.gather(envmap, None)
+    d, weight = hemisphere()
+    for row, p, wo in floor_rows(walled_floor):
+        seen = (d[:, 2] < 0) & ~_meets_wall(p, d)
+        gap = WALL_DISTANCE + p[2]
+        closed_form = 0.5 * gap / np.hypot(gap, WALL_HEIGHT)  # strip of infinite length beside a horizontal element
+        assert (seen * weight).sum() / np.pi == pytest.approx(closed_form, abs=2e-3)
+        expected = (diffuse_coefficients(UP, d, wo) * (seen * weight)[:, None]).sum(0) / np.pi
+        np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 0], expected, atol=6e-3)
+
+
+def test_wall_sends_the_radiance_of_its_pixel(walled_floor):
+    radiance = np.zeros((CAMERA.height, CAMERA.width, 3), np.float32)
+    radiance.reshape(-1, 3)[WALL_PIXEL] = (3.0, 2.0, 1.0)
+    tables = walled_floor.gather(constant(0.0), radiance)
+    d, weight = hemisphere()
+    for row, p, wo in floor_rows(walled_floor):
+        expected = (diffuse_coefficients(UP, d, wo) * (_meets_wall(p, d) * weight)[:, None]).sum(0) / np.pi
+        measured = tables.diffuse[row].reshape(3, 3).numpy()
+        np.testing.assert_allclose(measured, expected[:, None] * [3, 2, 1], atol=1.5e-2)
+
+
+def _meets_wall(p, d):
+    """Whether rays from p [3] along d [N, 3] meet the wall, taken as endless."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (-WALL_DISTANCE - p[2]) / d[:, 2]
+        y = p[1] + t * d[:, 1]
+    return (d[:, 2] < 0) & (y < WALL_HEIGHT - 1)
+
+
+def test_continued_planes_have_slots_of_their_own():
+    cache = TransportCache(
+        quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, 0]), CAMERA, diffuse_samples=64, specular_samples=4
+    )
+    size = CAMERA.width * CAMERA.height
+    np.testing.assert_array_equal(cache.slots, [0, 0, size, size + 1])
+    radiance = np.random.default_rng(0).random((CAMERA.height, CAMERA.width, 3)).astype(np.float32)
+    slots = cache.slot_radiance(radiance)
+    np.testing.assert_array_equal(slots[:size], radiance.reshape(-1, 3))
+    np.testing.assert_array_equal(slots[size:], radiance.reshape(-1, 3)[[WALL_PIXEL, WALL_PIXEL]])
+    assert not cache.slot_radiance(None).any()
+    hits = np.array(cache._hits[0])
+    assert set(np.unique(hits)) <= {0, size, size + 1, MISS}
+
+
+def test_equal_seeds_give_equal_tables():
+    geometry = quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1])
+    rng = np.random.default_rng(1)
+    envmap, radiance = rng.random((16, 32, 3)), rng.random((CAMERA.height, CAMERA.width, 3))
+    first, again, other = (TransportCache(geometry, CAMERA, seed=s).gather(envmap, radiance) for s in (4, 4, 5))
+    assert first.diffuse.equal(again.diffuse) and first.specular.equal(again.specular)
+    assert not first.diffuse.equal(other.diffuse)
+
+
+def test_light_is_linear(walled_floor):
+    rng = np.random.default_rng(2)
+    a, b = (rng.random((16, 32, 3)).astype(np.float32) for _ in range(2))
+    tables = [walled_floor.gather(e, None).specular for e in (a, b, 2 * a + 3 * b)]
+    np.testing.assert_allclose(tables[2], 2 * tables[0] + 3 * tables[1], rtol=1e-4, atol=1e-5)
+
+
+def test_progress_counts_every_lobe():
+    told = []
+    TransportCache(
+        quads(floor(), pixels=[0], planes=[-1]), CAMERA, diffuse_samples=4, specular_samples=4,
+        progress=lambda *a: told.append(a),
+    )  # fmt: skip
+    assert told == [("trace", k, 9) for k in range(1, 10)]

@@ -1,0 +1,97 @@
+"""The joint filter: it smooths along a surface and nowhere else."""
+
+import numpy as np
+import torch
+from transport_scenes import furnished_room, windowed_sky
+
+from materialist.fit.engine import TransportEngine
+from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
+from materialist.transport.filter import Guide, filter_tables, guide_weights, joint_filter
+
+H, W = 12, 10
+
+
+def flat_guide() -> Guide:
+    """A plane that faces the camera, a pixel one unit wide."""
+    ys, xs = torch.meshgrid(torch.arange(H).float(), torch.arange(W).float(), indexing="ij")
+    position = torch.stack([xs, -ys, torch.full((H, W), -5.0)], -1)
+    return Guide(position, torch.tensor([0.0, 0, 1]).expand(H, W, 3).clone(), torch.ones(H, W))
+
+
+def folded_guide() -> Guide:
+    """Columns from 5 on face another way."""
+    guide = flat_guide()
+    guide.normal[:, 5:] = torch.tensor([1.0, 0, 0])
+    return guide
+
+
+def noise(channels: int = 2):
+    return torch.rand(H, W, channels, generator=torch.Generator().manual_seed(0))
+
+
+def test_constants_stay():
+    grey = torch.full((H, W, 2), 0.7)
+    for guide in (flat_guide(), folded_guide()):
+        for step in (1, 3):
+            torch.testing.assert_close(joint_filter(grey, guide, step=step), grey)
+
+
+def test_plane_gets_the_plain_box_average():
+    """Inside, the filter equals a 5 x 5 average with half weight on the rim."""
+    values, tap = noise(1), np.array([0.5, 1, 1, 1, 0.5]) / 4
+    expected = np.zeros((H, W))
+    for i in range(2, H - 2):
+        for j in range(2, W - 2):
+            expected[i, j] = (values[i - 2 : i + 3, j - 2 : j + 3, 0].numpy() * np.outer(tap, tap)).sum()
+    filtered = joint_filter(values, flat_guide())[..., 0].numpy()
+    np.testing.assert_allclose(filtered[2:-2, 2:-2], expected[2:-2, 2:-2], rtol=1e-5)
+
+
+def test_nothing_crosses_a_fold():
+    values = torch.zeros(H, W, 1)
+    values[:, 5:] = 1
+    torch.testing.assert_close(joint_filter(values, folded_guide()), values)
+    assert float(joint_filter(values, flat_guide())[:, 4].min()) > 0.2  # without the fold it does
+
+
+def test_nothing_crosses_a_step_in_depth():
+    guide = flat_guide()
+    guide.position[:, 5:, 2] -= 40
+    values = torch.zeros(H, W, 1)
+    values[:, 5:] = 1
+    torch.testing.assert_close(joint_filter(values, guide), values)
+
+
+def test_weights_end_at_the_frame():
+    weight = guide_weights(flat_guide(), 1, -2, 32.0)
+    assert not weight[-1].any() and not weight[:, :2].any()
+    torch.testing.assert_close(weight[:-1, 2:], torch.ones(H - 1, W - 2))
+
+
+def test_pixels_without_a_surface_give_nothing():
+    guide = flat_guide()
+    guide.normal[3, 3] = 0
+    values = noise(1)
+    poisoned = values.clone()
+    poisoned[3, 3] = 1e6
+    smooth, other = joint_filter(values, guide), joint_filter(poisoned, guide)
+    keep = torch.ones(H, W, dtype=torch.bool)
+    keep[3, 3] = False
+    torch.testing.assert_close(smooth[keep], other[keep])
+
+
+def test_sharp_levels_are_left_alone_and_noise_falls():
+    """Filtered tables come closer to tables with sixteen times the samples."""
+    camera, geometry, _ = furnished_room(64)
+    black = np.zeros((camera.height, camera.width, 3), np.float32)
+    engines = [
+        TransportEngine(geometry, camera, black, diffuse_samples=16 * k, specular_samples=8 * k) for k in (1, 16)
+    ]
+    envmap = windowed_sky()
+    raw, reference = (e.cache.gather(envmap, None) for e in engines)
+    smooth = filter_tables(engines[0].cache, raw, engines[0].guide)
+    assert isinstance(smooth, Tables)
+    for k, level in enumerate(ROUGHNESS_LEVELS):
+        assert smooth.specular[k].equal(raw.specular[k]) == (level < 0.2)
+    error = lambda t: float((t.diffuse[:, :3] - reference.diffuse[:, :3]).square().median())  # noqa: E731
+    assert error(smooth) < 0.3 * error(raw)

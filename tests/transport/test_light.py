@@ -1,0 +1,89 @@
+"""The light matrix against gathering and shading, pixel by pixel."""
+
+import numpy as np
+import pytest
+import torch
+from transport_scenes import furnished_room, windowed_sky
+
+from materialist.transport.cache import TransportCache
+from materialist.transport.light import light_matrix
+from materialist.transport.shading import shade
+
+HEIGHT = 16
+
+
+@pytest.fixture(scope="module")
+def both():
+    """A cache with many samples, the rows compared, their materials, and the matrix of these rows."""
+    camera, geometry, materials = furnished_room(48)
+    cache = TransportCache(geometry, camera, diffuse_samples=256, specular_samples=128)
+    rows = np.arange(3, len(cache.pixels), 7)
+    return cache, rows, materials, light_matrix(cache, materials, rows, HEIGHT)
+
+
+def shaded(both, envmap, radiance):
+    cache, rows, materials, _ = both
+    pixels = cache.pixels
+    a, r, m = (
+        torch.from_numpy(x.reshape(materials.roughness.size, -1)[pixels])
+        for x in (materials.albedo, materials.roughness, materials.metallic)
+    )
+    return shade(cache.gather(envmap, radiance), a, r[:, 0], m[:, 0])[rows]
+
+
+def relative_error(a, b):
+    return float((a - b).norm() / b.norm())
+
+
+def test_matrix_times_light_is_gather_and_shade(both):
+    envmap = windowed_sky(HEIGHT)
+    matrix = both[3]
+    direct = matrix.combine(matrix.direct(torch.from_numpy(envmap).reshape(-1, 3)))
+    reference = shaded(both, envmap, None)
+    assert relative_error(direct, reference) < 0.02
+    assert float(direct.mean() / reference.mean()) == pytest.approx(1, abs=0.006)
+    # The comparison can fail: a light turned by a quarter is far outside it.
+    turned = torch.from_numpy(np.roll(envmap, HEIGHT // 2, 1)).reshape(-1, 3)
+    assert relative_error(matrix.combine(matrix.direct(turned)), reference) > 0.1
+
+
+def test_matrix_sums_what_surfaces_send(both):
+    cache, _, materials, matrix = both
+    radiance = materials.albedo * np.linspace(0.2, 2, materials.albedo.shape[1], dtype=np.float32)[None, :, None]
+    black = np.zeros((HEIGHT, 2 * HEIGHT, 3), np.float32)
+    indirect = matrix.combine(matrix.indirect(torch.from_numpy(cache.slot_radiance(radiance))))
+    reference = shaded(both, black, radiance)
+    assert relative_error(indirect, reference) < 0.04
+    assert float(indirect.mean() / reference.mean()) == pytest.approx(1, abs=0.01)
+
+
+def test_direct_light_is_linear_and_differentiable(both):
+    matrix, rng = both[3], torch.Generator().manual_seed(0)
+    a, b = (torch.rand(2 * HEIGHT**2, 3, generator=rng) for _ in range(2))
+    torch.testing.assert_close(matrix.direct(2 * a + b), 2 * matrix.direct(a) + matrix.direct(b), rtol=1e-4, atol=1e-5)
+    envmap = a.clone().requires_grad_()
+    (gradient,) = torch.autograd.grad(matrix.direct(envmap)[0, 5, 1], envmap)
+    torch.testing.assert_close(gradient[:, 1], matrix.lobes[0][5])
+    assert not gradient[:, [0, 2]].any()
+
+
+def test_another_albedo_changes_the_albedo_alone(both):
+    """Light of the lobes 1, 0, 0 then 0, 1, 0: A (1 - M) and C_0 = 0.04 (1 - M) + M A."""
+    matrix = both[3]
+    albedo = torch.rand(matrix.albedo.shape, generator=torch.Generator().manual_seed(1))
+    light = torch.zeros(3, len(albedo), 3)
+    light[0] = 1
+    torch.testing.assert_close(matrix.combine(light, albedo), albedo * (1 - matrix.metallic))
+    light = light.roll(1, 0)
+    expected = 0.04 * (1 - matrix.metallic) + matrix.metallic * albedo
+    torch.testing.assert_close(matrix.combine(light, albedo), expected)
+
+
+def test_every_ray_either_leaves_or_meets_a_surface(both):
+    """In a furnace, where surfaces send what the sky sends, each pixel shows what the tables say, nearly without noise."""
+    cache, _, materials, matrix = both
+    light = np.ones((HEIGHT, 2 * HEIGHT, 3), np.float32)
+    surfaces = np.ones_like(materials.albedo)
+    direct = matrix.direct(torch.from_numpy(light).reshape(-1, 3))
+    indirect = matrix.indirect(torch.from_numpy(cache.slot_radiance(surfaces)))
+    torch.testing.assert_close(matrix.combine(direct + indirect), shaded(both, light, surfaces), rtol=0.03, atol=0.01)

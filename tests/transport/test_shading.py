@@ -1,0 +1,70 @@
+"""Shading from tables against a loop over pixels, and its gradients against finite differences."""
+
+import numpy as np
+import pytest
+import torch
+
+from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
+from materialist.transport.shading import shade, specular_at
+
+P = 6
+
+
+@pytest.fixture
+def tables():
+    generator = torch.Generator().manual_seed(3)
+    draw = lambda *shape: torch.rand(*shape, generator=generator, dtype=torch.float64)  # noqa: E731
+    return Tables(draw(P, 9), draw(len(ROUGHNESS_LEVELS), P, 6))
+
+
+def draw_materials():
+    generator = torch.Generator().manual_seed(4)
+    albedo = torch.rand(P, 3, generator=generator, dtype=torch.float64)
+    roughness = torch.tensor([0.05, 0.15, 0.25, 0.5, 0.77, 0.95], dtype=torch.float64)
+    return albedo, roughness, torch.rand(P, generator=generator, dtype=torch.float64)
+
+
+def slow_twin(tables, albedo, roughness, metallic):
+    """A (1 - M) (D0 + D1 R + D2 R^2) + C_0 S0(R) + S1(R), a pixel and a channel at a time."""
+    out = np.zeros((P, 3))
+    for p in range(P):
+        r, m = float(roughness[p]), float(metallic[p])
+        for c in range(3):
+            d = [float(tables.diffuse[p, 3 * k + c]) for k in range(3)]
+            s = [np.interp(r, ROUGHNESS_LEVELS, tables.specular[:, p, 3 * k + c].numpy()) for k in range(2)]
+            a = float(albedo[p, c])
+            base = 0.04 * (1 - m) + m * a
+            out[p, c] = a * (1 - m) * (d[0] + d[1] * r + d[2] * r * r) + base * s[0] + s[1]
+    return out
+
+
+def test_shading_equals_the_slow_twin(tables):
+    materials = draw_materials()
+    np.testing.assert_allclose(shade(tables, *materials).numpy(), slow_twin(tables, *materials), rtol=1e-7)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.03, 1.0])
+def test_roughness_beyond_the_levels_is_held(tables, roughness):
+    level = 0 if roughness < 0.5 else -1
+    at = specular_at(tables, torch.full((P,), roughness, dtype=torch.float64))
+    torch.testing.assert_close(at, tables.specular[level])
+
+
+def test_levels_are_met_exactly(tables):
+    for k, level in enumerate(ROUGHNESS_LEVELS):
+        at = specular_at(tables, torch.full((P,), level, dtype=torch.float64))
+        torch.testing.assert_close(at, tables.specular[k], rtol=1e-6, atol=1e-7)
+
+
+def test_gradients_are_those_of_finite_differences(tables):
+    leaves = [x.clone().requires_grad_() for x in draw_materials()]
+    assert torch.autograd.gradcheck(lambda *m: shade(tables, *m), leaves, eps=1e-6, atol=1e-6)
+
+
+def test_black_dielectric_keeps_its_reflection_and_metal_has_no_diffuse(tables):
+    albedo, roughness, _ = draw_materials()
+    s0, s1 = specular_at(tables, roughness).split(3, -1)
+    black = shade(tables, torch.zeros_like(albedo), roughness, torch.zeros_like(roughness))
+    torch.testing.assert_close(black, 0.04 * s0 + s1)
+    metal = shade(tables, albedo, roughness, torch.ones_like(roughness))
+    torch.testing.assert_close(metal, albedo * s0 + s1)
