@@ -89,17 +89,17 @@ def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
     assert min(cosines) >= 0.95, cosines
 
 
-def gradient_cosines(c: Comparison, max_depth: int, *, spp: int) -> list[float]:
+def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int = 256) -> list[float]:
     """Cosines of the gradients of L1 + L2 in albedo, roughness and metallic, noise of the reference taken out."""
     c.path.set_materials(c.materials)
-    target = torch.from_numpy(c.path.render(spp=4 * spp, seed=7, max_depth=max_depth))
+    target = torch.from_numpy(c.path.render(spp=image_spp, seed=7, max_depth=max_depth))
     # Darker all over: where a rendering meets the photo, the gradient of L1 is a coin toss in both.
     start = replace(
         c.materials, albedo=c.materials.albedo * 0.6, roughness=np.clip(c.materials.roughness + 0.15, 0, 1),
         metallic=c.materials.metallic * 0.6 + 0.2,
     )  # fmt: skip
     c.path.set_materials(start)
-    image = torch.from_numpy(c.path.render(spp=4 * spp, seed=9, max_depth=max_depth)).requires_grad_()
+    image = torch.from_numpy(c.path.render(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
     weight = torch.autograd.grad(l1_l2(image - target), image)[0]
     leaves = [t.requires_grad_() for t in _tensors(start)]
     light = torch.from_numpy(c.envmap)

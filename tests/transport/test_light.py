@@ -80,7 +80,7 @@ def test_another_albedo_changes_the_albedo_alone(both):
 
 
 def test_every_ray_either_leaves_or_meets_a_surface(both):
-    """In a furnace, where surfaces send what the sky sends, each pixel shows what the tables say, nearly without noise."""
+    """In a furnace, where surfaces send what the sky sends both agree almost without noise."""
     cache, _, materials, matrix = both
     light = np.ones((HEIGHT, 2 * HEIGHT, 3), np.float32)
     surfaces = np.ones_like(materials.albedo)

@@ -1,0 +1,139 @@
+"""What the optimiser moves: encodings, continuity, starting points and shapes."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from materialist.fit.fields import (
+    EnvmapMLP,
+    EnvmapSH,
+    EnvmapTexels,
+    MaterialMaps,
+    MaterialMLP,
+    MaterialUNet,
+    Unified,
+    positional_encoding,
+    resize_envmap,
+    sh_basis,
+)
+from materialist.transport.environment import row_solid_angle, texel_directions
+
+
+def prior_maps(count: int, seed: int = 0):
+    """[P, 5] in [0.1, 0.9]."""
+    return 0.1 + 0.8 * torch.rand(count, 5, generator=torch.Generator().manual_seed(seed))
+
+
+def test_positional_encoding_is_sines_then_cosines():
+    x = torch.tensor([[0.25, -0.5]])
+    expected = [math.sin(2**k * math.pi * v) for k in range(3) for v in (0.25, -0.5)]
+    expected += [math.cos(2**k * math.pi * v) for k in range(3) for v in (0.25, -0.5)]
+    torch.testing.assert_close(positional_encoding(x, 3), torch.tensor([expected]))
+
+
+def seam(envmap) -> float:
+    """How much larger the step from the last column to the first is than the largest step between columns."""
+    steps = (envmap[:, 1:] - envmap[:, :-1]).abs().max()
+    return float((envmap[:, 0] - envmap[:, -1]).abs().max() / steps)
+
+
+def test_direction_field_is_continuous_where_the_map_is_sewn():
+    torch.manual_seed(3)
+    sphere, sheet = EnvmapMLP(), EnvmapMLP(coordinates="uv")
+    assert sphere.net[0].in_features == 2 * 4 * 3 and sheet.net[0].in_features == 2 * 4 * 2
+    with torch.no_grad():
+        envmap, flat = sphere(48), sheet(48)
+    assert envmap.shape == (48, 96, 3)
+    assert float(envmap.min()) >= 0
+    assert seam(envmap) < 1.2
+    # Near a pole all columns look nearly the same way; on the sheet they do not.
+    assert float(envmap[0].std(0).max()) < 0.3 * float(flat[0].std(0).max())
+
+
+def test_jittered_lookups_average_to_the_map():
+    torch.manual_seed(0)
+    field = EnvmapMLP()
+    generator = torch.Generator().manual_seed(1)
+    with torch.no_grad():
+        jittered = torch.stack([field(16, generator) for _ in range(32)])
+        assert float((jittered[0] - jittered[1]).abs().max()) > 0
+        torch.testing.assert_close(jittered.mean(0), resize_envmap(field(48), 16), atol=0.02, rtol=0.05)
+
+
+def test_texels_start_where_they_are_told():
+    start = torch.rand(8, 16, 3) + 0.1
+    torch.testing.assert_close(EnvmapTexels(start)(8), start)
+    assert float(EnvmapTexels(torch.zeros(8, 16, 3))(8).min()) > 0
+
+
+def test_spherical_harmonics_are_orthonormal_and_the_known_ones():
+    d = texel_directions(128, 256)
+    basis = sh_basis(d, 3).numpy()
+    weight = np.broadcast_to(row_solid_angle(128)[:, None], d.shape[:2])
+    gram = np.einsum("ijk,ijl,ij->kl", basis, basis, weight)
+    np.testing.assert_allclose(gram, np.eye(16), atol=2e-3)
+    c1, c2 = math.sqrt(3 / (4 * math.pi)), math.sqrt(5 / (16 * math.pi))
+    np.testing.assert_allclose(basis[..., 0], math.sqrt(1 / (4 * math.pi)), rtol=1e-5)
+    np.testing.assert_allclose(basis[..., 2], c1 * d[..., 1], atol=1e-5)
+    for column, axis in ((1, 0), (3, 2)):  # the sign is a convention
+        np.testing.assert_allclose(np.abs(basis[..., column]), c1 * np.abs(d[..., axis]), atol=1e-5)
+    np.testing.assert_allclose(basis[..., 6], c2 * (3 * d[..., 1] ** 2 - 1), atol=1e-5)
+
+
+def test_harmonics_field_starts_even_and_grey():
+    torch.testing.assert_close(EnvmapSH()(8).detach(), torch.full((8, 16, 3), math.log(2)))
+
+
+def test_resizing_to_the_same_size_changes_nothing():
+    envmap = torch.rand(16, 32, 3)
+    assert resize_envmap(envmap, 16) is envmap
+
+
+@pytest.mark.parametrize("height", [4, 8, 16, 32, 48, 80])
+def test_resizing_keeps_the_shape_and_the_mean(height):
+    envmap = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(0))
+    resized = resize_envmap(envmap, height)
+    assert resized.shape == (height, 2 * height, 3)
+    torch.testing.assert_close(resized.mean((0, 1)), envmap.mean((0, 1)), rtol=0.01, atol=0.01)
+    assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(envmap.max())
+
+
+def test_enlarging_wraps_in_azimuth():
+    envmap = torch.zeros(8, 16, 3)
+    envmap[:, 0] = 1
+    large = resize_envmap(envmap, 32)
+    torch.testing.assert_close(large[:, 0], large[:, 3])  # the bright column is symmetric about its centre
+    assert float(large[10, -1, 0]) == pytest.approx(0.375)  # 5/8 of a texel from it, across the seam
+
+
+def test_material_network_starts_exactly_at_the_prior():
+    prior = prior_maps(40)
+    assert MaterialMLP(prior)().equal(prior)
+    assert MaterialMaps(prior)().equal(prior)
+    # ... and both its weights and zeta have somewhere to go.
+    field = MaterialMLP(prior)
+    torch.nn.init.normal_(field.net[-1].weight, generator=torch.Generator().manual_seed(0))
+    change = (field() - prior).abs()
+    assert 0 < float(change.max()) <= float(field.zeta.detach()) + 1e-6
+    assert field.zeta.requires_grad
+
+
+@pytest.mark.parametrize(("height", "width"), [(8, 8), (7, 10), (5, 13)])
+def test_unet_takes_any_size_and_starts_at_the_prior(height, width):
+    pixels = torch.arange(height * width)[::2]
+    prior = prior_maps(len(pixels))
+    field = MaterialUNet(prior, pixels, height, width, channels=4)
+    assert field().shape == (len(pixels), 5)
+    torch.testing.assert_close(field(), prior)
+    field().square().sum().backward()
+    assert any(p.grad is not None and p.grad.abs().max() > 0 for p in field.parameters())
+
+
+def test_unified_roughness_and_metallic_are_one_value_in_the_mask():
+    prior, inside = prior_maps(20), torch.arange(20) < 7
+    maps = Unified(MaterialMaps(prior), inside)()
+    torch.testing.assert_close(maps[:7, 3:], prior[:7, 3:].mean(0).expand(7, 2))
+    assert maps[:, :3].equal(prior[:, :3])
+    assert maps[7:].equal(prior[7:])

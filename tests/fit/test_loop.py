@@ -1,0 +1,76 @@
+"""The optimisation loop: step sizes, early stopping, progress."""
+
+import pytest
+import torch
+
+from materialist.fit.loop import Schedule, StageResult, optimise
+
+
+def run(losses, schedule, **options) -> StageResult:
+    """A loop whose loss takes the given values, whatever the parameter does."""
+    parameter = torch.nn.Parameter(torch.zeros(1))
+    return optimise("test", [parameter], lambda step: losses(step) + 0 * parameter.sum(), schedule, **options)
+
+
+def test_learning_rate_falls_in_steps():
+    """Under a constant gradient Adam moves by the learning rate."""
+    parameter, seen = torch.nn.Parameter(torch.zeros(1)), []
+    optimise(
+        "test", [parameter], lambda _: -parameter.sum(),
+        Schedule(learning_rate=0.1, max_steps=7, decay_every=3, decay=0.5, patience=0),
+        after_step=lambda: seen.append(parameter.item()),
+    )  # fmt: skip
+    moves = [b - a for a, b in zip([0.0, *seen], seen, strict=False)]
+    assert moves == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.05, 0.05, 0.025], rel=1e-4)
+
+
+def test_minimum_is_found():
+    parameter = torch.nn.Parameter(torch.tensor([3.0, -2.0]))
+    result = optimise(
+        "test", [parameter], lambda _: (parameter - 1).square().sum(),
+        Schedule(learning_rate=0.1, max_steps=300, decay_every=100, decay=0.5, patience=0),
+    )  # fmt: skip
+    torch.testing.assert_close(parameter.detach(), torch.ones(2), atol=1e-2, rtol=0)
+    assert result.losses[-1] < 1e-3 * result.losses[0]
+
+
+@pytest.mark.parametrize(("fall", "stops"), [(0.99995, True), (0.9998, False)])
+def test_stops_when_the_loss_falls_by_less_than_one_percent_in_100_steps(fall, stops):
+    """0.99995^100 is 0.5 % less, 0.9998^100 is 2 % less."""
+    result = run(lambda step: fall**step, Schedule(max_steps=500, patience=100, min_improvement=0.01))
+    assert result.steps == len(result.losses)
+    if stops:
+        assert 100 < result.steps <= 120
+    else:
+        assert result.steps == 500
+
+
+def test_stops_a_hundred_steps_after_the_fall_has_ended():
+    result = run(lambda step: max(1 - 0.01 * step, 0.3), Schedule(max_steps=500, patience=100, min_improvement=0.01))
+    assert 170 <= result.steps <= 190
+
+
+def test_noise_alone_does_not_stop_a_falling_loss():
+    torch.manual_seed(0)
+    result = run(lambda step: 0.997**step * (1 + 0.05 * torch.rand(1).item()), Schedule(max_steps=400))
+    assert result.steps == 400
+
+
+def test_patience_zero_runs_to_the_end():
+    assert run(lambda _: 1.0, Schedule(max_steps=130, patience=0)).steps == 130
+
+
+def test_progress_and_summary():
+    told = []
+    result = run(lambda step: 2.0 / (step + 1), Schedule(max_steps=4), progress=lambda *a: told.append(a))
+    assert told == [("test", k, 4) for k in (1, 2, 3, 4)]
+    summary = result.summary()
+    assert (summary["name"], summary["steps"]) == ("test", 4)
+    assert (summary["loss_first"], summary["loss_last"]) == (2.0, 0.5)
+    assert summary["loss_curve"] == [2.0, 1.0, 0.666667, 0.5]
+
+
+def test_long_curves_are_thinned():
+    curve = run(lambda step: 1000.0 - step, Schedule(max_steps=400, patience=0)).summary()["loss_curve"]
+    assert len(curve) == 50
+    assert curve[0] == 1000

@@ -1,0 +1,95 @@
+"""The paper's preset is the paper's numbers (Implementation Details)."""
+
+from dataclasses import replace
+
+import pytest
+
+from materialist.errors import InputError
+from materialist.fit.engine import PathEngine
+from materialist.fit.fields import EnvmapMLP, MaterialMLP
+from materialist.fit.light import envmap_field
+from materialist.fit.settings import DEFAULT, PAPER, LightSettings, preset
+
+PAPER_NUMBERS = {
+    "light.field": "mlp",
+    "light.height": 256,
+    "light.encoding": "linear",
+    "light.clipped": False,
+    "light.schedule.learning_rate": 1e-3,
+    "light.schedule.decay_every": 100,
+    "light.schedule.decay": 0.8,
+    "light.schedule.patience": 100,
+    "light.schedule.min_improvement": 0.01,
+    "light.schedule.max_steps": 500,
+    "light.slack": None,
+    "light.smooth": 0,
+    "light.chroma": 0,
+    "light.refit_steps": 0,
+    "materials.field": "mlp",
+    "materials.remap": True,
+    "materials.encoding": "linear",
+    "materials.clipped": False,
+    "materials.delta": 0.5,
+    "materials.weights": (1, 1, 1),
+    "materials.smooth": (0, 0, 0),
+    "materials.stages.0.targets": ("roughness", "metallic"),
+    "materials.stages.1.targets": ("albedo", "roughness", "metallic"),
+    "materials.stages.0.schedule.learning_rate": 3e-4,
+    "materials.stages.1.schedule.learning_rate": 3e-4,
+    "materials.stages.0.schedule.decay_every": 100,
+    "materials.stages.1.schedule.decay": 0.8,
+    "materials.stages.0.schedule.patience": 200,
+    "materials.stages.1.schedule.patience": 200,
+    "materials.stages.1.schedule.min_improvement": 0.005,
+    "rounds": 1,
+    "corrections": 0,
+}
+
+
+@pytest.mark.parametrize("name", PAPER_NUMBERS)
+def test_paper_preset(name):
+    value = PAPER
+    for part in name.split("."):
+        value = value[int(part)] if part.isdigit() else getattr(value, part)
+    assert value == PAPER_NUMBERS[name]
+
+
+def test_paper_has_two_material_stages():
+    assert len(PAPER.materials.stages) == 2
+
+
+def test_paper_engine_uses_64_samples():
+    import inspect
+
+    parameters = inspect.signature(PathEngine.__init__).parameters
+    assert parameters["spp"].default == 64
+    assert parameters["envmap_height"].default == 256
+
+
+@pytest.mark.parametrize(("name", "kind"), [("mlp", "direction"), ("mlp-uv", "uv")])
+def test_light_field_by_name(name, kind):
+    field = envmap_field(LightSettings(field=name))
+    assert isinstance(field, EnvmapMLP)
+    assert field.coordinates == kind
+
+
+def test_equal_seeds_make_equal_networks():
+    first, again, other = (envmap_field(PAPER.light, seed=s)(4) for s in (1, 1, 2))
+    assert first.equal(again)
+    assert not first.equal(other)
+    assert MaterialMLP.__init__.__kwdefaults__["zeta"] > 0
+
+
+def test_unknown_names_are_told():
+    with pytest.raises(InputError, match="quick"):
+        preset("quick")
+    with pytest.raises(InputError, match="cube"):
+        envmap_field(replace(DEFAULT.light, field="cube"))
+
+
+@pytest.mark.parametrize("name", ["paper", "default"])
+def test_hdr_photos_are_compared_as_log(name):
+    settings = preset(name, hdr=True)
+    assert settings.light.encoding == settings.materials.encoding == "log1p"
+    assert not settings.light.clipped and not settings.materials.clipped
+    assert preset(name) == {"paper": PAPER, "default": DEFAULT}[name]
