@@ -14,8 +14,8 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
 
     truth, camera = sample.truth, sample.photo.camera
     geometry = build_geometry(truth.depth, truth.normal, camera)
-    found = light.fit(sample, geometry, RenderScene(geometry, camera, device="cpu"), light.METHODS["default"])
-    assert found.shape == sample.envmap.shape and found.min() >= 0
+    found, steps = light.fit(sample, geometry, RenderScene(geometry, camera, device="cpu"), light.METHODS["default"])
+    assert steps > 0 and found.shape == sample.envmap.shape and found.min() >= 0
     grey = np.full_like(found, sample.envmap.mean())
     assert metrics.sh_error(found, sample.envmap) < 0.7 * metrics.sh_error(grey, sample.envmap)
     photo = sample.photo.linear

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,13 @@ NEUTRAL = 0.5
 
 NOTE = """Light fitted to synthetic photographs whose materials, geometry and light are known.
 `envmap` figures compare the fitted with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; MSE
-linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `relit` the
-depth mesh with the true materials under another light with the true picture of it. `ceiling` is the depth mesh with the
-true maps and the true light: what no fit on this mesh can beat. Seconds are those of the light fit with its ray
-tracing, without the mesh. `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps."""
+linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `mesh` the
+depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
+`ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is
+the whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o planes`: without
+the continued planes (`--completion none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the
+true maps. Seconds are those of the light fit with its ray tracing, without the mesh; for `inversion`, of all of it.
+The first sample's seconds hold the compilation of kernels that the computer has not met before."""
 
 COLUMNS = (
     Column("envmap_ssim", "envmap SSIM", "higher"),
@@ -43,6 +46,8 @@ COLUMNS = (
     Column("render_mse", "render MSE", "lower", 4),
     Column("mesh_psnr", "mesh PSNR", "higher", 2),
     Column("relit_psnr", "relit PSNR", "higher", 2),
+    Column("albedo_l1", "albedo L1", "lower"),
+    Column("steps", "steps", "", 0),
     Column("seconds", "s", "lower", 1),
 )
 
@@ -86,14 +91,17 @@ def run(
     size: int = 96,
     methods: str = "default,paper",
     completion: str = "planes",
+    relight: bool = True,
     spp: int = 256,
     seed: int = 0,
     device: str = "auto",
 ) -> Report:
     """Fit the light of scenes x views x lights samples of `size` pixels with each of the `methods`.
 
-    `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10. `completion` is that of
-    `invert`; `spp` the samples a pixel of all pictures that are compared. The report is written after every sample.
+    `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
+    begins with another light, so that small runs meet several. `completion` is that of `invert` under the methods;
+    with `relight`, whole inversions with and without the continued planes are relit. `spp` are the samples a pixel of
+    all pictures that are compared. The report is written after every row.
     """
     chosen = _methods(methods)
     from rich.console import Console
@@ -110,9 +118,12 @@ def run(
     report = Report("Light", NOTE, settings, COLUMNS, rows, plotted=("sh_error_relative", "render_psnr", "seconds"))
     indices = list(product(range(scenes), range(views), range(lights)))
     for scene, view, light in track(indices, "bench light", console=Console(stderr=True)):
-        make = lambda k: make_sample(scene, view, k, size=size, data=data, seed=seed)  # noqa: B023, E731
-        rows += _measure(make(light), make(light + 1).envmap, chosen, completion, spp, seed, device)
-        write(report, output)
+        first = scene + view + light
+        sample, other = (make_sample(scene, view, k, size=size, data=data, seed=seed) for k in (first, first + 1))
+        stage = _Stage(sample, other.envmap, spp, seed, device)
+        for row in chain(stage.relit() if relight else (), stage.fitted(chosen, completion)):
+            rows.append({**row, "sample": sample.name})
+            write(report, output)
     return report
 
 
@@ -126,45 +137,89 @@ def _methods(names: str) -> dict[str, Method]:
     return chosen
 
 
-def _measure(
-    sample: SyntheticSample, other: Array, methods: dict[str, Method], completion: str, spp: int, seed: int, device: str
-) -> Iterator[dict[str, Any]]:
-    """Rows of one sample: the ceiling, and every method; `other` is the light of the relit pictures."""
-    from materialist.geometry.build import build_geometry
-    from materialist.render.scene import RenderScene
+class _Stage:
+    """One sample, its depth meshes, and the true pictures that all rows are compared with."""
 
-    camera, truth = sample.photo.camera, sample.truth
-    geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=seed)
-    mesh = RenderScene(geometry, camera, device=device)
+    def __init__(self, sample: SyntheticSample, other: Array, spp: int, seed: int, device: str):
+        """`other` [h, 2h, 3] is the light of the relit pictures."""
+        self.sample, self.other = sample, other
+        self.spp, self.seed, self.device = spp, seed, device
+        self.photo = sample.render(sample.envmap, spp=spp, seed=seed + 2)
+        self.relit_photo = sample.render(other, spp=spp, seed=seed + 3)
+        self._meshes: dict[str, tuple[Any, Any]] = {}
 
-    def on_mesh(envmap: Array) -> Array:
-        mesh.set_materials(truth.materials)
-        mesh.set_envmap(envmap)
-        return mesh.render(spp=spp, seed=seed + 1)
+    def mesh(self, completion: str) -> tuple[Any, Any]:
+        """Geometry and RenderScene of the true depth, built once."""
+        from materialist.geometry.build import build_geometry
+        from materialist.render.scene import RenderScene
 
-    true_picture = sample.render(sample.envmap, spp=spp, seed=seed + 2)
-    relit = metrics.psnr(on_mesh(other), sample.render(other, spp=spp, seed=seed + 3))
-    ceiling = metrics.psnr(on_mesh(sample.envmap), true_picture)
-    yield {"method": CEILING, "sample": sample.name, "mesh_psnr": ceiling, "relit_psnr": relit}
-    for name, method in methods.items():
-        start = time.perf_counter()
-        envmap = fit(sample, geometry, mesh, method, seed=seed)
-        seconds = time.perf_counter() - start
-        picture = sample.render(envmap, spp=spp, seed=seed + 4)
-        yield {
-            "method": name,
-            "sample": sample.name,
-            **metrics.envmap_metrics(envmap, sample.envmap),
-            "render_ssim": metrics.ssim(picture, true_picture),
-            "render_psnr": metrics.psnr(picture, true_picture),
-            "render_mse": metrics.mse(picture, true_picture),
-            "mesh_psnr": metrics.psnr(on_mesh(envmap), true_picture),
-            "seconds": seconds,
+        if completion not in self._meshes:
+            camera, truth = self.sample.photo.camera, self.sample.truth
+            geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=self.seed)
+            self._meshes[completion] = geometry, RenderScene(geometry, camera, device=self.device)
+        return self._meshes[completion]
+
+    def relit(self) -> Iterator[dict[str, Any]]:
+        """Rows of the ceiling and of whole inversions, with and without the continued planes."""
+        from materialist import pipeline
+
+        truth = self.sample.truth
+        for completion, suffix in (("planes", ""), ("none", " w/o planes")):
+            yield {"method": CEILING + suffix, **self._on_mesh(completion, truth.materials, self.sample.envmap)}
+            start = time.perf_counter()
+            found = pipeline.invert(
+                self.sample.photo, prior=truth, completion=completion, seed=self.seed, device=self.device
+            )
+            seconds = time.perf_counter() - start
+            surface = truth.depth > 0
+            yield {
+                "method": "inversion" + suffix,
+                **self._of_light(found.envmap),
+                **self._on_mesh(completion, found.materials, found.envmap),
+                "albedo_l1": float(np.abs(found.materials.albedo - truth.materials.albedo)[surface].mean()),
+                "seconds": seconds,
+            }
+
+    def fitted(self, methods: dict[str, Method], completion: str) -> Iterator[dict[str, Any]]:
+        """A row for every method of fitting the light."""
+        geometry, mesh = self.mesh(completion)
+        for name, method in methods.items():
+            start = time.perf_counter()
+            envmap, steps = fit(self.sample, geometry, mesh, method, seed=self.seed)
+            seconds = time.perf_counter() - start
+            on_mesh = self._on_mesh(completion, self.sample.truth.materials, envmap)
+            yield {
+                "method": name,
+                **self._of_light(envmap),
+                "mesh_psnr": on_mesh["mesh_psnr"],
+                "steps": steps,
+                "seconds": seconds,
+            }
+
+    def _of_light(self, envmap: Array) -> dict[str, float]:
+        """The map against the true one, and the true scene under it against the photo."""
+        picture = self.sample.render(envmap, spp=self.spp, seed=self.seed + 4)
+        return {
+            **metrics.envmap_metrics(envmap, self.sample.envmap),
+            "render_ssim": metrics.ssim(picture, self.photo),
+            "render_psnr": metrics.psnr(picture, self.photo),
+            "render_mse": metrics.mse(picture, self.photo),
         }
 
+    def _on_mesh(self, completion: str, materials: Materials, envmap: Array) -> dict[str, float]:
+        """PSNR of the depth mesh with these materials, under this light and under the other."""
+        _, mesh = self.mesh(completion)
+        mesh.set_materials(materials)
+        mesh.set_envmap(envmap)
+        picture = mesh.render(spp=self.spp, seed=self.seed + 1)
+        mesh.set_envmap(self.other)
+        relit = mesh.render(spp=self.spp, seed=self.seed + 1)
+        return {"mesh_psnr": metrics.psnr(picture, self.photo), "relit_psnr": metrics.psnr(relit, self.relit_photo)}
 
-def fit(sample: SyntheticSample, geometry: Any, mesh: Any, method: Method, *, seed: int = 0) -> Array:
-    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth."""
+
+def fit(sample: SyntheticSample, geometry: Any, mesh: Any, method: Method, *, seed: int = 0) -> tuple[Array, int]:
+    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth, and in how
+    many steps."""
     import torch
 
     from materialist.fit.engine import PathEngine, TransportEngine, prepared_envmap
@@ -187,9 +242,9 @@ def fit(sample: SyntheticSample, geometry: Any, mesh: Any, method: Method, *, se
         engine = TransportEngine(geometry, photo.camera, photo.linear, seed=seed, light_height=named.light_grid)
     problem = engine.light_problem(truth.materials if method.given else _neutral(truth.materials))
     field = envmap_field(light, seed=seed)
-    fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
+    result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
     envmap = prepared_envmap(field(max(light.height, 16)), height)
-    return paste_visible_sky(envmap, photo.linear, surface, photo.camera)
+    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps
 
 
 def _neutral(materials: Materials) -> Materials:

@@ -15,7 +15,7 @@ import numpy as np
 from materialist.errors import OutputError
 
 CEILING = "ceiling"
-"""The method name of rows that no method can beat: they do not compete for the best figure."""
+"""How the method names of rows begin that no method can beat: they do not compete for the best figure."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ def markdown(report: Report) -> str:
     lines = [f"# {report.title}", "", report.note, "", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
     best = {}
     for c in report.columns:
-        values = [f[c.key] for method, f in table.items() if c.key in f and method != CEILING]
+        values = [f[c.key] for method, f in table.items() if c.key in f and not method.startswith(CEILING)]
         if c.better and len(values) > 1:
             best[c.key] = max(values) if c.better == "higher" else min(values)
     for method, figures in table.items():
         cells = [method, str(int(figures["samples"]))]
         for c in report.columns:
             text = f"{figures[c.key]:.{c.digits}f}" if c.key in figures else "–"
-            winner = method != CEILING and c.key in figures and figures[c.key] == best.get(c.key)
+            winner = c.key in best and not method.startswith(CEILING) and figures.get(c.key) == best[c.key]
             cells.append(f"**{text}**" if winner else text)
         lines.append("| " + " | ".join(cells) + " |")
     settings = ", ".join(f"{k} {v}" for k, v in report.settings.items() if v is not None)

@@ -105,7 +105,7 @@ class TrueScene:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
         import mitsuba as mi
 
-        from materialist.render.scene import _padded as on_mitsuba_grid
+        from materialist.render.envmap import on_mitsuba_grid
 
         self._params["light.data"] = mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self._params.update()
