@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,8 @@ class Report:
     """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
     plotted: tuple[str, ...] = ()
     """Keys of the columns in the plot."""
+    draw: Callable[[Report, Path], None] | None = None
+    """Draws the plot to a path instead: draw(report, path)."""
 
 
 def claim(folder: Path, *, force: bool = False) -> Path:
@@ -61,7 +63,9 @@ def write(report: Report, folder: Path) -> None:
     try:
         _replace(folder / "report.json", json.dumps(as_dict(report), indent=1, default=float).encode())
         _replace(folder / "report.md", markdown(report).encode())
-        if report.plotted and report.rows:
+        if report.rows and report.draw is not None:
+            report.draw(report, folder / "plot.png")
+        elif report.rows and report.plotted:
             _plot(report, folder / "plot.png")
     except OSError as error:
         raise OutputError(f"The report cannot be written to {folder}: {error.strerror or error}.") from error

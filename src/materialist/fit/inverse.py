@@ -13,7 +13,7 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared
 from materialist.fit.fields import EnvmapTexels
 from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.loop import Progress
-from materialist.fit.materials import fit_materials, material_field, remapped
+from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
 from materialist.transport.environment import texel_directions
@@ -98,6 +98,9 @@ class Fit:
             neighbours(self.engine.pixels.numpy(), linear_to_srgb(self.photo.linear)) if any(settings.smooth) else None
         )
         photo = self._photo()[self.engine.pixels]
+        first = all(stage["name"] != "materials" for stage in state.stages)
+        if settings.other_metallic is not None and settings.field == "maps" and first and not stages:
+            start = better_start(render, photo, start, held, settings, self._smooth, progress=self.progress)
         model = material_field(
             start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
         )
@@ -118,10 +121,15 @@ class Fit:
         """[P, 3] what the path tracer adds to the cached rendering, smoothed along surfaces."""
         traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp)
         cached = self._image(render(state.maps))
-        difference = torch.from_numpy(traced - cached)
-        for step in (1, 2):
-            difference = joint_filter(difference, self.engine.guide, step=step)
-        return difference.reshape(-1, 3)[self.engine.pixels]
+        return self._smooth(torch.from_numpy(traced - cached).reshape(-1, 3)[self.engine.pixels], (1, 2))
+
+    def _smooth(self, values: torch.Tensor, steps: tuple[int, ...] = (1, 4, 16)) -> torch.Tensor:
+        """`values` [P, C] averaged along surfaces, over as wide a neighbourhood as the filter's steps reach."""
+        shape = (*self.prior.roughness.shape, values.shape[1])
+        grid = torch.zeros(shape[0] * shape[1], shape[2]).index_copy(0, self.engine.pixels, values).view(shape)
+        for step in steps:
+            grid = joint_filter(grid, self.engine.guide, step=step)
+        return grid.reshape(-1, shape[2])[self.engine.pixels]
 
     def _white_light_first(self, state: FitState) -> FitState:
         neutral = state.maps.clone()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import torch
 from torch import nn
@@ -12,7 +13,7 @@ from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unif
 from materialist.fit.loop import Progress, StageResult, optimise
 from materialist.fit.losses import consistency, l1_l2, residual
 from materialist.fit.neighbours import Neighbours
-from materialist.fit.settings import MaterialSettings
+from materialist.fit.settings import MaterialSettings, MaterialStage
 from materialist.types import Camera
 
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
@@ -39,6 +40,36 @@ def material_field(
     else:
         raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
     return field if inside is None else Unified(field, inside)
+
+
+def better_start(
+    render: Callable[[torch.Tensor], torch.Tensor],
+    photo: torch.Tensor,
+    start: torch.Tensor,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    smooth: Callable[[torch.Tensor], torch.Tensor],
+    *,
+    steps: int = 25,
+    progress: Progress | None = None,
+) -> torch.Tensor:
+    """[P, 5] maps to start from: `start`, or where it fits better after `steps` steps, another metallic.
+
+    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide.
+    """
+    other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
+    weights = settings.delta * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
+    short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
+    candidates, costs = [], []
+    for maps in (start, other):
+        field = MaterialMaps(maps)
+        fit_materials(render, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
+        with torch.no_grad():
+            error = residual(render(field()), photo, settings.encoding, clipped=settings.clipped)
+            cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * weights).mean(1)
+        candidates.append(field().detach())
+        costs.append(smooth(cost[:, None]))
+    return torch.where(costs[1] < costs[0], candidates[1], candidates[0])
 
 
 def fit_materials(

@@ -58,6 +58,9 @@ class MaterialSettings:
     smooth: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Weights of the edge-aware total variation of the change of albedo, roughness and metallic."""
     stages: tuple[MaterialStage, ...] = ()
+    other_metallic: float | None = None
+    """If set, the first fit of `maps` also starts from this metallic, and every region goes on from what fitted it
+    better: between a dielectric and a metal the loss has a barrier that no gradient crosses."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ PAPER = FitSettings(
 )
 """The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
 
-_FAST = Schedule(learning_rate=0.02, max_steps=60, decay_every=40, decay=0.6, patience=0)
+_FAST = Schedule(learning_rate=0.02, max_steps=40, decay_every=25, decay=0.6, patience=0)
 
 DEFAULT = FitSettings(
     light=LightSettings(
@@ -98,7 +101,7 @@ DEFAULT = FitSettings(
         clipped=True,
         schedule=Schedule(learning_rate=0.05, max_steps=200, decay_every=80, decay=0.6, patience=0),
         refit_steps=60,
-        slack=0.05,
+        slack=0.03,
         smooth=0.01,
         chroma=0.05,
     ),
@@ -108,11 +111,12 @@ DEFAULT = FitSettings(
         encoding="srgb",
         clipped=True,
         delta=1.0,
-        weights=(0.02, 0.01, 0.007),
+        weights=(0.02, 0.01, 0.02),
         smooth=(0.002, 0.01, 0.01),
         stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
+        other_metallic=0.95,
     ),
-    rounds=2,
+    rounds=3,
     corrections=2,
     light_grid=16,
 )
