@@ -1,0 +1,80 @@
+"""What one step of the material fit costs with cached transport, and what it costs with the paper's path tracing."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from materialist.types import Photo, Prediction
+
+LIGHT = 0.6
+"""Radiance of the grey light of both measurements; what the light is does not change what a step costs."""
+CACHED_STEPS = 24
+WARM_UP = 4
+"""Cached steps that are not counted: memory is allocated in them."""
+PRB_STEPS = 2
+"""Path-traced steps that are counted, after one that compiles the kernels."""
+
+
+def step_costs(photo: Photo, prior: Prediction, *, seed: int = 0, device: str = "auto") -> dict[str, float]:
+    """Median seconds of a material step, and their ratio; in one process, one after the other.
+
+    Both are steps of the default preset's own fit (the maps as parameters, its loss with all regularisers, Adam), at
+    full resolution and with gradients of all maps; only the engine differs: cached transport, or Mitsuba's path replay
+    backpropagation with the paper's 64 samples a pixel and depth 4.
+
+    Returns `cached_step`, `prb_step` (seconds), `prb_per_cached`, and `cache_seconds`, what tracing the cache took.
+    """
+    from materialist.fit.engine import PathEngine, TransportEngine
+    from materialist.geometry.build import build_geometry
+    from materialist.render.scene import RenderScene
+    from materialist.render.variant import setup
+
+    setup(device)
+    camera, light = photo.camera, np.full((256, 512, 3), LIGHT, np.float32)
+    geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
+    start = time.perf_counter()
+    engine: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
+    render = engine.material_renderer(light)
+    cache_seconds = time.perf_counter() - start
+    cached = _seconds_per_step(engine, render, photo, prior, CACHED_STEPS)[WARM_UP:]
+    path: Any = PathEngine(RenderScene(geometry, camera, device=device), camera, engine.pixels.numpy(), seed=seed)
+    prb = _seconds_per_step(path, path.material_renderer(light), photo, prior, 1 + PRB_STEPS)[1:]
+    return {
+        "cached_step": float(np.median(cached)),
+        "prb_step": float(np.median(prb)),
+        "prb_per_cached": float(np.median(prb) / np.median(cached)),
+        "cache_seconds": cache_seconds,
+    }
+
+
+def _seconds_per_step(engine: Any, render: Any, photo: Photo, prior: Prediction, steps: int) -> list[float]:
+    """Seconds of each of the first `steps` steps of the default preset's material fit."""
+    import torch
+
+    from materialist.color import linear_to_srgb
+    from materialist.fit.materials import fit_materials, material_field
+    from materialist.fit.neighbours import neighbours
+    from materialist.fit.settings import preset
+
+    settings = preset("default", hdr=photo.hdr).materials
+    last = settings.stages[-1]
+    stage = replace(last, schedule=replace(last.schedule, max_steps=steps, patience=0))
+    settings = replace(settings, stages=(stage,))
+    pixels = engine.pixels.numpy()
+    maps = prior.materials
+    flat = [m.reshape(photo.camera.width * photo.camera.height, -1) for m in _arrays(maps)]
+    held = torch.from_numpy(np.concatenate(flat, 1).astype(np.float32))[engine.pixels]
+    field = material_field(held, settings, engine.pixels, photo.camera, seed=0)
+    pairs = neighbours(pixels, linear_to_srgb(photo.linear)) if any(settings.smooth) else None
+    target = torch.from_numpy(np.ascontiguousarray(photo.linear.reshape(-1, 3)))[engine.pixels]
+    moments = [time.perf_counter()]
+    fit_materials(render, target, field, held, settings, pairs, progress=lambda *_: moments.append(time.perf_counter()))
+    return list(np.diff(moments))
+
+
+def _arrays(materials: Any) -> tuple[Any, Any, Any]:
+    return materials.albedo, materials.roughness, materials.metallic
