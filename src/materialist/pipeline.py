@@ -166,6 +166,9 @@ def _report(
     notes = [*picture.warnings, *prior.warnings]
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
+    measured = next((s for s in stages if "prior_trust" in s), {"prior_trust": None})
+    if measured["prior_trust"] == 1.0:
+        notes.append("No light explains the photo with the predicted materials; they were changed to match it.")
     poor = float((residual > 0.1).mean())
     if poor > 0.05:
         notes.append(f"The re-rendering is off by more than 0.1 (sRGB) on {poor:.0%} of the pixels; see overview.png.")

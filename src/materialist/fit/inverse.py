@@ -13,12 +13,17 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared
 from materialist.fit.fields import EnvmapTexels
 from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.loop import Progress
+from materialist.fit.losses import residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
 from materialist.transport.environment import texel_directions
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
+
+STRICT_STEPS = 120
+"""Steps of the light fit that measures how far the prior can be trusted."""
+MAX_TRUST = 100.0
 
 Judge = Callable[[Materials, Array, int], Array]
 """judge(materials, envmap, spp) -> path-traced [H, W, 3]."""
@@ -59,10 +64,33 @@ class Fit:
         state = FitState(self._prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
         if self.strategy == "white-light-first":
             return self._white_light_first(state)
+        fit = self if self.settings.trust is None else replace(self, settings=self._trusting(state))
         for round_ in range(self.settings.rounds):
-            self._light(state, round_)
-            self._materials(state, corrections=self.settings.corrections * (round_ == self.settings.rounds - 1))
+            fit._light(state, round_)
+            fit._materials(state, corrections=self.settings.corrections * (round_ == self.settings.rounds - 1))
         return state
+
+    def _trusting(self, state: FitState) -> FitSettings:
+        """The settings with the prices of leaving the prior scaled by how well the prior explains the photo.
+
+        A light is fitted with the prior's materials as they are. The mean absolute error e that it leaves is what
+        materials or geometry have wrong; prices grow by (trust / e)^3.
+        """
+        settings = self.settings
+        strict = replace(settings.light, slack=None)
+        problem = self.engine.light_problem(self.prior)
+        light = envmap_field(strict, seed=self.seed)
+        result = fit_light(
+            problem, self._photo(), light, strict, steps=STRICT_STEPS, seed=self.seed, progress=self.progress
+        )
+        with torch.no_grad():
+            radiance, photo = problem.render(light(problem.height)), self._photo()[problem.pixels]
+            error = float(residual(radiance, photo, strict.encoding, clipped=strict.clipped).abs().mean())
+        scale = min(max((settings.trust / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
+        state.stages.append({**result.summary(), "name": "trust", "prior_error": error, "prior_trust": scale})
+        slack = None if settings.light.slack is None else settings.light.slack * scale
+        materials = replace(settings.materials, delta=settings.materials.delta * scale)
+        return replace(settings, light=replace(settings.light, slack=slack), materials=materials)
 
     # -- stages --------------------------------------------------------------------------------------------------------
 
@@ -92,13 +120,13 @@ class Fit:
         render = self.engine.material_renderer(state.envmap)
         prior = self._prior_maps()
         held = remapped(prior) if settings.remap else prior
-        start = held if not state.stages or settings.field != "maps" else state.maps
+        first = all(stage["name"] != "materials" for stage in state.stages)
+        start = state.maps if settings.field == "maps" and not first else held
         inside = None if self.mask is None else torch.from_numpy(self.mask.reshape(-1)[self.engine.pixels.numpy()])
         pairs = (
             neighbours(self.engine.pixels.numpy(), linear_to_srgb(self.photo.linear)) if any(settings.smooth) else None
         )
         photo = self._photo()[self.engine.pixels]
-        first = all(stage["name"] != "materials" for stage in state.stages)
         if settings.other_metallic is not None and settings.field == "maps" and first and not stages:
             start = better_start(render, photo, start, held, settings, self._smooth, progress=self.progress)
         model = material_field(
@@ -135,7 +163,9 @@ class Fit:
         neutral = state.maps.clone()
         neutral[:, 3:] = 0.5
         schedule = self.settings.materials.stages[0].schedule
-        start = replace(self, prior=self._as_materials(neutral), strategy="default")
+        # 0.5 is where they start, and what was fitted is kept: nothing is remapped on the way.
+        settings = replace(self.settings, materials=replace(self.settings.materials, remap=False))
+        start = replace(self, prior=self._as_materials(neutral), strategy="default", settings=settings)
         state.maps = neutral
         start._materials(state, stages=(MaterialStage(("roughness", "metallic"), schedule),))
         refined = replace(start, prior=self._as_materials(state.maps))

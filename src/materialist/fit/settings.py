@@ -74,6 +74,9 @@ class FitSettings:
     corrections: int = 0
     """Fixed-point corrections of the material fit against the path tracer."""
     correction_spp: int = 16
+    trust: float | None = None
+    """Mean absolute error (encoded) of the best light under the prior's materials from which the prior is doubted:
+    below it, leaving the prior grows dearer with the third power. None: no such scaling."""
     light_grid: int = 32
     """Rows of the envmap that the transport engine's light matrix resolves."""
 
@@ -118,6 +121,7 @@ DEFAULT = FitSettings(
     ),
     rounds=3,
     corrections=2,
+    trust=0.08,
     light_grid=16,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
