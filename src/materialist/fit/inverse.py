@@ -132,10 +132,10 @@ class Fit:
         model = material_field(
             start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
         )
-        correction = torch.zeros(1)
+        correction = torch.ones(1)
         for k in range(corrections + 1):
             results = fit_materials(
-                lambda maps, c=correction: (render(maps) + c).clamp_min(0), photo, model, held, settings, pairs,
+                lambda maps, c=correction: render(maps) * c, photo, model, held, settings, pairs,
                 progress=self.progress,
             )  # fmt: skip
             state.stages += [r.summary() for r in results]
@@ -146,10 +146,15 @@ class Fit:
             self.engine.set_radiance(self._image(render(state.maps)))
 
     def _correction(self, state: FitState, render) -> torch.Tensor:
-        """[P, 3] what the path tracer adds to the cached rendering, smoothed along surfaces."""
+        """[P, 3] ratio of the path-traced to the cached rendering, both smoothed along surfaces.
+
+        A factor, not a difference: where the cache is too bright, a difference would leave nothing to optimise.
+        """
         traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp)
         cached = self._image(render(state.maps))
-        return self._smooth(torch.from_numpy(traced - cached).reshape(-1, 3)[self.engine.pixels], (1, 2))
+        both = torch.from_numpy(np.concatenate([traced, cached], -1)).reshape(-1, 6)[self.engine.pixels]
+        traced_smooth, cached_smooth = self._smooth(both, (1, 2)).split(3, -1)
+        return ((traced_smooth + 1e-3) / (cached_smooth + 1e-3)).clamp(0.1, 4)
 
     def _smooth(self, values: torch.Tensor, steps: tuple[int, ...] = (1, 4, 16)) -> torch.Tensor:
         """`values` [P, C] averaged along surfaces, over as wide a neighbourhood as the filter's steps reach."""
