@@ -72,20 +72,20 @@ def comparison():
 def test_cached_shading_equals_path_tracing(comparison, bounces, away, everywhere):
     assert comparison.surface.mean() > 0.95
     assert comparison.away.mean() > 0.5
-    measured = comparison.decibels(bounces, spp=144)
+    measured = comparison.decibels(bounces, spp=100)
     assert measured[0] >= away
     assert measured[1] >= everywhere
 
 
 def test_cached_shading_has_no_bias(comparison):
-    reference = comparison.path.render(spp=144, seed=3, max_depth=2)
+    reference = comparison.path.render(spp=100, seed=3, max_depth=2)
     ratio = comparison.cached(1)[comparison.away].mean() / reference[comparison.away].mean()
     assert ratio == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.parametrize("max_depth", [2, 4], ids=["direct", "indirect"])
 def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
-    cosines = gradient_cosines(comparison, max_depth, spp=64)
+    cosines = gradient_cosines(comparison, max_depth, spp=36, image_spp=100)
     assert min(cosines) >= 0.95, cosines
 
 

@@ -1,0 +1,214 @@
+"""The whole inverse problem on a small synthetic room whose materials and light are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from transport_scenes import furnished_room, windowed_sky
+
+from materialist import metrics
+from materialist.fit.engine import PathEngine, TransportEngine
+from materialist.fit.inverse import Fit, paste_visible_sky
+from materialist.fit.loop import Schedule
+from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage
+from materialist.render.scene import RenderScene
+from materialist.transport.environment import texel_directions
+from materialist.types import Camera, Materials, Photo
+
+ENVMAP_HEIGHT = 16
+
+
+class Room:
+    """A photograph of the room, path traced, and a prior that is wrong in every map."""
+
+    def __init__(self, size: int = 32):
+        self.camera, self.geometry, self.truth = furnished_room(size)
+        self.light = windowed_sky(ENVMAP_HEIGHT)
+        self.path = RenderScene(self.geometry, self.camera)
+        linear = np.clip(self.judge(self.truth, self.light, 256), 0, 1)
+        self.photo = Photo(linear=linear, camera=self.camera, original=linear)
+        ramp = np.linspace(-0.12, 0.12, self.camera.width, dtype=np.float32)[None, :]
+        self.prior = Materials(
+            np.clip(self.truth.albedo + ramp[..., None], 0.02, 1),
+            np.clip(self.truth.roughness + ramp, 0.05, 1),
+            np.clip(self.truth.metallic * 0.8 + 0.05, 0, 1),
+        )
+        self.start_error = metrics.sh_error_relative(np.full_like(self.light, 0.6), self.light)
+
+    def judge(self, materials, envmap, spp, seed=0):
+        self.path.set_materials(materials)
+        self.path.set_envmap(envmap)
+        return self.path.render(spp=spp, seed=seed)
+
+    def fit(self, settings: FitSettings, **options) -> Fit:
+        engine = TransportEngine(
+            self.geometry, self.camera, self.photo.linear, light_height=settings.light_grid, diffuse_samples=32,
+            specular_samples=8,
+        )  # fmt: skip
+        options = {"judge": self.judge, "envmap_height": ENVMAP_HEIGHT, **options}
+        return Fit(self.photo, options.pop("prior", self.prior), engine, settings, **options)
+
+
+@pytest.fixture(scope="module")
+def room():
+    return Room()
+
+
+def short(settings: FitSettings, steps: int = 15) -> FitSettings:
+    """The same settings with fewer steps."""
+    cut = lambda schedule: replace(schedule, max_steps=min(steps, schedule.max_steps))  # noqa: E731
+    stages = tuple(replace(s, schedule=cut(s.schedule)) for s in settings.materials.stages)
+    return replace(
+        settings, light=replace(settings.light, schedule=cut(settings.light.schedule), refit_steps=min(steps, 10)),
+        materials=replace(settings.materials, stages=stages), correction_spp=4,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def fitted(room):
+    fit = room.fit(DEFAULT)
+    return fit, fit.run()
+
+
+def test_every_stage_lowers_its_loss(fitted):
+    _, state = fitted
+    assert {"light", "materials"} <= {s["name"] for s in state.stages}
+    for stage in state.stages:
+        assert stage["loss_last"] <= stage["loss_first"]
+    first = {s["name"]: s for s in reversed(state.stages)}
+    assert first["light"]["loss_last"] < 0.7 * first["light"]["loss_first"]
+
+
+def test_light_is_recovered(room, fitted):
+    envmap = fitted[1].envmap
+    assert envmap.shape == room.light.shape
+    assert float(envmap.min()) >= 0
+    assert metrics.sh_error_relative(envmap, room.light) < 0.75 * room.start_error
+    turned = np.roll(envmap, envmap.shape[1] // 2, axis=1)
+    assert metrics.sh_error_relative(envmap, room.light) < metrics.sh_error_relative(turned, room.light)
+
+
+def test_rerendering_comes_close_to_the_photo(room, fitted):
+    fit, state = fitted
+    before = room.judge(room.prior, np.full_like(room.light, 0.6), 64)
+    after = room.judge(fit.materials(state), state.envmap, 64)
+    assert metrics.psnr(after, room.photo.linear) > max(28, metrics.psnr(before, room.photo.linear) + 8)
+
+
+def test_maps_are_in_range(fitted):
+    fit, state = fitted
+    materials = fit.materials(state)
+    for values in (materials.albedo, materials.roughness, materials.metallic):
+        assert values.dtype == np.float32
+        assert float(values.min()) >= 0 and float(values.max()) <= 1
+
+
+def test_true_materials_and_light_stay(room):
+    """With true maps as the prior, the fit finds no reason to leave them."""
+    fit = room.fit(DEFAULT, prior=room.truth)
+    materials = fit.materials(fit.run())
+    assert float(np.abs(materials.albedo - room.truth.albedo).mean()) < 0.08
+    assert float(np.abs(materials.roughness - room.truth.roughness).mean()) < 0.08
+    assert float(np.abs(materials.metallic - room.truth.metallic).mean()) < 0.08
+
+
+def test_equal_seeds_give_equal_results(room):
+    first, again = (room.fit(short(DEFAULT), seed=3).run() for _ in range(2))
+    assert first.maps.equal(again.maps)
+    np.testing.assert_array_equal(first.envmap, again.envmap)
+
+
+def test_mask_unifies_roughness_and_metallic(room):
+    mask = room.truth.metallic == 1
+    fit = room.fit(short(DEFAULT), mask=mask)
+    materials = fit.materials(fit.run())
+    for values in (materials.roughness, materials.metallic):
+        assert float(np.ptp(values[mask])) < 1e-6
+        assert float(np.ptp(values[~mask])) > 0.05
+    assert float(materials.albedo[mask].std(0).max()) > 1e-3
+
+
+@pytest.mark.parametrize("settings", [PAPER, DEFAULT], ids=["paper", "default"])
+def test_white_light_first(room, settings):
+    """Roughness and metallic from 0.5 under white light, then the light, then albedo alone (appendix)."""
+    fit = room.fit(short(settings, steps=4), strategy="white-light-first")
+    kept = {}
+    original = type(fit)._light
+
+    def spy(self, state, round_=0):
+        kept["maps"], kept["envmap"] = state.maps.clone(), state.envmap.copy()
+        original(self, state, round_)
+
+    type(fit)._light = spy
+    try:
+        state = fit.run()
+    finally:
+        type(fit)._light = original
+    assert [s["name"] for s in state.stages][:3] == ["roughness+metallic", "light", "albedo"]
+    assert (kept["envmap"] == 1).all()
+    assert float((kept["maps"][:, 3:] - 0.5).abs().max()) < 0.2
+    assert float((kept["maps"][:, 3:] - 0.5).abs().max()) > 0
+    torch.testing.assert_close(state.maps[:, 3:], kept["maps"][:, 3:])
+    assert not state.maps[:, :3].equal(kept["maps"][:, :3])
+
+
+def test_papers_first_stage_leaves_albedo_alone(room):
+    stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=3))
+    settings = replace(short(PAPER, 3), materials=replace(PAPER.materials, stages=(stage,)))
+    fit = room.fit(settings)
+    state = fit.run()
+    prior = fit._prior_maps()
+    torch.testing.assert_close(state.maps[:, :3], prior[:, :3])
+    expected = 0.7 * prior[:, 3:] + 0.2
+    assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
+
+
+@pytest.mark.parametrize("field", ["maps", "unet"])
+def test_other_material_fields_start_from_the_same_maps(room, field):
+    """The ablation of the network type compares like with like: all start from the remapped prior."""
+    settings = short(replace(PAPER, materials=replace(PAPER.materials, field=field)), 1)
+    fit = room.fit(settings)
+    state = fit.run()
+    expected = 0.7 * fit._prior_maps()[:, 3:] + 0.2
+    assert float((state.maps[:, 3:] - expected).abs().max()) < 0.05
+
+
+@pytest.mark.parametrize("field", ["mlp", "mlp-uv", "sh", "texels"])
+def test_every_light_field_learns(room, field):
+    light = replace(DEFAULT.light, field=field, height=16, schedule=Schedule(learning_rate=5e-3, max_steps=25))
+    fit = room.fit(short(replace(DEFAULT, light=light, rounds=1, corrections=0, trust=None), 25))
+    stage = next(s for s in fit.run().stages if s["name"] == "light")
+    assert stage["loss_last"] < 0.97 * stage["loss_first"]
+
+
+def test_papers_engine_runs_the_same_fit(room):
+    camera = room.camera
+    pixels = np.arange(camera.width * camera.height)
+    engine = PathEngine(room.path, camera, pixels, spp=4, max_depth=2, envmap_height=ENVMAP_HEIGHT)
+    settings = replace(
+        short(PAPER, 6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
+    )
+    fit = Fit(room.photo, room.prior, engine, settings, envmap_height=ENVMAP_HEIGHT)
+    state = fit.run()
+    assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "materials"]
+    assert state.stages[0]["loss_last"] < state.stages[0]["loss_first"]
+    assert state.envmap.shape == (ENVMAP_HEIGHT, 2 * ENVMAP_HEIGHT, 3)
+    assert torch.isfinite(state.maps).all()
+
+
+def test_visible_sky_is_pasted_where_it_is_seen():
+    """Radiance of the photo's upper half goes to the texels that look through it; clipped sky only raises them."""
+    camera = Camera(32, 32, 60.0)
+    photo = np.full((32, 32, 3), 0.4, np.float32)
+    photo[:, 16:] = 1.0
+    surface = np.zeros((32, 32), bool)
+    surface[16:] = True
+    envmap = np.full((64, 128, 3), 3.0, np.float32)
+    pasted = paste_visible_sky(envmap, photo, surface, camera)
+    d = texel_directions(64, 128)
+    ahead = (d[..., 2] < -0.95) & (d[..., 1] > 0.03)
+    np.testing.assert_allclose(pasted[ahead & (d[..., 0] < -0.03)], 0.4)
+    np.testing.assert_allclose(pasted[ahead & (d[..., 0] > 0.03)], 3.0)  # clipped: at least 1, and 3 is more
+    np.testing.assert_allclose(pasted[(d[..., 1] < -0.03) | (d[..., 2] > 0)], 3.0)
+    assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera) is envmap

@@ -1,0 +1,190 @@
+"""The main job on a tiny photograph with maps: every field of the scene, both engines, bad options."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from materialist.errors import InputError
+from materialist.pipeline import invert, render_scene
+
+WIDTH, HEIGHT = 24, 18
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread():
+    """Small tensors: waking threads costs more than the work."""
+    from materialist.render.variant import setup
+
+    setup("cpu")  # before torch, as in a run
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A photo of a lit corner and its maps, in the project's conventions."""
+    from geometry_scenes import room, sphere_depth
+
+    from materialist.io.exr import write_exr
+    from materialist.io.image import write_png
+    from materialist.types import Camera
+
+    folder = tmp_path_factory.mktemp("photo")
+    camera = Camera(WIDTH, HEIGHT, 45.0)
+    depth, normal, label = room(camera)
+    ball, ball_normal = sphere_depth(camera, (0.85, -0.5, -3.4), 0.5)
+    closer = ball < depth
+    depth, normal = np.where(closer, ball, depth), np.where(closer[..., None], ball_normal, normal)
+    shade = 0.4 + 0.3 * np.clip(normal @ np.array([-0.4, 0.7, 0.4]), 0, 1)
+    albedo = np.array([[0.6, 0.5, 0.4], [0.5, 0.5, 0.6], [0.3, 0.5, 0.3]])[label]
+    write_png(folder / "photo.png", (albedo * shade[..., None]).astype(np.float32))
+    maps = {"albedo": albedo, "depth": depth, "normal": normal}
+    maps |= {"roughness": np.full(depth.shape, 0.5), "metallic": np.full(depth.shape, 0.1)}
+    for name, values in maps.items():
+        write_exr(folder / f"{name}.exr", np.ascontiguousarray(values, np.float32))
+    return folder
+
+
+def options(folder, **changes) -> dict:
+    """Arguments of a run that takes a second."""
+    settings = changes.pop("settings", None) or short()
+    return {
+        "photo": folder / "photo.png", "predictor": f"maps:{folder}", "fov": 45.0, "size": WIDTH,
+        "envmap_size": (32, 16), "spp": 8, "settings": settings, "device": "cpu", **changes,
+    }  # fmt: skip
+
+
+def short():
+    """The default preset with a few steps."""
+    from materialist.fit.settings import DEFAULT
+
+    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=4)) for s in DEFAULT.materials.stages)
+    light = replace(DEFAULT.light, schedule=replace(DEFAULT.light.schedule, max_steps=10), refit_steps=4)
+    materials = replace(DEFAULT.materials, stages=stages)
+    return replace(DEFAULT, light=light, materials=materials, rounds=2, corrections=1, correction_spp=4, trust=None)
+
+
+def short_paper():
+    """The paper's preset with three steps a stage."""
+    from materialist.fit.settings import PAPER
+
+    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=3)) for s in PAPER.materials.stages)
+    light = replace(PAPER.light, schedule=replace(PAPER.light.schedule, max_steps=3))
+    return replace(PAPER, light=light, materials=replace(PAPER.materials, stages=stages))
+
+
+@pytest.fixture(scope="module")
+def scene(folder):
+    return invert(**options(folder))
+
+
+def test_scene_has_every_field(scene):
+    size = (HEIGHT, WIDTH)
+    assert (scene.camera.width, scene.camera.height, scene.camera.fov) == (WIDTH, HEIGHT, 45.0)
+    assert scene.photo.linear.shape == (*size, 3)
+    for materials in (scene.materials, scene.prior.materials):
+        assert materials.albedo.shape == (*size, 3)
+        assert materials.roughness.shape == materials.metallic.shape == size
+        assert all(np.isfinite(m).all() for m in (materials.albedo, materials.roughness, materials.metallic))
+    assert scene.normal.shape == scene.rerender.shape == (*size, 3)
+    assert scene.depth.shape == scene.geometry.plane_label.shape == size
+    assert scene.envmap.shape == (16, 32, 3)
+    assert scene.envmap.dtype == scene.rerender.dtype == np.float32
+    assert float(scene.envmap.min()) >= 0
+    assert len(scene.geometry.mesh.faces) >= 2 * WIDTH * HEIGHT
+
+
+def test_report_tells_what_happened(scene):
+    metrics = scene.report.metrics
+    assert metrics["rerender_psnr_path"] > 20
+    assert 0 < metrics["rerender_ssim_path"] <= 1
+    assert metrics["total_seconds"] > 0 and metrics["peak_rss_mb"] > 50
+    for name in ("albedo", "roughness", "metallic"):
+        moved = np.abs(getattr(scene.materials, name) - getattr(scene.prior.materials, name)).mean()
+        assert metrics[f"prior_l1_{name}"] == pytest.approx(float(moved), abs=1e-6)
+    names = [stage["name"] for stage in scene.report.stages]
+    assert {"predict", "geometry", "light", "materials", "rerender"} <= set(names)
+    assert names[-1] == "rerender"
+    assert all(stage["seconds"] >= 0 for stage in scene.report.stages)
+
+
+def test_provenance_names_the_options(scene):
+    told = scene.provenance
+    assert (told["engine"], told["preset"], told["seed"], told["spp"]) == ("transport", "default", 0, 8)
+    assert told["envmap_size"] == [32, 16]
+    assert told["predictor"].startswith("maps")
+
+
+def test_equal_seeds_give_equal_scenes(folder, scene):
+    again = invert(**options(folder))
+    np.testing.assert_array_equal(again.materials.albedo, scene.materials.albedo)
+    np.testing.assert_array_equal(again.materials.roughness, scene.materials.roughness)
+    np.testing.assert_array_equal(again.materials.metallic, scene.materials.metallic)
+    np.testing.assert_array_equal(again.envmap, scene.envmap)
+
+
+def test_rerendering_is_the_scenes_rendering(scene):
+    """Rendering the scene afresh gives the re-rendering, up to noise."""
+    from materialist.metrics import psnr
+
+    assert psnr(render_scene(scene, spp=64), scene.rerender) > 25
+    with pytest.raises(InputError, match="spp"):
+        render_scene(scene, spp=0)
+
+
+def test_papers_engine_gives_a_scene(folder, monkeypatch):
+    from materialist.fit import engine
+
+    monkeypatch.setitem(engine.PathEngine.__init__.__kwdefaults__, "spp", 2)
+    told = []
+    scene = invert(**options(folder, engine="path", settings=short_paper(), progress=lambda *a: told.append(a[0])))
+    assert scene.provenance["engine"] == "path"
+    assert scene.provenance["preset"] == "paper"
+    names = [stage["name"] for stage in scene.report.stages]
+    assert [n for n in names if n in ("light", "roughness+metallic", "materials")] == [
+        "light", "roughness+metallic", "materials",
+    ]  # fmt: skip
+    assert scene.envmap.shape == (16, 32, 3)
+    assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)
+
+
+def test_mask_is_taken_at_working_size(folder):
+    mask = np.zeros((HEIGHT, WIDTH), bool)
+    mask[6:12, 4:12] = True
+    scene = invert(**options(folder, mask=mask))
+    assert float(np.ptp(scene.materials.roughness[mask])) < 1e-6
+    assert float(np.ptp(scene.materials.metallic[mask])) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"engine": "raster"}, "raster.*transport, path"),
+        ({"strategy": "albedo-first"}, "albedo-first"),
+        ({"envmap_size": (64, 16)}, "64x16"),
+        ({"envmap_size": (8, 4)}, "8x4"),
+        ({"envmap_size": (16384, 8192)}, "16384x8192"),
+        ({"seed": -1}, "-1"),
+        ({"mask": np.ones((3, 3), bool)}, r"\(3, 3\).*\(18, 24\)"),
+        ({"mask": np.zeros((HEIGHT, WIDTH), bool)}, "empty"),
+        ({"completion": "walls"}, "walls"),
+        ({"tau": 120.0}, "120"),
+        ({"device": "tpu"}, "tpu"),
+        ({"predictor": "oracle"}, "oracle"),
+        ({"photo": "nowhere.png"}, "nowhere.png"),
+    ],
+    ids=lambda v: "-".join(v) if isinstance(v, dict) else "",
+)
+def test_bad_options_are_named(folder, changes, words):
+    with pytest.raises(InputError, match=words):
+        invert(**{**options(folder), **changes})
+
+
+def test_unknown_preset_is_named(folder):
+    with pytest.raises(InputError, match="quick"):
+        invert(**{**options(folder), "preset": "quick", "settings": None})
