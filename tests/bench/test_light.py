@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from materialist import bench, metrics
 from materialist.bench import light
@@ -23,12 +24,32 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     assert better > 3 + metrics.psnr(sample.render(grey, spp=64), photo)
 
 
-def test_a_run_writes_a_row_for_the_ceiling_and_every_method(mitsuba, tmp_path):
+def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
     out = bench.run(
-        "light", output=tmp_path / "out", scenes=1, lights=1, size=24, spp=16, methods="default", device="cpu"
+        "light",
+        output=tmp_path / "out",
+        scenes=1,
+        lights=1,
+        size=24,
+        spp=16,
+        methods="default",
+        relight=False,
+        device="cpu",
     )
     rows = json.loads((out / "report.json").read_text())["rows"]
-    assert [r["method"] for r in rows] == ["ceiling", "default"]
-    assert rows[0]["mesh_psnr"] > 10 and rows[0]["relit_psnr"] > 10
-    assert {c.key for c in light.COLUMNS} - set(rows[1]) == {"relit_psnr"}
-    assert "| ceiling | 1 |" in (out / "report.md").read_text()
+    assert [r["method"] for r in rows] == ["default"]
+    assert {c.key for c in light.COLUMNS} - set(rows[0]) == {"relit_psnr", "albedo_l1"}
+    assert rows[0]["mesh_psnr"] > 10 and rows[0]["cpu_seconds"] > 0
+    assert "| default | 1 |" in (out / "report.md").read_text()
+
+
+@pytest.mark.slow
+def test_relit_inversions_and_the_paper_s_engine(mitsuba, tmp_path):
+    out = bench.run(
+        "light", output=tmp_path / "out", scenes=1, lights=1, size=24, spp=64, methods="paper path 128x64", device="cpu"
+    )
+    rows = {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
+    assert list(rows) == ["ceiling", "inversion", "ceiling w/o planes", "inversion w/o planes", "paper path 128x64"]
+    assert min(row["mesh_psnr"] for row in rows.values()) > 15
+    assert rows["inversion"]["relit_psnr"] < rows["ceiling"]["relit_psnr"] + 1
+    assert rows["paper path 128x64"]["sh_error_relative"] < 1

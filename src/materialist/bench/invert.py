@@ -295,7 +295,8 @@ def plot(report: Report, path: Path) -> None:
             axis.annotate(f"{y:.0f}", (x, y), textcoords="offset points", xytext=(0, 6), ha="center", fontsize=8)
         axis.set_title(title, fontsize=9)
         axis.set_xlabel("Mpixel", fontsize=8)
-        axis.margins(0.12, 0.15)
+        axis.margins(x=0.12)
+        axis.set_ylim(np.nanmin(values) / 2, np.nanmax(values) * 2)  # a shorter axis would make noise look like growth
         axis.tick_params(labelsize=8, which="both")
         axis.legend(fontsize=8)
         axis.grid(which="both", alpha=0.25)
