@@ -24,7 +24,8 @@ LARGEST = 8192
 NOTE = """`materialist invert` as a user runs it, every size in a fresh process. Seconds are wall clock from the start
 of the process to its end, starting Python, reading and writing included, and so is the peak of its resident memory.
 PSNR and SSIM compare the path-traced re-rendering (no denoiser) with the photo, sRGB-encoded; L1 figures are mean
-distances of the fitted maps from the prior. Sizes beyond the photo's own enlarge it (bicubic); the maps of the prior
+distances of the fitted maps from the prior; `other` is the time that no stage claims: starting Python, tables and
+corrections between the stages, writing. Sizes beyond the photo's own enlarge it (bicubic); the maps of the prior
 are brought to each size by the predictor."""
 
 STEP_NOTE = """`one step` compares one step of the material fit (all maps, full resolution, with gradients; medians
@@ -40,7 +41,7 @@ STAGES = {
     "materials": "materials",
     "rerender": "re-render",
 }
-"""Stages of report.json, and what the table calls them."""
+"""Stages of report.json, and what the table calls them; see `_stages` for the rest."""
 
 COLUMNS = (
     Column("seconds", "s", digits=1),
@@ -250,7 +251,9 @@ def _stages(report: dict[str, Any], seconds: float) -> dict[str, float]:
     """Seconds by stage, repeated stages added up; `other` is what no stage claims, start and writing among it."""
     spent: Counter[str] = Counter()
     for stage in report["stages"]:
-        name = stage["name"] if stage["name"] in STAGES else "materials"
+        # The light that tests the prior counts as light; stages named by what they move, as the paper's, as materials.
+        name = {"trust": "light"}.get(stage["name"], stage["name"])
+        name = name if name in STAGES else "materials"
         spent[name] += stage["seconds"]
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
 
@@ -289,14 +292,15 @@ def plot(report: Report, path: Path) -> None:
         figure.subplots(1, 2), (("seconds", "wall seconds"), ("peak_mb", "peak memory, MB")), strict=True
     ):
         values = np.array([row[key] or np.nan for row in rows])
-        axis.loglog(pixels, values, "o-", color="#1f3b5c")
-        axis.loglog(pixels, values[-1] * pixels / pixels[-1], "--", color="#9db8d9", label="proportional to pixels")
+        # A shorter axis would make noise look like growth.
+        axis.set(xscale="log", yscale="log", ylim=(np.nanmin(values) / 2, np.nanmax(values) * 2))
+        axis.plot(pixels, values, "o-", color="#1f3b5c")
+        axis.plot(pixels, values[-1] * pixels / pixels[-1], "--", color="#9db8d9", label="proportional to pixels")
         for x, y in zip(pixels, values, strict=True):
             axis.annotate(f"{y:.0f}", (x, y), textcoords="offset points", xytext=(0, 6), ha="center", fontsize=8)
         axis.set_title(title, fontsize=9)
         axis.set_xlabel("Mpixel", fontsize=8)
         axis.margins(x=0.12)
-        axis.set_ylim(np.nanmin(values) / 2, np.nanmax(values) * 2)  # a shorter axis would make noise look like growth
         axis.tick_params(labelsize=8, which="both")
         axis.legend(fontsize=8)
         axis.grid(which="both", alpha=0.25)
