@@ -143,10 +143,10 @@ class PathEngine:
         self.pixels = torch.from_numpy(pixels.astype(np.int64))
         self.envmap_height, self.seed, self._step = envmap_height, seed, 0
 
-    def _render(self, albedo, roughness, metallic, envmap) -> torch.Tensor:
+    def _render(self, *maps_and_envmap: torch.Tensor) -> torch.Tensor:
         self._step += 1
         return self.scene.render_torch(
-            albedo, roughness, metallic, envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
+            *maps_and_envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
         )
 
     def light_problem(self, materials: Materials) -> LightProblem:

@@ -113,14 +113,15 @@ def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
 class MaterialMLP(nn.Module):
     """m_p + zeta * tanh(MLP_mat(gamma(m_p))) with learnable zeta (paper, Material Properties Optimization)."""
 
+    prior: torch.Tensor
+
     def __init__(self, prior: torch.Tensor, *, bands: int = 6, width: int = 128, layers: int = 3, zeta: float = 0.3):
         """prior: [P, 5] albedo, roughness, metallic."""
         super().__init__()
         self.register_buffer("prior", prior)
         self.register_buffer("code", positional_encoding(prior, bands))
         self.net = mlp(10 * bands, 5, width=width, layers=layers)
-        nn.init.zeros_(self.net[-1].weight)
-        nn.init.zeros_(self.net[-1].bias)
+        _silence(self.net[-1])
         self.zeta = nn.Parameter(torch.tensor(zeta))
 
     def forward(self) -> torch.Tensor:
@@ -141,6 +142,8 @@ class MaterialMaps(nn.Module):
 class MaterialUNet(nn.Module):
     """Residual by a U-Net with two down- and two upsampling blocks of two 3x3 convolutions (paper's ablation)."""
 
+    prior: torch.Tensor
+
     def __init__(self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int, *, channels: int = 32):
         super().__init__()
         grid = torch.zeros(height * width, 5)
@@ -155,8 +158,7 @@ class MaterialUNet(nn.Module):
         self.middle = _double_conv(2 * c, 2 * c)
         self.up2, self.up1 = _double_conv(4 * c, c), _double_conv(2 * c, c)
         self.head = nn.Conv2d(c, 5, 1)
-        nn.init.zeros_(self.head.weight)
-        nn.init.zeros_(self.head.bias)
+        _silence(self.head)
         self.zeta = nn.Parameter(torch.tensor(0.3))
 
     def forward(self) -> torch.Tensor:
@@ -167,6 +169,12 @@ class MaterialUNet(nn.Module):
         u = self.up1(torch.cat([functional.interpolate(u, scale_factor=2.0), a], 1))
         delta = self.head(u)[0, :, : self.size[0], : self.size[1]].reshape(5, -1).T[self.pixels]
         return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)
+
+
+def _silence(layer: nn.Module) -> None:
+    """Zero weights and bias, so that a residual network starts at its prior."""
+    for parameter in layer.parameters():
+        nn.init.zeros_(parameter)
 
 
 def _double_conv(inputs: int, outputs: int) -> nn.Sequential:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -86,7 +87,7 @@ class Fit:
         with torch.no_grad():
             radiance, photo = problem.render(light(problem.height)), self._photo()[problem.pixels]
             error = float(residual(radiance, photo, strict.encoding, clipped=strict.clipped).abs().mean())
-        scale = min(max((settings.trust / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
+        scale = min(max(((settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
         state.stages.append({**result.summary(), "name": "trust", "prior_error": error, "prior_trust": scale})
         slack = None if settings.light.slack is None else settings.light.slack * scale
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
@@ -134,10 +135,8 @@ class Fit:
         )
         correction = torch.ones(1)
         for k in range(corrections + 1):
-            results = fit_materials(
-                lambda maps, c=correction: render(maps) * c, photo, model, held, settings, pairs,
-                progress=self.progress,
-            )  # fmt: skip
+            corrected = partial(_corrected, render, correction)
+            results = fit_materials(corrected, photo, model, held, settings, pairs, progress=self.progress)
             state.stages += [r.summary() for r in results]
             state.maps = model().detach()
             if k < corrections:
@@ -150,6 +149,7 @@ class Fit:
 
         A factor, not a difference: where the cache is too bright, a difference would leave nothing to optimise.
         """
+        assert self.judge is not None
         traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp)
         cached = self._image(render(state.maps))
         both = torch.from_numpy(np.concatenate([traced, cached], -1)).reshape(-1, 6)[self.engine.pixels]
@@ -158,6 +158,7 @@ class Fit:
 
     def _smooth(self, values: torch.Tensor, steps: tuple[int, ...] = (1, 4, 16)) -> torch.Tensor:
         """`values` [P, C] averaged along surfaces, over as wide a neighbourhood as the filter's steps reach."""
+        assert isinstance(self.engine, TransportEngine)
         shape = (*self.prior.roughness.shape, values.shape[1])
         grid = torch.zeros(shape[0] * shape[1], shape[2]).index_copy(0, self.engine.pixels, values).view(shape)
         for step in steps:
@@ -207,6 +208,10 @@ class Fit:
         surface = np.zeros(self.photo.linear.shape[0] * self.photo.linear.shape[1], bool)
         surface[self.engine.pixels.numpy()] = True
         return surface.reshape(self.photo.linear.shape[:2])
+
+
+def _corrected(render, factor: torch.Tensor, maps: torch.Tensor) -> torch.Tensor:
+    return render(maps) * factor
 
 
 def _maps(materials: Materials) -> tuple[Array, Array, Array]:

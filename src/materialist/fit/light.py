@@ -52,9 +52,11 @@ def fit_light(
     jitter = torch.Generator().manual_seed(seed)
     schedule = settings.schedule if steps is None else replace(settings.schedule, max_steps=steps)
     parameters: list = [{"params": list(field.parameters())}]
-    slack = None
+    slack: nn.Parameter | None = None
+    price = settings.slack or 0.0
     if settings.slack is not None and problem.matrix is not None:
-        slack = nn.Parameter(problem.matrix.albedo.clone())
+        given = problem.matrix.albedo
+        slack = nn.Parameter(given.clone())
         parameters.append({"params": [slack], "lr": 0.02})
 
     def loss(_: int) -> torch.Tensor:
@@ -64,7 +66,7 @@ def fit_light(
         radiance = problem.render(envmap) if slack is None else problem.render(envmap, slack)
         value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped))
         if slack is not None:
-            value = value + settings.slack * (slack - problem.matrix.albedo).abs().mean()
+            value = value + price * (slack - given).abs().mean()
         if settings.smooth or settings.chroma:
             log = envmap.clamp_min(1e-6).log()
             value = value + settings.smooth * log_total_variation(log) + settings.chroma * log_chroma(log)

@@ -57,6 +57,7 @@ def better_start(
 
     `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide.
     """
+    assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
     weights = settings.delta * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
     short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]

@@ -8,6 +8,7 @@ face it hit. Directions are regenerated from their index, so that a gather is pu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -103,7 +104,7 @@ class TransportCache:
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
-        take = lambda v: dr.gather(type(v), v, pixels)  # noqa: E731
+        take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
         self.position, self.geometric_normal = take(si.p), take(si.n)
         normal, view = take(si.sh_frame.n), -take(d)
         self.normal = _towards(normal, view)

@@ -6,6 +6,7 @@ T is stored for a subset of pixels at the resolution of the fit; b is what arriv
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -93,7 +94,7 @@ def light_matrix(
     index = np.concatenate([h[0] for h in hits], 1)
     weight = np.concatenate([h[1] for h in hits])
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, tuple(matrices),
+        torch.from_numpy(pixels.astype(np.int64)), shape, (matrices[0], matrices[1], matrices[2]),
         torch.from_numpy(index), torch.from_numpy(weight),
         torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
     )  # fmt: skip
@@ -120,7 +121,8 @@ def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffu
         weights = [(1 - fresnel) * g1, fresnel * g1]
     above = wi.z > 0
     world = frame.to_world(wi)
-    pi = cache.scene.ray_intersect_preliminary(
+    scene: Any = cache.scene
+    pi = scene.ray_intersect_preliminary(
         spawn(take(cache.position), take(cache.geometric_normal), world), coherent=False, active=above
     )
     slot = dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), mi.UInt32(MISS))
