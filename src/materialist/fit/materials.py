@@ -114,8 +114,9 @@ def fit_materials(
             return value
 
         def into_range() -> None:
-            if isinstance(field, MaterialMaps):
-                field.maps.clamp_(0, 1)
+            base = field.field if isinstance(field, Unified) else field
+            if isinstance(base, MaterialMaps):
+                base.maps.clamp_(0, 1)
 
         name = "materials" if not frozen else "+".join(stage.targets)
         results.append(

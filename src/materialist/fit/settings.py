@@ -94,7 +94,7 @@ PAPER = FitSettings(
 )
 """The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
 
-_FAST = Schedule(learning_rate=0.02, max_steps=40, decay_every=25, decay=0.6, patience=0)
+_FAST = Schedule(learning_rate=0.02, max_steps=36, decay_every=24, decay=0.6, patience=0)
 
 DEFAULT = FitSettings(
     light=LightSettings(
@@ -102,7 +102,7 @@ DEFAULT = FitSettings(
         height=16,
         encoding="srgb",
         clipped=True,
-        schedule=Schedule(learning_rate=0.05, max_steps=200, decay_every=80, decay=0.6, patience=0),
+        schedule=Schedule(learning_rate=0.05, max_steps=150, decay_every=60, decay=0.6, patience=0),
         refit_steps=60,
         slack=0.03,
         smooth=0.01,
@@ -114,13 +114,14 @@ DEFAULT = FitSettings(
         encoding="srgb",
         clipped=True,
         delta=1.0,
-        weights=(0.02, 0.01, 0.02),
+        weights=(0.02, 0.01, 0.021),
         smooth=(0.002, 0.01, 0.01),
         stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
         other_metallic=0.95,
     ),
     rounds=3,
     corrections=2,
+    correction_spp=9,
     trust=0.08,
     light_grid=16,
 )

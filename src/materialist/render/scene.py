@@ -11,8 +11,6 @@ from materialist.types import Array, Camera, Geometry, Materials, Mesh
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
-_padded = on_mitsuba_grid
-"""The name under which the synthetic benchmark takes it."""
 
 _WAVEFRONT = 2**24
 """Camera paths traced at a time: bounds the memory."""

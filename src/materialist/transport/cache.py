@@ -54,7 +54,7 @@ def build_scene(mesh: Mesh) -> mi.Scene:
     params["vertex_normals"] = mi.Float(mesh.normals.ravel())
     params["faces"] = mi.UInt32(mesh.faces.ravel().astype(np.uint32))
     params.update()
-    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "surface": shape})
+    return mi.load_dict({"type": "scene", "surface": shape})
 
 
 class TransportCache:

@@ -41,8 +41,8 @@ class LightMatrix:
     """[Q] int64 row-major pixel indices."""
     shape: tuple[int, int]
     """(h, 2h) of the envmap."""
-    lobes: tuple[torch.Tensor, torch.Tensor, torch.Tensor]
-    """Each [Q, h * 2h]: direct transport of a lobe."""
+    lobes: torch.Tensor
+    """[3, Q, h * 2h]: direct transport of the lobes."""
     hit_index: torch.Tensor
     """[2, K] int64: (row, radiance slot) of every ray that meets a surface."""
     hit_weight: torch.Tensor
@@ -54,7 +54,7 @@ class LightMatrix:
 
     def direct(self, envmap: torch.Tensor) -> torch.Tensor:
         """[3, Q, 3] light of each lobe straight from `envmap` [h * 2h, 3]; differentiable in it."""
-        return torch.stack([lobe @ envmap for lobe in self.lobes])
+        return (self.lobes.flatten(0, 1) @ envmap).unflatten(0, (3, -1))
 
     def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
         """[3, Q, 3] light of each lobe by way of other surfaces, given what leaves each slot [S, 3]."""
@@ -94,7 +94,7 @@ def light_matrix(
     index = np.concatenate([h[0] for h in hits], 1)
     weight = np.concatenate([h[1] for h in hits])
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, (matrices[0], matrices[1], matrices[2]),
+        torch.from_numpy(pixels.astype(np.int64)), shape, torch.stack(matrices),
         torch.from_numpy(index), torch.from_numpy(weight),
         torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
     )  # fmt: skip
