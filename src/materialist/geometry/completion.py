@@ -28,6 +28,9 @@ SKY_SHARE = 0.05
 UPWARD = 0.7
 """Least Y of the normal of a floor or table top. Only those go on behind the camera: a wall or ceiling there would
 shut out the light that the picture never shows."""
+WALL_REACH = 1.2
+"""How far a wall or ceiling goes on, as a multiple of what is seen of it: where it ends is not known, and one continued
+too far shuts out the light from beside and above."""
 BOUNDING = 0.9
 """A plane that has this share of the other points in front of it bounds the scene (floor, wall, ceiling) and goes on
 freely; any other (a table top above a floor) only between its own pixels and across the frame sides that it touches."""
@@ -101,6 +104,8 @@ def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float
     own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
     outdoors = np.mean(~surface) > SKY_SHARE and plane.normal[1] > UPWARD
     half_size = (GROUND_EXTENT if outdoors else extent) * radius
+    if plane.normal[1] < UPWARD:
+        half_size = min(half_size, WALL_REACH * float(np.linalg.norm(own - own.mean(0), axis=-1).max()))
     return _Sheet(index, plane, own, pixels, bool(bounding), touches, half_size)
 
 
