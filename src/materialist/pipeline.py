@@ -15,7 +15,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.types import Array, FitReport, Geometry, Materials, Photo, Prediction, Scene
 
-FINAL_SPP = 64
+FINAL_SPP = 49
 """Samples per pixel of the re-rendering that a scene is judged by."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
