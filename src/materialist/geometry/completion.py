@@ -71,7 +71,7 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, e
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
-    of the scene nor cross the frame (the flat side of an object) are left alone.
+    of the scene nor cross the frame (the flat side of an object) are left alone. Walls go on by `WALL_REACH` only.
     """
     depth = np.asarray(depth, np.float64)
     sheets = [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent))]
