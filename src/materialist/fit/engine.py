@@ -83,6 +83,7 @@ class TransportEngine:
         self.camera, self.seed = camera, seed
         self.light_height, self.light_pixels = light_height, light_pixels
         self.radiance = radiance
+        self._last: tuple[tuple[Materials, Array], LightProblem] | None = None
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
@@ -92,6 +93,13 @@ class TransportEngine:
         self.radiance = radiance
 
     def light_problem(self, materials: Materials) -> LightProblem:
+        # The same question is asked twice in a row: how far to trust the prior, and then what light it wants.
+        asked = (materials, self.radiance)
+        if self._last is None or any(a is not b for a, b in zip(self._last[0], asked, strict=True)):
+            self._last = (asked, self._light_problem(materials))
+        return self._last[1]
+
+    def _light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
         rows = _subset(rng, len(self.cache.pixels), min(1.0, share))
