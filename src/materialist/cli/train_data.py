@@ -1,0 +1,58 @@
+"""`materialist train data`: procedural, labelled renderings."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from materialist.cli.options import Json, Seed
+from materialist.cli.outcome import report_success
+
+
+class Split(StrEnum):
+    """Which half of the captured meshes and HDR maps a data set may use."""
+
+    train = "train"
+    heldout = "heldout"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("data")(data)
+
+
+def data(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")],
+    count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
+    size: Annotated[int, typer.Option(help="Pixels on a side.")] = 256,
+    seed: Seed = 0,
+    workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
+    spp: Annotated[int, typer.Option(help="Samples per pixel, before denoising.")] = 36,
+    meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None,
+    envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None,
+    split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train,
+    resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
+    if sheet is not None:
+        from materialist.train.data.sheet import write_sheet
+
+        shown = write_sheet(output, sheet, seed=seed)
+        report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
+        return
+    from materialist.cli.progress import StageProgress
+    from materialist.train.data.produce import Options, produce
+
+    options = Options(size=size, seed=seed, spp=spp, split=split.value, meshes=meshes, envmaps=envmaps)
+    with StageProgress(quiet=as_json) as progress:
+        made = produce(output, options, count=count, workers=workers, resume=resume, progress=progress)
+    lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
+    report_success("train data", as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,
+                   seconds=made.seconds)  # fmt: skip

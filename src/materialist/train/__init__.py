@@ -1,0 +1,1 @@
+"""Training of the bundled network: its procedural data set and the trainer."""
