@@ -1,0 +1,182 @@
+"""The bundled network: one convolutional encoder and decoder from a photo to all maps.
+
+It stands where the paper has MatNet (section "Material Prediction Network") and gives the same maps. Plain 3x3
+convolutions on few, wide levels: on a CPU these run several times closer to the peak than depthwise ones, and they
+learn from scratch with far fewer pictures than a transformer. Two attention blocks on the coarsest level see the
+whole picture. Everything is relative to the camera rays, so that any field of view and any crop can be told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+STRIDE = 32
+"""Sides of the input are multiples of this."""
+CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
+"""Maps that the network answers with, and their channels."""
+LOG_FLOOR = 2.0**-7
+"""Radiance below which the logarithmic input no longer tells pixels apart."""
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Widths and depths; stored with the weights."""
+
+    widths: tuple[int, int, int, int] = (64, 128, 192, 256)
+    """Channels at 1/4, 1/8, 1/16 and 1/32 of the resolution."""
+    blocks: tuple[int, int, int, int] = (1, 2, 3, 2)
+    """Residual blocks of the encoder at each."""
+    attention: int = 2
+    """Attention blocks at 1/32."""
+    decoder_blocks: tuple[int, int, int] = (2, 1, 2)
+    """Residual blocks of the decoder at 1/4, 1/8, 1/16."""
+    fine: int = 32
+    """Channels at 1/2."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain lists and numbers, for JSON."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Architecture:
+        """The inverse of `as_dict`; raises TypeError for unknown names."""
+        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+
+
+class BundledNetwork(nn.Module):
+    """Photo and camera rays in, all maps out."""
+
+    def __init__(self, architecture: Architecture | None = None):
+        super().__init__()
+        self.architecture = a = architecture or Architecture()
+        w = a.widths
+        self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), _norm(w[0]), nn.SiLU())
+        self.levels = nn.ModuleList(nn.Sequential(*(_Block(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
+        self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
+        self.place = nn.Conv2d(4, w[3], 1)
+        self.attention = nn.ModuleList(_Attention(w[3]) for _ in range(a.attention))
+        self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
+        self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
+        self.decoders = nn.ModuleList(
+            nn.Sequential(*(_Block(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
+        )
+        self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
+        self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), _norm(a.fine), nn.SiLU())
+        self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
+
+    def forward(self, image: Tensor, rays: Tensor) -> dict[str, Tensor]:
+        """All maps of a batch of photos.
+
+        Args:
+            image: [B, 3, H, W] linear Rec.709 radiance, >= 0, exposed so that white is about 1; sides are multiples
+                of 32.
+            rays: [B, 2, H, W] x and y of the camera rays at z = -1 (see camera.pixel_rays).
+
+        Returns:
+            albedo [B, 3, H, W] sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
+            [B, 3, H, W] unit; depth [B, 1, H, W] natural logarithm of planar depth, up to a constant; mask
+            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid.
+        """
+        picture = encode(image)
+        x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), _shrink(rays, 4)], 1))
+        x, skips = self.levels[0](x), []
+        for k in range(3):
+            skips.append(x)
+            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)))
+        x = self._context(x, _shrink(rays, STRIDE))
+        for k in (2, 1, 0):
+            x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
+            x = self.decoders[k](x + self.skips[k](skips[k]))
+        x = F.pixel_shuffle(self.fine(x), 2)
+        x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
+        return _maps(F.pixel_shuffle(self.head(x).float(), 2))
+
+    def _context(self, x: Tensor, rays: Tensor) -> Tensor:
+        """Attention over the coarsest level [B, C, h, w], told where each cell looks."""
+        batch, channels, height, width = x.shape
+        x = x + self.place(torch.cat([rays, rays.square()], 1))
+        tokens = x.flatten(2).transpose(1, 2)  # [B, h w, C]
+        for block in self.attention:
+            tokens = block(tokens)
+        return tokens.transpose(1, 2).reshape(batch, channels, height, width)
+
+
+def encode(image: Tensor) -> Tensor:
+    """[B, 6, H, W] what the network sees of linear radiance [B, 3, H, W]: a photo-like curve, and a logarithm.
+
+    The curve separates mid-tones, the logarithm makes a change of light the same difference everywhere.
+    """
+    image = image.clamp(min=0)
+    curve = image.clamp(max=1.5).add(1e-4).pow(1 / 2.4) - 0.5
+    logarithm = (image.clamp(max=64) + LOG_FLOOR).log2() / 4 + 0.5
+    return torch.cat([curve, logarithm], 1)
+
+
+def _maps(raw: Tensor) -> dict[str, Tensor]:
+    """The heads [B, 10, H, W] float32 as maps."""
+    maps = dict(zip(CHANNELS, raw.split(list(CHANNELS.values()), 1), strict=True))
+    return {
+        "albedo": maps["albedo"].sigmoid(),
+        "roughness": maps["roughness"].sigmoid(),
+        "metallic": maps["metallic"].sigmoid(),
+        "metallic_logit": maps["metallic"],
+        "normal": _facing(maps["normal"]),
+        "depth": maps["depth"],
+        "mask": maps["mask"],
+    }
+
+
+def _facing(raw: Tensor) -> Tensor:
+    """Unit vectors of raw [B, 3, H, W]; raw zero looks at the viewer."""
+    return F.normalize(raw + raw.new_tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1), dim=1, eps=1e-4)
+
+
+def _shrink(rays: Tensor, factor: int) -> Tensor:
+    """Mean ray of every factor x factor cell."""
+    return F.avg_pool2d(rays, factor)
+
+
+def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:
+    return nn.Conv2d(inputs, outputs, 3, padding=1, bias=bias)
+
+
+def _norm(channels: int) -> nn.GroupNorm:
+    # Statistics over each picture alone: small batches train, and a batch of one predicts, alike.
+    return nn.GroupNorm(8, channels)
+
+
+class _Block(nn.Module):
+    """Residual block: two normalised 3x3 convolutions, starting as the identity."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.norm1, self.conv1 = _norm(channels), _conv(channels, channels)
+        self.norm2, self.conv2 = _norm(channels), _conv(channels, channels)
+        nn.init.zeros_(self.conv2.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.conv1(F.silu(self.norm1(x)))
+        return x + self.conv2(F.silu(self.norm2(y)))
+
+
+class _Attention(nn.Module):
+    """Pre-norm transformer block over cells [B, n, C]; cells know their place from their rays."""
+
+    def __init__(self, channels: int, head_size: int = 32):
+        super().__init__()
+        self.heads = channels // head_size
+        self.norm1, self.norm2 = nn.LayerNorm(channels), nn.LayerNorm(channels)
+        self.qkv, self.out = nn.Linear(channels, 3 * channels), nn.Linear(channels, channels)
+        self.up, self.down = nn.Linear(channels, 3 * channels), nn.Linear(3 * channels, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        batch, cells, channels = x.shape
+        qkv = self.qkv(self.norm1(x)).view(batch, cells, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        seen = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
+        x = x + self.out(seen.transpose(1, 2).reshape(batch, cells, channels))
+        return x + self.down(F.gelu(self.up(self.norm2(x))))
