@@ -1,0 +1,69 @@
+"""Our MatNet against the published one: names, shapes and numbers (../shared/parity)."""
+
+import json
+import zlib
+from math import prod
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from materialist.predict.matnet.inference import infer
+from materialist.predict.matnet.network import MatNet
+
+PARITY = Path(__file__).parents[4] / "shared" / "parity"
+MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
+
+pytestmark = pytest.mark.skipif(not PARITY.is_dir(), reason="needs ../shared/parity")
+
+
+def filled(name: str, shape: list[int]) -> torch.Tensor:
+    """One tensor of the fixture's recipe."""
+    r = torch.randn(shape, generator=torch.Generator().manual_seed(zlib.crc32(name.encode())))
+    if len(shape) >= 2:
+        return r / prod(shape[1:]) ** 0.5
+    if name.endswith("gamma") or ("norm" in name and name.endswith("weight")):
+        return 1 + 0.1 * r
+    return 0.1 * r
+
+
+@pytest.fixture(scope="module")
+def expected() -> dict[str, np.ndarray]:
+    return dict(np.load(PARITY / "matnet_vitb_io.npz"))
+
+
+@pytest.fixture(scope="module")
+def network() -> MatNet:
+    keys = json.loads((PARITY / "matnet_vitb_keys.json").read_text())
+    network = MatNet("vitb")
+    network.load_state_dict({name: filled(name, shape) for name, shape in keys.items()}, strict=True)
+    return network.eval()
+
+
+def worst(found: np.ndarray, wanted: np.ndarray) -> float:
+    """Largest difference, relative to the largest value."""
+    assert found.shape == wanted.shape
+    return float(np.abs(found - wanted).max() / np.abs(wanted).max())
+
+
+def test_names_and_shapes_are_the_published_ones():
+    keys = json.loads((PARITY / "matnet_vitb_keys.json").read_text())
+    with torch.device("meta"):
+        ours = {name: list(x.shape) for name, x in MatNet("vitb").state_dict().items()}
+    assert len(keys) == 303
+    assert ours == keys
+
+
+def test_forward_is_the_published_one(network, expected):
+    image = torch.from_numpy(expected["image"]).permute(2, 0, 1)[None]
+    with torch.no_grad():
+        outputs = network(image)
+    for name in MAPS:
+        assert worst(outputs[name][0].numpy(), expected[f"forward_{name}"]) < 1e-4, name
+
+
+def test_inference_is_the_published_one(network, expected):
+    outputs = infer(network, expected["image"], input_size=140)
+    for name in MAPS:
+        assert worst(outputs[name], expected[f"infer140_{name}"]) < 1e-4, name
