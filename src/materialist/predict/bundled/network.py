@@ -68,6 +68,8 @@ class BundledNetwork(nn.Module):
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
         self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), _norm(a.fine), nn.SiLU())
         self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
+        _same_subpixels(self.fine)
+        _same_subpixels(self.head)
 
     def forward(self, image: Tensor, rays: Tensor) -> dict[str, Tensor]:
         """All maps of a batch of photos.
@@ -148,6 +150,14 @@ def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:
 def _norm(channels: int) -> nn.GroupNorm:
     # Statistics over each picture alone: small batches train, and a batch of one predicts, alike.
     return nn.GroupNorm(8, channels)
+
+
+@torch.no_grad()
+def _same_subpixels(conv: nn.Conv2d) -> None:
+    """Start the four pixels that pixel_shuffle makes of one as equals: no checkerboard (Aitken et al. 2017)."""
+    conv.weight.copy_(conv.weight[::4].repeat_interleave(4, 0))
+    if conv.bias is not None:
+        conv.bias.zero_()
 
 
 class _Block(nn.Module):

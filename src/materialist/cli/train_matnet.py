@@ -1,0 +1,92 @@
+"""`materialist train matnet` and `materialist train export`: train the networks that predict materials."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.outcome import report_success
+from materialist.errors import InputError
+
+
+class Config(StrEnum):
+    """Which network and recipe."""
+
+    bundled = "bundled"
+    paper = "paper"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command("matnet")(matnet)
+    app.command("export")(export)
+
+
+def matnet(
+    data: Annotated[Path, typer.Option(help="A set made by `materialist train data`, or an InteriorVerse folder.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="Folder of the run.")],
+    config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False,
+    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None,
+    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None,
+    batch: Annotated[int | None, typer.Option(help="Pictures a step, on each device; default: the recipe's.")] = None,
+    size: Annotated[int | None, typer.Option(help="Side of the crops, pixels; default: the recipe's.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None,
+    init: Annotated[
+        Path | None, typer.Option(help="paper: a Depth Anything or DINOv2 checkpoint to begin from.")
+    ] = None,
+    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 300,
+    score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
+    workers: Annotated[int, typer.Option(help="Processes that load data, for each training process.")] = 1,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
+) -> None:
+    """Train a network; several GPUs: torchrun --nproc-per-node N -m materialist train matnet ..."""
+    from materialist.train.budget import Budget
+    from materialist.train.recipes import recipe
+
+    budget = Budget(steps=steps, minutes=minutes)
+    chosen = recipe(config.value, batch=batch, size=size, rate=rate)
+    if init is not None and config is not Config.paper:
+        raise InputError("--init is for --config paper; the bundled network starts from scratch.")
+    from materialist.cli.progress import StageProgress
+    from materialist.train.launch import join
+    from materialist.train.sources import open_source
+    from materialist.train.tasks import task
+    from materialist.train.trainer import Habits, Trainer
+
+    processes = join(device.value)
+    quiet = as_json or not processes.first
+    habits = Habits(checkpoint_seconds=every, score_samples=score_samples, workers=workers, seed=seed)
+    try:
+        with StageProgress(quiet=quiet) as progress:
+            trainer = Trainer(
+                chosen, task(chosen, {"init": init} if init else None), open_source(data, size=chosen.size), output,
+                budget=budget, habits=habits, processes=processes, resume=resume,
+                note=(lambda _: None) if quiet else lambda text: typer.echo(text, err=True),
+            )  # fmt: skip
+            figures = trainer.run(progress)
+    finally:
+        processes.leave()
+    if processes.first:
+        lines = [f"{output}: step {trainer.clock.step}.", f"Look at {output / 'sheet.png'}"]
+        report_success("train matnet", as_json, lines, run=str(output), step=trainer.clock.step, **figures)
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run of `train matnet`.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="A .safetensors file.")],
+    as_json: Json = False,
+    force: Force = False,
+) -> None:
+    """Write the averaged weights of a run as float16 with everything needed to load them."""
+    from materialist.train.export import export_run
+
+    facts = export_run(run, output, force=force)
+    lines = [f"{output}: {facts['megabytes']:.1f} MB after {facts['step']} steps."]
+    report_success("train export", as_json, lines, output=str(output), **facts)

@@ -1,0 +1,136 @@
+"""From a photo of any size to maps: what happens around the bundled network."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+
+from materialist.camera import pixel_rays
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.predict import resample
+from materialist.predict.bundled.network import STRIDE, BundledNetwork
+from materialist.types import Array, Camera, Materials, Prediction
+
+NETWORK_SIDE = 768
+"""Longest side that the network sees; larger photos are brought down and the maps up again, guided by the photo."""
+MEDIAN_DEPTH = 3.0
+"""Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
+DEPTH_SPAN = 50.0
+"""Largest ratio of a depth to the median, either way."""
+LEAST_ISLAND = 0.0005
+"""Specks of sky or surface smaller than this part of the picture are taken for their surroundings."""
+
+
+def infer(
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", side: int = NETWORK_SIDE
+) -> Prediction:
+    """Maps of a photo at its own size.
+
+    Args:
+        network: in evaluation mode, on `device`.
+        linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
+        rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
+        side: longest side, in pixels, that the network sees.
+
+    Returns:
+        A Prediction without a name: albedo linear, depth with median MEDIAN_DEPTH, 0 where the network sees no surface.
+    """
+    linear = np.clip(linear, 0, 1).astype(np.float32)
+    size = linear.shape[:2]
+    small = _network_size(size, side)
+    photo = resample.values(linear, small)
+    maps = _run(network, photo, resample.values(np.ascontiguousarray(rays), small), device)
+    surface = _without_specks(maps["mask"] > 0)
+    if not surface.any():
+        surface[:] = True
+    depth = _scaled(maps["depth"], surface)
+    albedo, roughness, metallic, normal = (maps[n] for n in ("albedo", "roughness", "metallic", "normal"))
+    if small != size:
+        guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
+        albedo, roughness, metallic = (guided(m, guide, fine) for m in (albedo, roughness, metallic))
+        depth, normal = resample.depth(depth, size), resample.normals(normal, size)
+    normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
+    materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
+    return Prediction(materials, normal, depth)
+
+
+def rays_of(camera: Camera) -> Array:
+    """[H, W, 2] x and y of the camera rays."""
+    return pixel_rays(camera)[..., :2].copy()
+
+
+def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float = 1e-3) -> Array:
+    """Values [h, w] or [h, w, c] in [0, 1] brought to the size of `fine`, with edges where the photo has them.
+
+    Fast guided filter (He and Sun 2015) with a grey guide: in every window the map is a line over the photo's
+    brightness; its two coefficients are smooth and are enlarged instead of the map.
+    """
+    grey, grey_fine = guide.mean(-1), fine.mean(-1)  # [h, w], [H, W]
+    box = lambda x: cv2.blur(x, (2 * radius + 1, 2 * radius + 1), borderType=cv2.BORDER_REFLECT)  # noqa: E731
+    mean_grey = box(grey)
+    variance = box(grey * grey) - mean_grey**2
+    planes = values[..., None] if values.ndim == 2 else values
+    result = []
+    for k in range(planes.shape[-1]):
+        plane = np.ascontiguousarray(planes[..., k])
+        slope = (box(grey * plane) - mean_grey * box(plane)) / (variance + eps)
+        offset = box(box(plane) - slope * mean_grey)
+        slope = box(slope)
+        # What the window's line leaves over is kept, so that the enlarged map is the map where nothing is finer.
+        rest = plane - (slope * grey + offset)
+        enlarged = [resample.values(np.ascontiguousarray(x), fine.shape[:2]) for x in (slope, offset, rest)]
+        result.append(enlarged[0] * grey_fine + enlarged[1] + enlarged[2])
+    return np.clip(result[0] if values.ndim == 2 else np.stack(result, -1), 0, 1).astype(np.float32)
+
+
+def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:
+    """The network's maps at the size of `photo` [h, w, 3]: [h, w] or [h, w, 3] float32."""
+    height, width = photo.shape[:2]
+    below, right = -height % STRIDE, -width % STRIDE
+    padded = np.pad(photo, ((0, below), (0, right), (0, 0)), mode="edge")
+    # Rays are linear in the pixel, so they go on as such.
+    extended = np.empty((*padded.shape[:2], 2), np.float32)
+    extended[..., 0] = _linear(rays[0, :, 0], right)[None, :]
+    extended[..., 1] = _linear(rays[:, 0, 1], below)[:, None]
+    tensors = [torch.from_numpy(x).permute(2, 0, 1)[None].to(device) for x in (padded, extended)]
+    with torch.inference_mode():
+        maps = network(tensors[0].contiguous(memory_format=torch.channels_last), tensors[1])
+    arrays = {name: m[0, :, :height, :width].permute(1, 2, 0).float().cpu().numpy() for name, m in maps.items()}
+    return {n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()}
+
+
+def _linear(values: Array, more: int) -> Array:
+    """Evenly spaced values [n] and `more` further ones."""
+    step = (values[-1] - values[0]) / max(len(values) - 1, 1)
+    return np.concatenate([values, values[-1] + step * np.arange(1, more + 1)])
+
+
+def _network_size(size: tuple[int, int], side: int) -> tuple[int, int]:
+    """The size (height, width) that the network sees of a photo of this size."""
+    factor = min(1.0, side / max(size))
+    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
+
+
+def _scaled(log_depth: Array, surface: Array) -> Array:
+    """Depth [h, w] with median MEDIAN_DEPTH over the surface, 0 elsewhere."""
+    relative = log_depth - np.median(log_depth[surface])
+    limit = np.log(DEPTH_SPAN)
+    return np.where(surface, MEDIAN_DEPTH * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
+
+
+def _without_specks(surface: Array) -> Array:
+    """The surface [h, w] bool without tiny islands of either kind."""
+    least = max(4, int(LEAST_ISLAND * surface.size))
+    for wanted in (True, False):
+        count, labels, stats, _ = cv2.connectedComponentsWithStats((surface == wanted).astype(np.uint8), connectivity=4)
+        small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] < least]
+        if small:
+            surface = np.where(np.isin(labels, small), not wanted, surface)
+    return surface
+
+
+def _unit(normal: Array) -> Array:
+    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)

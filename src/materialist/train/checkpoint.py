@@ -1,0 +1,57 @@
+"""The state of a training run on disk: written whole or not at all, so that a killed run goes on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from materialist.errors import OutputError, WeightsError
+
+NAME = "checkpoint.pt"
+VERSION = 1
+
+
+def save(folder: Path, state: dict[str, Any]) -> None:
+    """Write the state (tensors, numbers, texts, and lists and dicts of them) to FOLDER/checkpoint.pt."""
+    partial = folder / (NAME + ".part")
+    try:
+        torch.save({"version": VERSION, **state}, partial)
+        partial.replace(folder / NAME)
+    except (OSError, RuntimeError) as error:
+        partial.unlink(missing_ok=True)
+        raise OutputError(f"The checkpoint cannot be written to {folder}: {error}.") from error
+
+
+def load(folder: Path, device: Any = "cpu") -> dict[str, Any]:
+    """The state in FOLDER/checkpoint.pt; raises WeightsError when there is none or it is damaged."""
+    path = folder / NAME
+    if not path.is_file():
+        raise WeightsError(f"{folder} holds no {NAME}; start the run without --resume.")
+    try:
+        state = torch.load(path, map_location=device, weights_only=True)
+    except Exception as error:  # torch raises what its unpickler or zip reader raises
+        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
+        raise WeightsError(f"{path} is damaged ({reason}); start the run anew in another folder.") from error
+    if not isinstance(state, dict) or state.get("version") != VERSION:
+        raise WeightsError(f"{path} is no checkpoint of this version; start the run anew in another folder.")
+    return state
+
+
+def append_line(path: Path, values: dict[str, Any]) -> None:
+    """Add one line of JSON to a curve file."""
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(values) + "\n")
+
+
+def read_lines(path: Path) -> list[dict[str, Any]]:
+    """The lines of a curve file; none when it is not there. A last line that was cut off is left out."""
+    found = []
+    for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
+        try:
+            found.append(json.loads(line))
+        except ValueError:
+            continue
+    return found

@@ -1,0 +1,47 @@
+"""From a training run to the weights that ship."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import InputError, OutputError
+from materialist.predict.bundled.network import Architecture, BundledNetwork
+from materialist.predict.bundled.weights import file_hash, save_weights
+from materialist.train import checkpoint
+from materialist.train.trainer import SCORES
+
+
+def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any]:
+    """Write the averaged weights of a bundled run as float16 .safetensors; returns step, minutes, megabytes, hash.
+
+    Raises WeightsError without a checkpoint, InputError for a run of another network, OutputError when `output` exists.
+    """
+    if output.suffix != ".safetensors":
+        raise InputError(f"The weights are a .safetensors file, not {output.name}.")
+    if output.exists() and not force:
+        raise OutputError(f"{output} exists; choose another name, or add --force to replace it.")
+    state = checkpoint.load(run)
+    if state["recipe"]["task"] != "bundled":
+        raise InputError(f"{run} is a run of the recipe '{state['recipe']['name']}'; only 'bundled' runs are exported.")
+    network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
+    network.load_state_dict(state["averaged" if state["recipe"]["ema"] else "network"])
+    scores = checkpoint.read_lines(run / SCORES)
+    facts = {
+        "step": state["step"],
+        "minutes": round(state["seconds"] / 60, 1),
+        "pictures": state["step"] * state["recipe"]["batch"],
+        "recipe": state["recipe"],
+        "data": state["data"],
+        "scores": scores[-1] if scores else {},
+    }
+    try:
+        save_weights(output, network, facts)
+    except OSError as error:
+        raise OutputError(f"The weights cannot be written to {output}: {error.strerror or error}.") from error
+    return {
+        "step": state["step"],
+        "minutes": facts["minutes"],
+        "megabytes": output.stat().st_size / 1e6,
+        "hash": file_hash(output),
+    }

@@ -1,0 +1,60 @@
+"""One process or several: what torchrun says, and what the processes tell each other."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import torch
+from torch import distributed, nn
+from torch.nn.parallel import DistributedDataParallel
+
+from materialist.errors import SetupError
+
+
+@dataclass(frozen=True)
+class Processes:
+    """The place of this process among those that train together."""
+
+    rank: int = 0
+    world: int = 1
+    device: torch.device = field(default_factory=lambda: torch.device("cpu"))
+
+    @property
+    def first(self) -> bool:
+        """Whether this process writes the files."""
+        return self.rank == 0
+
+    def wrap(self, network: nn.Module) -> nn.Module:
+        """The network as the training step calls it: gradients are averaged over all processes."""
+        if self.world == 1:
+            return network
+        places = [self.device.index] if self.device.type == "cuda" else None
+        return DistributedDataParallel(network, device_ids=places)
+
+    def agree(self, stop: bool) -> bool:
+        """The first process's answer, for all: clocks differ, but all must stop after the same step."""
+        if self.world == 1:
+            return stop
+        answer = torch.tensor([float(stop)], device=self.device)
+        distributed.broadcast(answer, src=0)
+        return bool(answer.item())
+
+    def leave(self) -> None:
+        """Part from the others."""
+        if self.world > 1 and distributed.is_initialized():
+            distributed.destroy_process_group()
+
+
+def join(device: str = "auto") -> Processes:
+    """Take the place that torchrun gave this process, or be alone; raises SetupError when there is no such device."""
+    if device == "cuda" and not torch.cuda.is_available():
+        raise SetupError("There is no CUDA device that PyTorch can use; train with --device cpu.")
+    cuda = device != "cpu" and torch.cuda.is_available()
+    world, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
+    place = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if cuda else torch.device("cpu")
+    if cuda:
+        torch.cuda.set_device(place)
+    if world > 1:
+        distributed.init_process_group("nccl" if cuda else "gloo")
+    return Processes(rank, world, place)

@@ -1,0 +1,130 @@
+"""Losses between maps [B, C, H, W], over the pixels that a mask [B, 1, H, W] keeps; each is a scalar."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+SILOG_LAMBDA = 0.5
+"""Weight of the mean term (paper, equation of L_D)."""
+SILOG_RANGE = (1e-3, 20.0)
+"""Depths that count (paper: "we set the mask to a depth value in [0, 20]"); a logarithm needs more than 0."""
+
+
+def mean(error: Tensor, mask: Tensor) -> Tensor:
+    """Mean of error [B, C, H, W] over the kept pixels; 0 when none is kept."""
+    return (error * mask).sum() / (mask.sum() * error.shape[1]).clamp(min=1)
+
+
+def l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """Mean absolute difference."""
+    return mean((predicted - true).abs(), mask)
+
+
+def l2(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """Mean squared difference."""
+    return mean((predicted - true).square(), mask)
+
+
+def cosine(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """1 - cosine of the angle between normals (paper: L_N)."""
+    return mean(1 - F.cosine_similarity(predicted, true, dim=1).unsqueeze(1), mask)
+
+
+def silog(predicted: Tensor, true: Tensor, mask: Tensor, lam: float = SILOG_LAMBDA) -> Tensor:
+    """The paper's L_D of depths: sqrt(E[g^2] - lam E[g]^2), g = log true - log predicted, for depths in (0, 20].
+
+    lam = 1 does not see the scale at all, lam = 0 sees it fully.
+    """
+    mask = mask * ((true > SILOG_RANGE[0]) & (true <= SILOG_RANGE[1]))
+    g = true.clamp(min=SILOG_RANGE[0]).log() - predicted.clamp(min=SILOG_RANGE[0]).log()
+    # A root has no gradient at 0.
+    return (mean(g.square(), mask) - lam * mean(g, mask).square()).clamp(min=1e-8).sqrt()
+
+
+def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor, limit: float = 2.0) -> Tensor:
+    """L1 of logarithmic depths after each picture's mean difference is removed: blind to scale, robust to outliers."""
+    difference = predicted - true
+    shift = per_picture(difference, mask)
+    return mean((difference - shift).abs().clamp(max=limit), mask)
+
+
+def scaled_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """L1 of linear albedos after one factor a picture (least squares; itself not a path of the gradient)."""
+    with torch.no_grad():
+        over = (predicted * true * mask).flatten(1).sum(1)
+        under = (predicted.square() * mask).flatten(1).sum(1)
+        scale = (over / under.clamp(min=1e-6)).clamp(0.25, 4).view(-1, 1, 1, 1)
+    return l1(predicted * scale, true, mask)
+
+
+def gradient(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> Tensor:
+    """L1 of the differences of neighbours, at 1, 1/2, 1/4, ... of the resolution: edges where they are, flat elsewhere.
+
+    Coarser scales are plain subsampling, so that both neighbours of a difference are pixels that the mask keeps.
+    """
+    total = predicted.new_zeros(())
+    for scale in range(scales):
+        step = 2**scale
+        p, t, m = (x[..., ::step, ::step] for x in (predicted, true, mask))
+        difference = p - t
+        across = mean((difference[..., 1:] - difference[..., :-1]).abs(), m[..., 1:] * m[..., :-1])
+        down = mean((difference[..., 1:, :] - difference[..., :-1, :]).abs(), m[..., 1:, :] * m[..., :-1, :])
+        total = total + across + down
+    return total / scales
+
+
+def perceptual_substitute(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> Tensor:
+    """Stands in for LPIPS where its backbone cannot be had: multi-scale structure of encoded colours in [0, 1].
+
+    LPIPS compares network features over growing windows, each normalised. This compares the same windows without a
+    network: 1 - structural similarity (7 x 7 means, as Wang et al. 2004) at 1, 1/2, 1/4, 1/8 of the resolution, plus
+    the multi-scale gradient loss. In [0, 2] or so, like LPIPS about 0.1 to 0.6 for images of interest.
+    """
+    total = gradient(predicted, true, mask, scales)
+    p, t, m = predicted * mask, true * mask, mask
+    for _ in range(scales):
+        total = total + (1 - _ssim(p, t, m)) / scales
+        if min(p.shape[-2:]) < 14:
+            break
+        p, t, m = (F.avg_pool2d(x, 2) for x in (p, t, m))
+    return total
+
+
+def per_picture(values: Tensor, mask: Tensor) -> Tensor:
+    """[B, 1, 1, 1] mean of values [B, C, H, W] over the kept pixels of each picture."""
+    over = (values * mask).flatten(1).sum(1)
+    return (over / (mask.flatten(1).sum(1) * values.shape[1]).clamp(min=1)).view(-1, 1, 1, 1)
+
+
+def slopes(log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, step: int = 4) -> Tensor:
+    """1 - cosine between the normals of the depth surface and the true ones: flat walls stay flat in the mesh.
+
+    log_depth [B, 1, H, W], rays [B, 2, H, W]. Depth is averaged over step x step cells, and cells on an edge of the
+    true surface, where neighbours belong to other objects, do not count.
+    """
+    depth = F.avg_pool2d(log_depth, step).clamp(-8, 8).exp()
+    directions = F.avg_pool2d(rays, step)
+    points = torch.cat([directions, -torch.ones_like(depth)], 1) * depth  # [B, 3, h, w]
+    across = points[..., 1:-1, 2:] - points[..., 1:-1, :-2]
+    down = points[..., 2:, 1:-1] - points[..., :-2, 1:-1]
+    normal = torch.linalg.cross(down, across, dim=1)  # +Z to the viewer: rows run downwards
+    true = F.avg_pool2d(true_normal, step)[..., 1:-1, 1:-1]
+    # The mean of unit vectors is short where they disagree; and all nine cells must be surface.
+    whole = 1 - F.max_pool2d(1 - F.avg_pool2d(mask, step), 3, 1)
+    alike = (true.norm(dim=1, keepdim=True) > 0.97).float() * (whole > 0.99).float()
+    return mean(1 - F.cosine_similarity(normal, true, dim=1, eps=1e-8).unsqueeze(1), alike)
+
+
+def _ssim(a: Tensor, b: Tensor, mask: Tensor) -> Tensor:
+    """Mean structural similarity over 7 x 7 windows whose centre is kept."""
+    window = min(7, *a.shape[-2:])
+    pool = lambda x: F.avg_pool2d(x, window, 1)  # noqa: E731
+    mean_a, mean_b = pool(a), pool(b)
+    var_a, var_b = pool(a * a) - mean_a**2, pool(b * b) - mean_b**2
+    covariance = pool(a * b) - mean_a * mean_b
+    c1, c2 = 0.01**2, 0.03**2
+    similarity = (2 * mean_a * mean_b + c1) * (2 * covariance + c2)
+    similarity = similarity / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))
+    return mean(similarity, pool(mask)) if bool(mask.any()) else similarity.new_ones(())

@@ -1,0 +1,132 @@
+"""Labelled pictures to train on: what one is, and the folder format of the procedural data set."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.color import srgb_to_linear
+from materialist.errors import InputError
+from materialist.types import Array, Camera, Materials, Prediction
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One picture and its true maps, in the conventions of the project."""
+
+    image: Array
+    """[H, W, 3] float32 linear radiance, exposed, not clipped."""
+    albedo: Array
+    """[H, W, 3] float32 linear, in [0, 1]."""
+    roughness: Array
+    """[H, W] float32, in [0, 1]."""
+    metallic: Array
+    """[H, W] float32, in [0, 1]."""
+    normal: Array
+    """[H, W, 3] float32 unit, camera frame; zero where there is no surface."""
+    depth: Array
+    """[H, W] float32 planar, > 0, scene units; 0 where there is no surface."""
+    mask: Array
+    """[H, W] float32: 1 where the maps hold."""
+    rays: Array
+    """[H, W, 2] float32 x and y of the camera rays at z = -1: what a crop keeps of its camera."""
+    shading: Array | None = None
+    """[H, W, 3] float32 with image = albedo (1 - metallic) shading + rest; None where it is not known."""
+
+    def truth(self) -> Prediction:
+        """The true maps as a prediction."""
+        return Prediction(
+            Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, predictor="truth"
+        )
+
+
+_DECODED = srgb_to_linear(np.arange(256, dtype=np.float32) / 255)
+"""[256] linear values of 8-bit codes: a table is ten times faster than the curve."""
+
+
+class Source(Protocol):
+    """A set of samples."""
+
+    def __len__(self) -> int:
+        """How many there are at present."""
+        ...
+
+    def read(self, index: int) -> Sample:
+        """Sample number `index`."""
+        ...
+
+    def refresh(self) -> None:
+        """Look again: a set may grow while it is used."""
+        ...
+
+
+class SampleFolder:
+    """DIR/dataset.json and DIR/samples/NNNNNNN.npz, as `materialist train data` writes them."""
+
+    def __init__(self, folder: str | Path):
+        self.folder = Path(folder)
+        if not (self.folder / "samples").is_dir():
+            raise InputError(f"{self.folder} holds no folder 'samples'; make a data set with: materialist train data.")
+        self.paths: list[Path] = []
+        self.refresh()
+        if not self.paths:
+            raise InputError(f"{self.folder} holds no samples yet; make some with: materialist train data.")
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def read(self, index: int) -> Sample:
+        """Sample number `index` in the order of names."""
+        return read_sample(self.paths[index])
+
+    def refresh(self) -> None:
+        """List the folder again."""
+        self.paths = sorted((self.folder / "samples").glob("[0-9]*.npz"))
+
+    def seed(self) -> int | None:
+        """The seed that the set was made with, when dataset.json tells."""
+        try:
+            content = json.loads((self.folder / "dataset.json").read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+        found = content.get("seed", content.get("options", {}).get("seed"))
+        return found if isinstance(found, int) else None
+
+
+def read_sample(path: Path) -> Sample:
+    """The sample in an .npz file; raises InputError naming the file when it is damaged or lacks an array."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        return _decode(arrays)
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"The sample {path} cannot be read ({error}); delete it and make it again.") from error
+    except KeyError as error:
+        raise InputError(f"The sample {path} has no array {error}; make the data set again.") from error
+
+
+def _decode(arrays: dict[str, Array]) -> Sample:
+    """The stored arrays, each in its compact type, as float32 maps."""
+    surface = (arrays["mask"] > 0) & (arrays["depth"] > 0)
+    image = arrays["image"].astype(np.float32)
+    height, width = image.shape[:2]
+    normal = arrays["normal"].astype(np.float32)
+    length = np.sqrt(np.einsum("hwc,hwc->hw", normal, normal))[..., None]
+    shading = arrays.get("shading")
+    return Sample(
+        image=np.nan_to_num(image, posinf=6e4),
+        albedo=_DECODED[arrays["albedo"]],
+        roughness=arrays["roughness"].astype(np.float32) / 255,
+        metallic=arrays["metallic"].astype(np.float32) / 255,
+        normal=normal * (surface[..., None] / np.maximum(length, 1)).astype(np.float32),
+        depth=np.where(surface, arrays["depth"].astype(np.float32), 0),
+        mask=surface.astype(np.float32),
+        rays=pixel_rays(Camera(width, height, float(arrays["fov"])))[..., :2].copy(),
+        shading=None if shading is None else np.nan_to_num(shading.astype(np.float32), posinf=6e4),
+    )

@@ -1,0 +1,126 @@
+"""How good predicted maps are: the figures of the paper's Table 1, raw and after one scale where scale is ambiguous.
+
+Protocol. Only pixels with a true surface count. Albedo is compared sRGB-encoded and clipped to [0, 1], as it is and
+after one factor for the whole picture (least squares of linear values): the light's brightness cannot be told from the
+surface's. Roughness and metallic are compared as they are. Depth counts where both depths are positive: MAE and RMSE
+in units of the true depth, as it is and after one factor (least squares); the scale-invariant log RMSE is the standard
+deviation of log predicted - log true. Normals are compared by their angle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.metrics import ssim
+from materialist.types import Array, Prediction
+
+LEAST_SURFACE = 0.01
+"""A picture with less surface than this part of it is not scored."""
+
+
+def score(predicted: Prediction, true: Prediction, *, mask: Array | None = None) -> dict[str, float]:
+    """All figures for one picture; maps of both have one size. `mask` [H, W] bool narrows down what counts.
+
+    Keys: albedo_psnr, albedo_ssim (aligned), albedo_psnr_raw, albedo_ssim_raw, albedo_scale, roughness_psnr,
+    roughness_ssim, metallic_psnr, metallic_ssim, depth_mae, depth_rmse (aligned), depth_mae_raw, depth_rmse_raw,
+    depth_si_log_rmse, depth_coverage, normal_angle, mask_iou. PSNR in dB, angle in degrees. Empty when there is
+    next to no surface. Square errors are given as *_mse as well, so that a set can be pooled.
+    """
+    surface = true.depth > 0 if mask is None else (true.depth > 0) & mask
+    if surface.mean() < LEAST_SURFACE:
+        return {}
+    found = {**_albedo(predicted.materials.albedo, true.materials.albedo, surface)}
+    for name in ("roughness", "metallic"):
+        p, t = getattr(predicted.materials, name), getattr(true.materials, name)
+        found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
+        found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
+        found[f"{name}_ssim"] = _ssim_of_values(p, t, surface)
+    found |= depth_figures(predicted.depth, true.depth, surface)
+    cosine = np.clip((predicted.normal * true.normal).sum(-1), -1, 1)[surface]
+    found["normal_angle"] = float(np.degrees(np.arccos(cosine)).mean())
+    found["mask_iou"] = float(
+        ((predicted.depth > 0) & (true.depth > 0)).sum() / max(((predicted.depth > 0) | (true.depth > 0)).sum(), 1)
+    )
+    return found
+
+
+def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
+    """Figures of planar depth [H, W] against true depth over `surface`; see `score`."""
+    both = surface & (predicted > 0)
+    found = {"depth_coverage": float(both.sum() / max(surface.sum(), 1))}
+    if both.sum() < 2:
+        return found
+    p, t = predicted[both].astype(np.float64), true[both].astype(np.float64)
+    scale = (p * t).sum() / (p * p).sum()
+    for suffix, estimate in (("", p * scale), ("_raw", p)):
+        found[f"depth_mae{suffix}"] = float(np.abs(estimate - t).mean())
+        found[f"depth_rmse{suffix}"] = float(np.sqrt(np.square(estimate - t).mean()))
+    found["depth_si_log_rmse"] = float(np.std(np.log(p) - np.log(t)))
+    return found
+
+
+def ordinal_accuracy(
+    predicted: Array, true: Array, *, pairs: int = 50_000, tolerance: float = 0.02, seed: int = 0
+) -> float:
+    """Part of random pixel pairs whose order in depth is right; pairs truly closer than `tolerance` do not count.
+
+    A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out.
+    """
+    rng = np.random.default_rng(seed)
+    known = np.flatnonzero(true > 0)
+    first, second = rng.choice(known, pairs), rng.choice(known, pairs)
+    t = np.log(true.ravel()[first]) - np.log(true.ravel()[second])
+    clear = np.abs(t) > np.log1p(tolerance)
+    p = predicted.ravel()[first].astype(np.float64) - predicted.ravel()[second]
+    right = np.where(p == 0, 0.5, np.sign(p) == np.sign(t))
+    return float(right[clear].mean()) if clear.any() else float("nan")
+
+
+def summary(rows: list[dict[str, float]]) -> dict[str, float]:
+    """Mean of every figure over pictures, and PSNRs of the pooled square error as NAME_psnr_pooled."""
+    if not rows:
+        return {}
+    keys = dict.fromkeys(key for row in rows for key in row)
+    found = {}
+    for key in keys:
+        values = [row[key] for row in rows if key in row and np.isfinite(row[key])]
+        if values:
+            found[key] = float(np.mean(values))
+    for key in [k for k in found if k.endswith("_mse")]:
+        found[key.replace("_mse", "_psnr_pooled")] = decibel(found[key])
+    return found
+
+
+def decibel(square_error: float) -> float:
+    """PSNR in dB of a mean square error of values in [0, 1]; 100 for none, so that means stay finite."""
+    return float(-10 * np.log10(max(square_error, 1e-10)))
+
+
+def best_scale(predicted: Array, true: Array, surface: Array) -> float:
+    """The factor that brings linear values nearest to the true ones over `surface` [H, W] (least squares)."""
+    p, t = predicted[surface].astype(np.float64), true[surface].astype(np.float64)
+    return float((p * t).sum() / max((p * p).sum(), 1e-12))
+
+
+def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
+    scale = best_scale(predicted, true, surface)
+    found = {"albedo_scale": scale}
+    for suffix, estimate in (("", predicted * np.float32(scale)), ("_raw", predicted)):
+        difference = linear_to_srgb(estimate)[surface].astype(np.float64) - linear_to_srgb(true)[surface]
+        found[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
+        found[f"albedo_psnr{suffix}"] = decibel(found[f"albedo{suffix}_mse"])
+        filled = np.where(surface[..., None], estimate, true)  # outside the surface nothing differs
+        found[f"albedo_ssim{suffix}"] = ssim(filled, true) if min(surface.shape) >= 3 else float("nan")
+    return found
+
+
+def _ssim_of_values(predicted: Array, true: Array, surface: Array) -> float:
+    """SSIM of maps [H, W] in [0, 1] as they are (no encoding)."""
+    from skimage.metrics import structural_similarity
+
+    if min(surface.shape) < 11:
+        return float("nan")
+    filled = np.where(surface, predicted, true).astype(np.float64)
+    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    return float(structural_similarity(filled, true.astype(np.float64), data_range=1, **options))

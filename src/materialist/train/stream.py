@@ -1,0 +1,74 @@
+"""Batches without end: which samples are drawn, in which order, and loaded by whom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import torch
+from torch.utils.data import DataLoader, Dataset
+
+from materialist.train.samples import Sample, Source
+from materialist.train.tasks import Task, tensors
+
+KEPT_ASIDE = 40
+"""Every how-manieth sample is never trained on, but looked at."""
+
+
+class _Variants(Dataset):
+    """Variants of samples; an item is asked for by (sample number, seed of its randomness)."""
+
+    def __init__(self, source: Source, task: Task, size: int):
+        self.source, self.task, self.size = source, task, size
+
+    def __getitem__(self, key: tuple[int, tuple[int, ...]]) -> dict[str, torch.Tensor]:
+        index, seed = key
+        return tensors(self.task.prepare(self.source.read(index), self.size, np.random.default_rng(seed)))
+
+
+def epoch(
+    source: Source, task: Task, *, number: int, size: int, batch: int, seed: int, rank: int = 0, world: int = 1,
+    workers: int = 1,
+) -> Iterator[dict[str, torch.Tensor]]:  # fmt: skip
+    """Batches of one pass over all samples that are not kept aside, in a random order.
+
+    The order and the variants depend on (seed, number) alone, for any number of workers; of `world` processes each
+    gets a share of its own and all get equally many batches. A small set is gone through several times, so that a pass
+    has at least one batch.
+    """
+    source.refresh()
+    chosen = trained_on(len(source))
+    order = np.random.default_rng((seed, number)).permutation(chosen)
+    repeats = -(-batch * world // len(order))
+    order = np.tile(order, repeats)
+    order = order[: len(order) // (batch * world) * batch * world]
+    keys = [(int(order[k]), (seed, number, k)) for k in range(rank, len(order), world)]
+    loader = DataLoader(
+        _Variants(source, task, size),
+        batch_sampler=[keys[k : k + batch] for k in range(0, len(keys), batch)],  # type: ignore[arg-type]
+        num_workers=workers,
+        worker_init_fn=_quiet_worker,
+        prefetch_factor=4 if workers else None,
+    )
+    yield from loader
+
+
+def trained_on(count: int) -> list[int]:
+    """Numbers of the samples to train on, of `count`; the others are kept aside. All, when there are too few."""
+    if count < KEPT_ASIDE:
+        return list(range(count))
+    return [k for k in range(count) if k % KEPT_ASIDE != KEPT_ASIDE - 1]
+
+
+def kept_aside(source: Source, most: int) -> list[Sample]:
+    """Up to `most` samples that are not trained on, spread over those that there are (the first, of a tiny set)."""
+    count = len(source)
+    chosen = list(range(KEPT_ASIDE - 1, count, KEPT_ASIDE)) or list(range(min(count, most)))
+    return [source.read(chosen[k]) for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int))]
+
+
+def _quiet_worker(_: int) -> None:
+    """One thread a worker: the training itself has the others."""
+    torch.set_num_threads(1)
+    cv2.setNumThreads(0)
