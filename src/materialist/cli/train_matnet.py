@@ -66,7 +66,7 @@ def matnet(
     try:
         with StageProgress(quiet=quiet) as progress:
             trainer = Trainer(
-                chosen, task(chosen, {"init": init} if init else None), open_source(data, size=chosen.size), output,
+                chosen, task(chosen, {"init": init} if init else None), open_source(data), output,
                 budget=budget, habits=habits, processes=processes, resume=resume,
                 note=(lambda _: None) if quiet else lambda text: typer.echo(text, err=True),
             )  # fmt: skip

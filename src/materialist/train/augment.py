@@ -71,6 +71,13 @@ def flip(sample: Sample) -> Sample:
     return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
 
 
+def flip_vertical(sample: Sample) -> Sample:
+    """The picture upside down: rows reversed, y of normals and rays negated."""
+    mirror = np.array([1, -1, 1], np.float32)
+    mirrored = _each(sample, lambda array, _: np.ascontiguousarray(array[::-1]))
+    return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
+
+
 def recolour(sample: Sample, rng: np.random.Generator) -> Sample:
     """Surfaces of other colours under the same light: image = albedo (1 - metallic) shading + rest.
 

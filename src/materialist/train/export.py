@@ -7,7 +7,8 @@ from typing import Any
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.bundled.network import Architecture, BundledNetwork
-from materialist.predict.bundled.weights import file_hash, save_weights
+from materialist.predict.bundled.weights import save
+from materialist.predict.weights import sha256
 from materialist.train import checkpoint
 from materialist.train.trainer import SCORES
 
@@ -36,12 +37,12 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "scores": scores[-1] if scores else {},
     }
     try:
-        save_weights(output, network, facts)
+        save(output, network, facts)
     except OSError as error:
         raise OutputError(f"The weights cannot be written to {output}: {error.strerror or error}.") from error
     return {
         "step": state["step"],
         "minutes": facts["minutes"],
         "megabytes": output.stat().st_size / 1e6,
-        "hash": file_hash(output),
+        "hash": sha256(output)[:16],
     }

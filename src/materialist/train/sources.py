@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from materialist.errors import InputError
+from materialist.train.interiorverse import InteriorVerse, is_interiorverse
 from materialist.train.samples import SampleFolder, Source
 
 
-def open_source(folder: str | Path, *, split: str = "train", size: int | None = None) -> Source:
-    """The data set in `folder`: procedural samples, or InteriorVerse in its official layout.
+def open_source(folder: str | Path, *, split: str = "train") -> Source:
+    """The data set in `folder`: procedural samples, or InteriorVerse in its published layout.
 
     `split` is that of InteriorVerse: 'train', 'val' or 'test'. Raises InputError when it is neither, or is empty.
     """
@@ -18,6 +19,8 @@ def open_source(folder: str | Path, *, split: str = "train", size: int | None = 
         raise InputError(f"There is no data folder {folder}; make one with: materialist train data -o {folder}.")
     if (folder / "samples").is_dir():
         return SampleFolder(folder)
+    if is_interiorverse(folder):
+        return InteriorVerse(folder, split)
     raise InputError(
         f"{folder} holds neither 'samples' (materialist train data) nor InteriorVerse scenes; check the path."
     )

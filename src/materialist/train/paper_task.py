@@ -1,0 +1,122 @@
+"""MatNet trained as the paper says (sections "Material Prediction Network" and "Implementation Details")."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from materialist.errors import WeightsError
+from materialist.predict.matnet.encoder import PATCH
+from materialist.predict.matnet.inference import infer
+from materialist.predict.matnet.network import MatNet
+from materialist.predict.weights import read_state
+from materialist.train import augment, losses
+from materialist.train.recipes import Recipe
+from materialist.train.samples import Sample
+from materialist.train.tasks import Batch
+from materialist.types import Materials, Prediction
+
+DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
+"""Parts of the depth decoder that learn (paper: "the last four layers of the RefineNet"); its rest is frozen."""
+
+
+class PaperTask:
+    """MatNet: LPIPS + L1 for albedo, L1 for roughness and metallic, SiLog for depth, cosine for normals."""
+
+    def __init__(self, init: str | Path | None = None):
+        """`init` is a Depth Anything or DINOv2 checkpoint; it gives what it has, the rest starts at random."""
+        self.init = None if init is None else Path(init)
+        start = (
+            "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)." if init is None
+            else f"MatNet starts from {self.init}."
+        )  # fmt: skip
+        self.notes = (
+            "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
+            "backbone cannot be had here.",
+            start,
+        )
+
+    def network(self, recipe: Recipe) -> nn.Module:
+        """MatNet of the recipe's size, its encoder frozen and of its depth decoder all but the RefineNet layers."""
+        network = MatNet(**(recipe.network or {"size": "vitb"}))
+        if self.init is not None:
+            load_start(network, self.init)
+        freeze(network)
+        return network
+
+    def prepare(self, sample: Sample, size: int, rng: np.random.Generator) -> Sample:
+        """The paper's augmentation and no other: a random vertical flip and a random size x size crop."""
+        height, width = sample.depth.shape
+        if min(height, width) < size:
+            factor = size / min(height, width)
+            sample = augment.resized(sample, max(size, round(height * factor)), max(size, round(width * factor)))
+            height, width = sample.depth.shape
+        top, left = int(rng.integers(0, height - size + 1)), int(rng.integers(0, width - size + 1))
+        sample = augment.window(sample, top, left, size, size)
+        if rng.random() < 0.5:
+            sample = augment.flip_vertical(sample)
+        return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
+
+    def terms(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
+        """The five losses of L_MatNet, all with weight 1."""
+        image, mask = batch["image"], batch["mask"]
+        height, width = image.shape[-2:]
+        fitted = [max(PATCH, round(side / PATCH) * PATCH) for side in (height, width)]
+        out = network(F.interpolate(image, fitted, mode="bicubic", align_corners=False).clamp(min=0))
+        out = {k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False) for k, v in out.items()}
+        albedo = batch["albedo"]
+        return {
+            "albedo": losses.l1(out["albedo"], albedo, mask)
+            + losses.perceptual_substitute(out["albedo"], albedo, mask),
+            "roughness": losses.l1(out["roughness"], batch["roughness"], mask),
+            "metallic": losses.l1(out["metallic"], batch["metallic"], mask),
+            "normal": losses.cosine(out["normal"], batch["normal"], mask),
+            "depth": losses.silog(out["depth"], batch["depth"], mask),
+        }
+
+    def predict(self, network: nn.Module, sample: Sample) -> Prediction:
+        """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
+        assert isinstance(network, MatNet)
+        maps = infer(network, np.clip(sample.image, 0, 1), input_size=_shorter(sample.depth.shape))
+        normal = maps["normal"] / np.maximum(np.linalg.norm(maps["normal"], axis=-1, keepdims=True), 1e-6)
+        unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
+        return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
+
+
+def freeze(network: MatNet) -> None:
+    """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder."""
+    for name, parameter in network.named_parameters():
+        refine = any(f".{layer}." in name for layer in DEPTH_DECODER_LEARNS)
+        parameter.requires_grad_(name.startswith("material_head.") or (name.startswith("depth_head.") and refine))
+
+
+def load_start(network: MatNet, path: Path) -> list[str]:
+    """Copy what a Depth Anything or DINOv2 checkpoint has in common with MatNet; returns the names copied.
+
+    DINOv2 gives the encoder (its names lack the prefix 'pretrained.'), Depth Anything also the depth decoder, which the
+    material decoder starts as well where shapes agree. Raises WeightsError when there is no encoder in the file.
+    """
+    found = read_state(path)
+    if "cls_token" in found:
+        found = {f"pretrained.{name}": tensor for name, tensor in found.items()}
+    state = network.state_dict()
+    start = {name: tensor for name, tensor in found.items() if name in state and tensor.shape == state[name].shape}
+    for name in [n for n in start if n.startswith("depth_head.")]:
+        twin = name.replace("depth_head.", "material_head.", 1)
+        if twin in state and state[twin].shape == start[name].shape:
+            start[twin] = start[name]
+    if not any(name.startswith("pretrained.") for name in start):
+        raise WeightsError(f"{path} has no encoder that fits MatNet; give a Depth Anything or DINOv2 ViT-B/14 file.")
+    state |= {name: tensor.to(torch.float32) for name, tensor in start.items()}
+    network.load_state_dict(state)
+    return sorted(start)
+
+
+def _shorter(size: tuple[int, ...]) -> int:
+    """The shorter side rounded to the patches of the encoder: training saw pictures at their own size."""
+    return max(PATCH, round(min(size) / PATCH) * PATCH)
