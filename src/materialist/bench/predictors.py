@@ -1,0 +1,22 @@
+"""What the benchmarks of predictors share: opening one, timing one."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from materialist.types import Photo, Prediction
+
+
+def opened(spec: str, device: str = "auto") -> Any:
+    """The predictor of that name; raises as `get_predictor`."""
+    from materialist.predict.base import get_predictor
+
+    return get_predictor(spec.strip(), device=device)
+
+
+def predicted(source: Any, photo: Photo, seed: int) -> tuple[Prediction, float]:
+    """The maps and the seconds they took."""
+    start = time.perf_counter()
+    prediction = source.predict(photo, seed=seed)
+    return prediction, time.perf_counter() - start
