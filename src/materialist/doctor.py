@@ -133,7 +133,15 @@ def _extra(name: str, purpose: str) -> Finding:
 
 
 def _weights() -> Finding:
-    return Finding("weights", "missing", "none yet: the built-in predictor needs none")
+    """Networks fetched from a hub; none is needed for the main job."""
+    from materialist.predict.models import KNOWN, is_complete, models_folder
+
+    here = [model.name for model in KNOWN if is_complete(model)]
+    if here:
+        return Finding("hub models", "ok", f"{', '.join(here)} in {models_folder()}")
+    return Finding(
+        "hub models", "missing", f"optional: none in {models_folder()}", "materialist models download matnet"
+    )
 
 
 def _memory() -> Finding:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import resource
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,11 @@ def invert(
     photo: str | Path | Photo,
     *,
     predictor: str = "auto",
+    albedo: str | None = None,
+    roughness: str | None = None,
+    metallic: str | None = None,
+    normal: str | None = None,
+    depth: str | None = None,
     engine: str = "transport",
     preset: str = "default",
     fov: float | str | None = "auto",
@@ -43,10 +49,12 @@ def invert(
 
     Args:
         photo: a file, `example:NAME`, or a Photo already read.
-        predictor: `auto`, `classical`, or `maps:DIR`.
+        predictor: `auto`, `classical`, `matnet`, `maps:DIR`, ...; see docs/predictors.md.
+        albedo, roughness, metallic, normal, depth: another predictor for this map alone.
         engine: `transport` (cached transport) or `path` (Mitsuba PRB, as the paper).
         preset: `default` or `paper`; the path engine always follows the paper.
-        fov: horizontal field of view in degrees, or `auto`: from EXIF, else 35.
+        fov: horizontal field of view in degrees, or `auto`: from the predictor of the depth where it knows one
+            (MoGe), else from EXIF, else 35.
         size: longer side of the working image, pixels.
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes` continues dominant planes beyond what the photo shows; `none` does not.
@@ -69,7 +77,12 @@ def invert(
     picture = _read(photo, size=size, fov=fov)
     tick("predict", 0, 1)
     stages: list[dict] = []
-    prior = overrides.get("prior") or _timed(stages, "predict", lambda: _predict(picture, predictor, seed))
+    prior = overrides.get("prior")
+    if prior is None:
+        parts = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal, "depth": depth}
+        source = _predictor(predictor, parts, device)
+        picture = _seen_by(source, picture)
+        prior = _timed(stages, "predict", lambda: _predict(picture, source, seed))
     _check_mask(mask, picture)
 
     from materialist.render.variant import setup
@@ -106,7 +119,7 @@ def invert(
         camera=picture.camera, photo=picture, prior=prior, materials=materials, normal=prior.normal, depth=prior.depth,
         geometry=geometry, envmap=state.envmap, rerender=rerender, report=report,
         provenance={
-            "predictor": prior.predictor, "engine": engine, "preset": preset,
+            "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
             "completion": completion, "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
@@ -202,10 +215,25 @@ def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> P
     return read_photo(photo, size=size, fov=fov)
 
 
-def _predict(picture: Photo, spec: str, seed: int) -> Prediction:
+def _predictor(spec: str, parts: dict[str, str | None], device: str):
     from materialist.predict.base import get_predictor
 
-    prediction = get_predictor(spec).predict(picture, seed=seed)
+    return get_predictor(spec, device=device, **parts)
+
+
+def _seen_by(source, picture: Photo) -> Photo:
+    """The photo with the field of view of the predictor whose depth is used, unless the caller chose one."""
+    angle = getattr(source, "field_of_view", None)
+    if angle is None or picture.fov_source == "option":
+        return picture
+    known, notes = picture.camera.fov, picture.warnings
+    if picture.fov_source == "exif" and abs(known - angle) > 0.1 * angle:
+        notes = (*notes, f"EXIF says a field of view of {known:.1f} degrees, the depth was made with {angle:.1f}.")
+    return replace(picture, camera=replace(picture.camera, fov=angle), fov_source="predictor", warnings=notes)
+
+
+def _predict(picture: Photo, source, seed: int) -> Prediction:
+    prediction = source.predict(picture, seed=seed)
     if not (prediction.depth > 0).any():
         raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
     return prediction

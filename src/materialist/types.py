@@ -41,7 +41,7 @@ class Photo:
     hdr: bool = False
     """True when the file holds scene-linear values above 1 (EXR, HDR)."""
     fov_source: str = "default"
-    """Where camera.fov came from: 'exif', 'option' or 'default'."""
+    """Where camera.fov came from: 'exif', 'option', 'predictor' or 'default'."""
     path: str | None = None
     source: bytes | None = field(default=None, repr=False)
     """The input file, byte for byte."""
@@ -71,6 +71,8 @@ class Prediction:
     """[H, W] float32 planar depth along -Z, > 0, scene units; 0 where there is no surface."""
     predictor: str = "unknown"
     warnings: tuple[str, ...] = ()
+    sources: dict[str, str] = field(default_factory=dict)
+    """Map -> where it comes from, where several predictors or weights are behind them; empty: all of `predictor`."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from materialist.color import linear_to_srgb
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict import get_predictor
 from materialist.types import Camera, Photo
@@ -188,9 +188,8 @@ def test_the_spec_is_checked(tmp_path):
         get_predictor("maps:")
     with pytest.raises(InputError, match="no predictor 'nonsense'"):
         get_predictor("nonsense")
-    for name in ("bundled", "matnet", "marigold"):
-        with pytest.raises(SetupError, match="classical"):
-            get_predictor(name)
+    with pytest.raises(InputError, match="no predictor 'classical:x'"):
+        get_predictor("classical:x")
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")

@@ -33,7 +33,21 @@ def register(app: typer.Typer) -> None:
 def invert(
     photo: Annotated[str, typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...).")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE", help="The scene package, a folder.")],
-    predictor: Annotated[str, typer.Option(help="auto, bundled, matnet, marigold or maps:DIR.")] = "auto",
+    predictor: Annotated[
+        str,
+        typer.Option(
+            "--predictor",
+            "--rest",
+            help="auto, bundled, classical, matnet[:FILE], marigold or maps:DIR; for every map not named below.",
+        ),
+    ] = "auto",
+    albedo: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="Where the albedo comes from.")] = None,
+    roughness: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="The same for roughness,")] = None,
+    metallic: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="metallic,")] = None,
+    normal: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="normals (also moge:DIR),")] = None,
+    depth: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="depth (also depth-anything, moge:DIR).")] = (
+        None
+    ),
     engine: Annotated[Engine, typer.Option(help="Cached light transport, or the paper's path tracing.")] = (
         Engine.transport
     ),
@@ -62,6 +76,7 @@ def invert(
     if not 0 < tau < 90:
         raise InputError(f"--tau is an angle between 0 and 90 degrees, not {tau:g}.")
     ensure_writable(output, force)
+    parts = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal, "depth": depth}
     picture = read_photo(photo, size=size, fov=fov)
     region = _region(mask, picture) if mask else None
     from materialist import pipeline
@@ -71,6 +86,7 @@ def invert(
         scene = pipeline.invert(
             picture,
             predictor=predictor,
+            **{name: spec for name, spec in parts.items() if spec is not None},
             engine=engine.value,
             preset=preset.value,
             fov=fov,
@@ -87,7 +103,13 @@ def invert(
     save_scene(scene, output, force=force)
     warnings = list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
     seconds = time.monotonic() - start
-    facts = {"predictor": scene.prior.predictor, **scene.report.metrics, "seconds": seconds, "warnings": warnings}
+    facts = {
+        "predictor": scene.prior.predictor,
+        "sources": scene.prior.sources,
+        **scene.report.metrics,
+        "seconds": seconds,
+        "warnings": warnings,
+    }
     report_success("invert", as_json, _summary(output, scene, seconds, warnings), scene=str(output), **facts)
 
 

@@ -55,6 +55,7 @@ def load_scene(path: str | Path) -> Scene:
                 _exr(folder / "prior/depth.exr", shape),
                 prior["predictor"],
                 tuple(prior["warnings"]),
+                prior.get("sources", {}),
             ),
             materials=materials,
             normal=_exr(folder / "maps/normal.exr", (*shape, 3)),
@@ -111,7 +112,11 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "path": photo.path,
             "warnings": list(photo.warnings),
         },
-        "prior": {"predictor": scene.prior.predictor, "warnings": list(scene.prior.warnings)},
+        "prior": {
+            "predictor": scene.prior.predictor,
+            "warnings": list(scene.prior.warnings),
+            "sources": scene.prior.sources,
+        },
         "provenance": scene.provenance,
     }
 

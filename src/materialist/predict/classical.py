@@ -21,6 +21,7 @@ class ClassicalPredictor:
     """Colour Retinex for albedo, a ground-and-objects layout for depth, the paper's neutral roughness and metallic."""
 
     name = "classical"
+    normals_follow_depth = True
 
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """Maps of the photo's working size; deterministic, `seed` changes nothing. Works on any photo."""

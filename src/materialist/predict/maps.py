@@ -34,6 +34,11 @@ class MapsPredictor:
         """'maps:DIR'."""
         return f"maps:{self.folder}"
 
+    @property
+    def normals_follow_depth(self) -> bool:
+        """Whether its normals are derived from its depth."""
+        return self._find("normal") is None
+
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """The maps at the working size of the photo; `seed` changes nothing.
 
@@ -82,7 +87,7 @@ class MapsPredictor:
             return None
         values = _CHECKS[name](read_map(path, name), path, warnings)
         if values.shape[:2] != size:
-            _check_aspect(values, size, path)
+            check_aspect(values, size, path)
             warnings.append(
                 f"{path.name} is {values.shape[1]}x{values.shape[0]} and was resampled to {size[1]}x{size[0]}."
             )
@@ -135,7 +140,7 @@ def _read_png(path: Path) -> Array:
     return values if values.ndim == 2 else np.ascontiguousarray(values[..., 2::-1])  # OpenCV reads BGR(A)
 
 
-def _check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:
+def check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:
     """Raises InputError unless the map has the photo's aspect ratio, up to rounding of the smaller one."""
     (h, w), (height, width) = values.shape[:2], size
     slack = 1.5 * max(1.0, height / h, width / w)

@@ -1,0 +1,77 @@
+"""Depth Anything V2 (Yang et al. 2024) through transformers: depth, relative or metric."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import cv2
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.predict import hub
+from materialist.predict.mix import Part
+from materialist.predict.relative import from_inverse
+from materialist.types import Array, Photo
+
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of sRGB values in [0, 1], as the network was trained."""
+
+
+class DepthAnything:
+    """Gives depth alone.
+
+    Args:
+        where: a folder with a transformers model, a hub id, or "" for Depth Anything V2 Small.
+    """
+
+    gives = ("depth",)
+
+    def __init__(self, where: str = "", *, device: str = "auto"):
+        self._where, self._device = where, device
+        self._label = where or "V2 Small"
+
+    @property
+    def name(self) -> str:
+        """'depth-anything (which one)'."""
+        return f"depth-anything ({self._label})"
+
+    def prepare(self, wanted: Collection[str]) -> None:
+        """Raises SetupError or WeightsError now when `parts` would later."""
+        hub.locate(self._where, "depth-anything")
+        hub.library("transformers")
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """Planar depth at the photo's size; `seed` changes nothing.
+
+        The network sees sRGB values. A metric model's depth is taken as it is, in metres; a relative one gives inverse
+        depth without scale and shift, see `relative.from_inverse`.
+        """
+        folder, self._label = hub.locate(self._where, "depth-anything")
+        digest = hub.checked(folder)
+        model = hub.load(hub.library("transformers").DepthAnythingForDepthEstimation, folder)
+        values = _run(model, photo.linear, hub.on_gpu(self._device))
+        if model.config.depth_estimation_type == "metric":
+            return Part({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
+        depth, ratio = from_inverse(values, photo.camera, normal)
+        how = "fitted to the normals" if normal is not None else "assumed"
+        note = f"Depth from {self.name} is relative: far / near = {ratio:.1f} was {how}."
+        return Part({"depth": depth}, {"depth": f"{self.name}{digest}, far / near {ratio:.1f} {how}"}, (note,))
+
+
+def _run(model, linear: Array, gpu: bool) -> Array:
+    """The network's output [H, W] for a linear picture [H, W, 3]: the shorter side is seen at 518 pixels."""
+    import torch
+    from torch.nn import functional as F
+
+    from materialist.predict.matnet.inference import network_size
+
+    height, width = linear.shape[:2]
+    rows, columns = network_size(height, width)
+    small = cv2.resize(linear_to_srgb(linear), (columns, rows), interpolation=cv2.INTER_CUBIC)
+    pixels = ((small - MEAN) / DEVIATION).astype(np.float32)
+    model = model.to("cuda" if gpu else "cpu", torch.float32).eval()
+    image = torch.from_numpy(pixels).permute(2, 0, 1)[None].to(model.device)
+    with torch.inference_mode():
+        output = model(pixel_values=image).predicted_depth[:, None]
+        full = F.interpolate(output, (height, width), mode="bilinear", align_corners=True)
+    return full[0, 0].float().cpu().numpy()

@@ -1,0 +1,81 @@
+"""What the hub predictors share: where a model lies, and loading it whole or not at all."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import SetupError, WeightsError
+from materialist.predict.models import CHECKSUMS, INSTEAD, HubModel, hub_model, is_hub_id, require
+from materialist.predict.weights import SHOWN, verify_folder
+
+INSTALL = "pip install 'materialist[hub]'"
+
+
+def library(name: str) -> Any:
+    """The optional library, imported. Raises SetupError that says how to install it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise SetupError(f"This predictor needs {name} ({error}); install it with: {INSTALL}, or {INSTEAD}.") from error
+
+
+def locate(where: str, default: str) -> tuple[Path, str]:
+    """The folder of a model and what to call it: a folder as it is, else a download of a hub id, else of `default`.
+
+    Raises WeightsError when it is not there; nothing is downloaded.
+    """
+    if where and Path(where).expanduser().is_dir():
+        return Path(where).expanduser(), Path(where).name
+    if where and not is_hub_id(where) and where not in _known():
+        raise WeightsError(f"There is no folder {where} with a model; give one, or a hub id as owner/name.")
+    model: HubModel = hub_model(where or default)
+    return require(model), model.repo
+
+
+def checked(folder: Path) -> str:
+    """' sha256:...' of a download after every file was verified; '' for a folder without a list of checksums."""
+    return f" sha256:{verify_folder(folder)[:16]}" if (folder / CHECKSUMS).is_file() else ""
+
+
+def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
+    """`cls.from_pretrained` of a local folder, where every tensor that the model needs must be there and fit.
+
+    The libraries themselves fill what is missing with random numbers and only log it. Raises WeightsError.
+    """
+    where = folder / subfolder if subfolder else folder
+    try:
+        extra = {"subfolder": subfolder} if subfolder else {}
+        model, info = cls.from_pretrained(folder, local_files_only=True, output_loading_info=True, **extra, **options)
+    # The libraries raise whatever their readers raise on damaged files.
+    except Exception as error:
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+        raise WeightsError(
+            f"{where} does not hold a {cls.__name__} that can be read ({reason}); fetch it again with: materialist "
+            f"models download NAME --force, or {INSTEAD}."
+        ) from error
+    faults = []
+    for key, word in (("missing_keys", "lacks"), ("unexpected_keys", "has the unknown")):
+        if names := sorted(map(str, info.get(key) or ())):
+            faults.append(f"{word} {', '.join(names[:SHOWN])}" + (" and more" if len(names) > SHOWN else ""))
+    if odd := sorted(
+        str(item[0] if isinstance(item, tuple | list) else item) for item in info.get("mismatched_keys", ())
+    ):
+        faults.append(f"has tensors of another shape: {', '.join(odd[:SHOWN])}")
+    if faults:
+        raise WeightsError(f"{where} is not a whole {cls.__name__}: it {', '.join(faults)}; fetch it again.")
+    return model
+
+
+def on_gpu(device: str) -> bool:
+    """Whether to compute on the GPU."""
+    import torch
+
+    return device == "cuda" or (device == "auto" and torch.cuda.is_available())
+
+
+def _known() -> tuple[str, ...]:
+    from materialist.predict.models import KNOWN
+
+    return tuple(model.name for model in KNOWN)

@@ -1,0 +1,168 @@
+"""Marigold (Ke et al. 2025) through diffusers: albedo, roughness, metallic, normals and depth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.errors import WeightsError
+from materialist.predict import hub
+from materialist.predict.mix import MAPS, Part, whole
+from materialist.predict.relative import from_affine, from_inverse
+from materialist.types import Array, Photo, Prediction
+
+GIVES = {
+    "MarigoldIntrinsicsPipeline": ("albedo", "roughness", "metallic"),
+    "MarigoldNormalsPipeline": ("normal",),
+    "MarigoldDepthPipeline": ("depth",),
+}
+"""Pipeline class, as model_index.json names it -> the maps it gives."""
+
+
+class Marigold:
+    """All maps, from three models; only those are loaded whose maps are wanted."""
+
+    gives = MAPS
+    name = "marigold"
+
+    def __init__(self, *, device: str = "auto"):
+        models = ("marigold-appearance", "marigold-normals", "marigold-depth")
+        self._parts = [MarigoldPart(model, device=device, gives=gives) for model, gives in zip(models, GIVES.values())]
+
+    def prepare(self, wanted: Collection[str]) -> None:
+        """Raises SetupError or WeightsError now when `parts` would later."""
+        for part, names in self._shared(wanted):
+            part.prepare(names)
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted maps; the normals come before the depth, which is scaled by them."""
+        maps, sources, warnings = {}, {}, []
+        for part, names in self._shared(wanted):
+            found = part.parts(photo, names, seed=seed, normal=maps.get("normal", normal))
+            maps |= found.maps
+            sources |= found.sources
+            warnings += found.warnings
+        return Part(maps, sources, tuple(warnings))
+
+    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
+        """All maps; the same seed starts the diffusion from the same noise."""
+        return whole(self, photo, seed=seed)
+
+    def _shared(self, wanted: Collection[str]) -> list[tuple[MarigoldPart, list[str]]]:
+        shares = ((part, [name for name in part.gives if name in wanted]) for part in self._parts)
+        return [(part, names) for part, names in shares if names]
+
+
+class MarigoldPart:
+    """One Marigold model.
+
+    Args:
+        where: a folder with a diffusers pipeline, or a hub id.
+        gives: the maps, where they are known before the model is there; else its model_index.json says.
+    """
+
+    def __init__(self, where: str, *, device: str = "auto", gives: tuple[str, ...] = ()):
+        self._where, self._device = where, device
+        self.gives = gives or GIVES[_pipeline_class(hub.locate(where, "")[0])]
+
+    @property
+    def name(self) -> str:
+        """'marigold (which model)'."""
+        return f"marigold ({self._where})"
+
+    def prepare(self, wanted: Collection[str]) -> None:
+        """Raises SetupError or WeightsError now when `parts` would later."""
+        hub.locate(self._where, "")
+        hub.library("diffusers")
+        hub.library("transformers")
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted maps at the photo's size. The model sees sRGB values."""
+        import torch
+
+        folder, label = hub.locate(self._where, "")
+        source = f"marigold ({label}){hub.checked(folder)}"
+        kind, gpu = _pipeline_class(folder), hub.on_gpu(self._device)
+        pipeline = _pipeline(folder, kind, gpu)
+        generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
+        output = pipeline(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction
+        notes: tuple[str, ...] = ()
+        if kind == "MarigoldIntrinsicsPipeline":
+            maps = appearance(output, pipeline.target_properties or {})
+        elif kind == "MarigoldNormalsPipeline":
+            maps = {"normal": unit_normals(output[0])}
+        else:
+            inverse = pipeline.config.prediction_type == "disparity"
+            depth, ratio = (from_inverse if inverse else from_affine)(output[0, ..., 0], photo.camera, normal)
+            how = "fitted to the normals" if normal is not None else "assumed"
+            maps, source = {"depth": depth}, f"{source}, far / near {ratio:.1f} {how}"
+            notes = (f"Depth from {self.name} is relative: far / near = {ratio:.1f} was {how}.",)
+        lacking = [name for name in wanted if name not in maps]
+        if lacking:
+            raise WeightsError(f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it.")
+        return Part({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
+
+
+def appearance(output: Array, properties: dict) -> dict[str, Array]:
+    """Albedo, and roughness and metallic where they are among the targets.
+
+    Args:
+        output: [T, H, W, 3] in [0, 1], one picture a target.
+        properties: the pipeline's `target_properties`: the order of the targets, what their channels are
+            (`sub_target_names`), and whether the albedo is linear or sRGB (`prediction_space`; sRGB unless said).
+    """
+    maps = {}
+    ours = {"metallicity": "metallic", "roughness": "roughness"}
+    for name, picture in zip(properties.get("target_names", ("albedo",)), output):
+        about = properties.get(name) or {}
+        channels = about.get("sub_target_names")
+        if channels:
+            maps |= {ours[part]: picture[..., k] for k, part in enumerate(channels) if part in ours}
+        elif name == "albedo":
+            maps[name] = picture if about.get("prediction_space") == "linear" else srgb_to_linear(picture)
+    return {name: np.ascontiguousarray(np.clip(values, 0, 1), np.float32) for name, values in maps.items()}
+
+
+def unit_normals(output: Array) -> Array:
+    """[H, W, 3] unit normals. Marigold's frame is ours: +X right, +Y up, +Z to the viewer; interpolation shortens."""
+    length = np.linalg.norm(output, axis=-1, keepdims=True)
+    return np.where(length > 1e-3, output / np.maximum(length, 1e-3), np.float32([0, 0, 1])).astype(np.float32)
+
+
+def _pipeline_class(folder: Path) -> str:
+    """The kind of pipeline in a folder. Raises WeightsError unless it is a Marigold."""
+    try:
+        kind = json.loads((folder / "model_index.json").read_text("utf-8")).get("_class_name")
+    except (OSError, ValueError, AttributeError) as error:
+        raise WeightsError(f"{folder} holds no readable model_index.json, as diffusers writes it ({error}).") from error
+    if kind not in GIVES:
+        raise WeightsError(f"{folder} holds a {kind}; Marigold models are {', '.join(GIVES)}.")
+    return kind
+
+
+def _pipeline(folder: Path, kind: str, gpu: bool):
+    """The pipeline, every component whole; half precision on the GPU only."""
+    import torch
+
+    diffusers, transformers = hub.library("diffusers"), hub.library("transformers")
+    dtype = torch.float16 if gpu else torch.float32
+    half = {"variant": "fp16"}
+    components = {}
+    for name, cls in (
+        ("unet", diffusers.UNet2DConditionModel),
+        ("vae", diffusers.AutoencoderKL),
+        ("text_encoder", transformers.CLIPTextModel),
+    ):
+        variant = half if any((folder / name).glob("*.fp16.*")) else {}
+        components[name] = hub.load(cls, folder, name, **variant).to(dtype)
+    try:
+        pipeline = getattr(diffusers, kind).from_pretrained(folder, local_files_only=True, **components)
+    except Exception as error:  # whatever its readers raise on a damaged configuration
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+        raise WeightsError(f"{folder} does not hold a whole {kind} ({reason}); fetch it again.") from error
+    pipeline.set_progress_bar_config(disable=True)
+    return pipeline.to("cuda" if gpu else "cpu")

@@ -1,0 +1,162 @@
+"""The predictor matnet: where weights come from, what is refused, and what it makes of the network's outputs."""
+
+import hashlib
+import pickle
+
+import numpy as np
+import pytest
+import torch
+from made_matnet import install, made_network, made_photo
+from safetensors.torch import save_file
+
+from materialist.errors import WeightsError
+from materialist.predict import get_predictor
+from materialist.predict.matnet.inference import infer
+from materialist.predict.matnet.predictor import MatNetPredictor
+
+
+@pytest.fixture(autouse=True)
+def tiny(monkeypatch, tmp_path):
+    install(monkeypatch)
+    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
+
+
+@pytest.fixture
+def state():
+    return {name: tensor.clone() for name, tensor in made_network().state_dict().items()}
+
+
+def saved(path, content):
+    torch.save(content, path)
+    return path
+
+
+def refused(path, *words):
+    """The message of the WeightsError for a file; it names the file and the words."""
+    with pytest.raises(WeightsError) as error:
+        MatNetPredictor(path)
+    message = str(error.value)
+    assert all(word in message for word in (path.name, *words)), message
+    return message
+
+
+def test_prediction_is_the_networks_answer_in_our_conventions(tmp_path, state):
+    photo = made_photo()
+    predictor = MatNetPredictor(saved(tmp_path / "w.pth", state), input_size=28)
+    prediction, raw = predictor.predict(photo), infer(made_network(), photo.linear, input_size=28)
+    assert np.array_equal(prediction.materials.albedo, raw["albedo"].clip(0, 1))
+    assert np.array_equal(prediction.materials.roughness, raw["roughness"].clip(0, 1))
+    assert np.array_equal(prediction.materials.metallic, raw["metallic"].clip(0, 1))
+    assert np.allclose(prediction.depth, 2 * raw["depth"].max() - raw["depth"]) and prediction.depth.min() > 0
+    assert np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
+    known = np.linalg.norm(raw["normal"], axis=-1) > 0.1
+    assert ((prediction.normal * raw["normal"]).sum(-1)[known] > 0).all()
+    digest = hashlib.sha256((tmp_path / "w.pth").read_bytes()).hexdigest()[:16]
+    assert prediction.predictor == f"matnet tiny w.pth sha256:{digest}"
+
+
+def test_the_same_weights_in_every_packing(tmp_path, state):
+    save_file(state, tmp_path / "w.safetensors")
+    files = [
+        tmp_path / "w.safetensors",
+        saved(tmp_path / "plain.pth", state),
+        saved(tmp_path / "wrapped.pt", {"model": state, "epoch": 3}),
+        saved(tmp_path / "parallel.ckpt", {f"module.{k}": v for k, v in state.items()}),
+        saved(tmp_path / "half.pth", {k: v.half() for k, v in state.items()}),
+    ]
+    maps = [MatNetPredictor(file, input_size=28).predict(made_photo()).materials.albedo for file in files]
+    for other in maps[1:4]:
+        assert np.array_equal(other, maps[0])
+    assert np.allclose(maps[4], maps[0], atol=2e-2)
+
+
+def test_safetensors_come_before_pickles_in_a_folder(tmp_path, state):
+    saved(tmp_path / "matnet_weights.pth", state)
+    assert ".pth" in get_predictor(f"matnet:{tmp_path}").name
+    save_file(state, tmp_path / "matnet_weights.safetensors")
+    assert ".safetensors" in get_predictor(f"matnet:{tmp_path}").name
+
+
+def test_missing_extra_and_misshapen_tensors_are_named(tmp_path, state):
+    bias = state.pop("pretrained.norm.bias")
+    refused(saved(tmp_path / "less.pth", state), "lacks pretrained.norm.bias", "MatNet")
+    state |= {"pretrained.norm.bias": bias, "head.extra": bias}
+    refused(saved(tmp_path / "more.pth", state), "unknown head.extra")
+    del state["head.extra"]
+    state["depth_head.projects.0.weight"] = torch.zeros(8, 32, 3, 3)
+    refused(saved(tmp_path / "odd.pth", state), "depth_head.projects.0.weight [8, 32, 3, 3] instead of [8, 32, 1, 1]")
+    materials = {k: v for k, v in made_network().state_dict().items() if not k.startswith("material_head")}
+    assert "and 60 more" in refused(saved(tmp_path / "depth.pth", materials), "lacks material_head.")
+    refused(saved(tmp_path / "none.pth", {"a": bias}), "303 tensors", "lacks pretrained.cls_token", "unknown a")
+
+
+def test_broken_numbers_are_refused(tmp_path, state):
+    state["pretrained.norm.bias"][3] = float("nan")
+    refused(saved(tmp_path / "nan.pth", state), "NaN", "pretrained.norm.bias")
+
+
+def test_what_is_no_checkpoint_is_refused(tmp_path, state):
+    whole = saved(tmp_path / "w.pth", state).read_bytes()
+    for name, content in {
+        "cut.pth": whole[: len(whole) // 2],
+        "noise.pth": bytes(range(256)) * 50,
+        "page.pth": b"<!DOCTYPE html><html>not found</html>",
+        "noise.safetensors": bytes(range(256)) * 50,
+        "short.safetensors": b"\x10",
+    }.items():
+        (tmp_path / name).write_bytes(content)
+        refused(tmp_path / name, "maps:DIR")
+    (tmp_path / "empty.pth").write_bytes(b"")
+    refused(tmp_path / "empty.pth", "empty")
+    refused(saved(tmp_path / "list.pth", [1, 2]), "list")
+    refused(saved(tmp_path / "words.pth", {"a": "b", **state}), "more than tensors", "a")
+    save_file(state, tmp_path / "cut.safetensors")
+    (tmp_path / "cut.safetensors").write_bytes((tmp_path / "cut.safetensors").read_bytes()[:-100])
+    refused(tmp_path / "cut.safetensors", "truncated or damaged")
+
+
+class Trap:
+    """Runs a command when it is unpickled."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return (open, (str(self.mark), "w"))
+
+
+def test_a_pickle_never_runs(tmp_path):
+    mark = tmp_path / "ran"
+    (tmp_path / "plain.pth").write_bytes(pickle.dumps({"a": Trap(mark)}, protocol=2))
+    refused(tmp_path / "plain.pth", "no PyTorch checkpoint", "run code")
+    refused(saved(tmp_path / "zip.pth", {"a": Trap(mark)}), "run code")
+    assert not mark.exists()
+
+
+def test_the_checksum_beside_the_file_is_obeyed(tmp_path, state):
+    path = saved(tmp_path / "w.pth", state)
+    good = hashlib.sha256(path.read_bytes()).hexdigest()
+    (tmp_path / "SHA256SUMS").write_text(f"{good}  w.pth\n")
+    assert MatNetPredictor(path).name.endswith(good[:16])
+    (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  w.pth\n")
+    refused(path, good, "0" * 64, "damaged")
+
+
+def test_a_model_that_was_not_downloaded_says_how_to_get_it(tmp_path):
+    for spec, words in {
+        "matnet": ("matnet_weights.pth", "Lez/MatNet", "models download matnet", "maps:DIR"),
+        "matnet:someone/theirs": ("someone/theirs", "models download someone/theirs"),
+        "matnet:none.pth": ("no file none.pth", "models download matnet", "maps:DIR"),
+    }.items():
+        with pytest.raises(WeightsError) as error:
+            get_predictor(spec)
+        assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
+    for repo in ("Lez--MatNet", "someone--theirs"):
+        folder = tmp_path / "models" / repo
+        folder.mkdir(parents=True)
+        path = saved(folder / "matnet_weights.pth", state)
+        (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
+    assert get_predictor("matnet").name == get_predictor("matnet:someone/theirs").name
