@@ -43,7 +43,7 @@ NOTE = (
     "Pixels with a true surface count. Albedo: sRGB-encoded, clipped to [0, 1], after one factor a picture (least "
     "squares of linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]; `pooled` is the PSNR "
     "of the mean square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a "
-    "PSNR is at most 100. Depth: MAE and RMSE in the units of the truth after one factor (least squares), `raw` without "
+    "PSNR is at most 100. Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without "
     "it; SI log RMSE is the standard deviation of log depth error; `order` the part of random pixel pairs in the right "
     "order (a constant gets 0.5). Normals: mean angle, degrees. LPIPS (AlexNet) only where the lpips package and its "
     "weights are installed."

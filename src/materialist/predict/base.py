@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError
 from materialist.types import Photo, Prediction
 
 NEUTRAL_ROUGHNESS = 0.5
@@ -78,10 +78,19 @@ def _maps(argument: str, device: str) -> Predictor:
 
 
 def _bundled(argument: str, device: str) -> Predictor:
-    raise SetupError(
-        "The predictor 'bundled' is not part of this version; use --predictor classical, or run another tool and read "
-        "its maps with --predictor maps:DIR."
-    )
+    from materialist.predict.bundled.predictor import BundledPredictor
+
+    return BundledPredictor(argument, device=device)
+
+
+def _auto(argument: str, device: str) -> Predictor:
+    from materialist.predict.bundled import WEIGHTS
+
+    if WEIGHTS.is_file():
+        return _bundled("", device)
+    from materialist.predict.classical import ClassicalPredictor
+
+    return ClassicalPredictor(note=f"This installation has no weights of the bundled network ({WEIGHTS.name}).")
 
 
 def _matnet(argument: str, device: str) -> Predictor:
@@ -109,7 +118,7 @@ def _moge(argument: str, device: str):
 
 
 _OPEN: dict[str, Callable] = {
-    "auto": _classical,
+    "auto": _auto,
     "classical": _classical,
     "bundled": _bundled,
     "maps": _maps,
@@ -120,4 +129,4 @@ _OPEN: dict[str, Callable] = {
 }
 """Name before the colon -> what opens it, given what stands behind the colon and the device."""
 
-CHOICES = "auto, bundled, classical, matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR"
+CHOICES = "auto, bundled[:FILE], classical, matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR"

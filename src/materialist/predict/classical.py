@@ -23,6 +23,10 @@ class ClassicalPredictor:
     name = "classical"
     normals_follow_depth = True
 
+    def __init__(self, *, note: str | None = None):
+        """`note` says why this predictor runs although another was expected; it leads the warnings."""
+        self.note = note
+
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """Maps of the photo's working size; deterministic, `seed` changes nothing. Works on any photo."""
         depth = guess_depth(photo.linear, photo.camera)
@@ -33,7 +37,7 @@ class ClassicalPredictor:
             roughness=np.full(size, NEUTRAL_ROUGHNESS, np.float32),
             metallic=np.full(size, NEUTRAL_METALLIC, np.float32),
         )
-        warnings = [WARNING]
+        warnings = [WARNING] if self.note is None else [self.note, WARNING]
         if (depth == 0).any():
             warnings.append(f"{(depth == 0).mean():.0%} of the picture was taken for sky and has no surface.")
         normal = normals_from_depth(depth, photo.camera, radius=2)

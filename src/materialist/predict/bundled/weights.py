@@ -14,8 +14,6 @@ from materialist.predict.weights import load_weights, read_state
 
 FORMAT = "materialist-bundled-1"
 """What the file's metadata calls itself; another number is another network."""
-WEIGHTS = Path(__file__).with_name("weights.safetensors")
-"""Where the package has its weights."""
 
 
 def save(path: Path, network: BundledNetwork, facts: dict[str, Any]) -> None:
