@@ -19,6 +19,8 @@ STRIDE = 32
 """Sides of the input are multiples of this."""
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
 """Maps that the network answers with, and their channels."""
+ALBEDO_SLOPE = 4.0
+"""With it, sigmoid(slope * (encoded - 0.5)) is about the encoded photo itself."""
 LOG_FLOOR = 2.0**-7
 """Radiance below which the logarithmic input no longer tells pixels apart."""
 
@@ -96,7 +98,7 @@ class BundledNetwork(nn.Module):
             x = self.decoders[k](x + self.skips[k](skips[k]))
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
-        return _maps(F.pixel_shuffle(self.head(x).float(), 2))
+        return _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
         """Attention over the coarsest level [B, C, h, w], told where each cell looks."""
@@ -119,11 +121,14 @@ def encode(image: Tensor) -> Tensor:
     return torch.cat([curve, logarithm], 1)
 
 
-def _maps(raw: Tensor) -> dict[str, Tensor]:
-    """The heads [B, 10, H, W] float32 as maps."""
+def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
+    """The heads [B, 10, H, W] float32 as maps; albedo is told as what differs from the photo, curve [B, 3, H, W].
+
+    The photo's own detail is then there from the start, and the network learns to take light out of it.
+    """
     maps = dict(zip(CHANNELS, raw.split(list(CHANNELS.values()), 1), strict=True))
     return {
-        "albedo": maps["albedo"].sigmoid(),
+        "albedo": (maps["albedo"] + ALBEDO_SLOPE * curve).sigmoid(),
         "roughness": maps["roughness"].sigmoid(),
         "metallic": maps["metallic"].sigmoid(),
         "metallic_logit": maps["metallic"],

@@ -1,0 +1,212 @@
+"""The bundled network and what happens around it, with random weights."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from materialist.camera import pixel_rays
+from materialist.color import linear_to_srgb
+from materialist.errors import WeightsError
+from materialist.predict import bundled
+from materialist.predict.base import get_predictor
+from materialist.predict.bundled import inference, weights
+from materialist.predict.bundled.network import Architecture, BundledNetwork, encode
+from materialist.predict.bundled.predictor import BundledPredictor, exposed
+from materialist.types import Camera, Photo
+
+TINY = Architecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+
+
+@pytest.fixture(scope="module")
+def network():
+    torch.manual_seed(0)
+    return BundledNetwork(TINY).eval()
+
+
+@pytest.fixture
+def file(network, tmp_path):
+    path = tmp_path / "own.safetensors"
+    weights.save(path, network, {"step": 7})
+    return path
+
+
+def _photo(height, width, fov=50.0, seed=0):
+    linear = np.random.default_rng(seed).random((height, width, 3), dtype=np.float32)
+    return Photo(linear=linear, camera=Camera(width, height, fov), original=linear)
+
+
+def test_maps_are_in_range(network):
+    image, rays = torch.rand(2, 3, 64, 96), torch.randn(2, 2, 64, 96)
+    with torch.inference_mode():
+        maps = network(image, rays)
+    for name, channels in (("albedo", 3), ("roughness", 1), ("metallic", 1), ("normal", 3), ("depth", 1), ("mask", 1)):
+        assert maps[name].shape == (2, channels, 64, 96), name
+    for name in ("albedo", "roughness", "metallic"):
+        assert 0 <= maps[name].min() and maps[name].max() <= 1
+    torch.testing.assert_close(maps["normal"].norm(dim=1), torch.ones(2, 64, 96), atol=1e-4, rtol=0)
+
+
+def test_a_batch_is_its_pictures_one_by_one(network):
+    image, rays = torch.rand(3, 3, 32, 64), torch.randn(3, 2, 32, 64)
+    with torch.inference_mode():
+        together = network(image, rays)
+        alone = network(image[1:2], rays[1:2])
+    for name in together:
+        torch.testing.assert_close(together[name][1:2], alone[name], atol=1e-4, rtol=1e-4)
+
+
+def test_the_untrained_head_has_no_checkerboard(network):
+    with torch.inference_mode():
+        albedo = network(torch.full((1, 3, 64, 64), 0.4), torch.zeros(1, 2, 64, 64))["albedo"]
+    cell = albedo[..., 30:32, 30:32]
+    assert float((cell - cell.mean((-1, -2), keepdim=True)).abs().max()) < 1e-4
+
+
+def test_the_whole_network_learns():
+    torch.manual_seed(1)
+    network = BundledNetwork(TINY)
+    sum(v.sum() for v in network(torch.rand(1, 3, 64, 64), torch.randn(1, 2, 64, 64)).values()).backward()
+    idle = [name for name, p in network.named_parameters() if p.grad is None or not bool(p.grad.abs().sum() > 0)]
+    # The first convolution of a block learns once its second, which starts at zero, has moved.
+    assert all(".conv1" in name or ".norm" in name for name in idle), idle
+
+
+def test_the_input_is_finite_for_any_radiance():
+    seen = encode(torch.tensor([-1.0, 0.0, 1e-9, 1.0, 1e6]).view(1, 1, 1, 5).expand(1, 3, 1, 5))
+    assert torch.isfinite(seen).all() and float(seen.abs().max()) < 3
+
+
+@pytest.mark.parametrize("size", [(32, 32), (45, 61), (97, 33), (7, 150)])
+def test_any_size(file, size):
+    photo = _photo(*size)
+    prediction = BundledPredictor(file).predict(photo)
+    m = prediction.materials
+    assert m.albedo.shape == (*size, 3) and m.roughness.shape == m.metallic.shape == prediction.depth.shape == size
+    for array in (m.albedo, m.roughness, m.metallic):
+        assert array.dtype == np.float32 and 0 <= array.min() and array.max() <= 1
+    np.testing.assert_allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-4)
+    known = prediction.depth > 0
+    assert known.any() and np.isfinite(prediction.depth).all()
+    assert np.median(prediction.depth[known]) == pytest.approx(inference.MEDIAN_DEPTH, rel=0.05)
+
+
+def test_large_photos_are_seen_small(network, monkeypatch):
+    seen = []
+    run = inference._run
+    monkeypatch.setattr(inference, "_run", lambda n, photo, *rest: seen.append(photo.shape[:2]) or run(n, photo, *rest))
+    camera = Camera(150, 100, 60.0)
+    linear = np.random.default_rng(0).random((100, 150, 3), dtype=np.float32)
+    prediction = inference.infer(network, linear, inference.rays_of(camera), side=96)
+    assert seen == [(64, 96)] and prediction.depth.shape == (100, 150)
+
+
+def test_rays_go_on_into_the_padding(network):
+    """A picture of 40 columns is padded to 64, where the rays must be those of a wider camera."""
+    captured = {}
+
+    class Spy(torch.nn.Module):
+        def forward(self, image, rays):
+            captured["rays"] = rays
+            return network(image, rays)
+
+    camera = Camera(40, 40, 50.0)
+    inference.infer(Spy(), np.zeros((40, 40, 3), np.float32), inference.rays_of(camera))
+    rays = captured["rays"][0].permute(1, 2, 0).numpy()
+    assert rays.shape == (64, 64, 2)
+    np.testing.assert_allclose(rays[:40, :40], pixel_rays(camera)[..., :2], atol=1e-6)
+    np.testing.assert_allclose(np.diff(rays[0, :, 0]), 1 / camera.focal, rtol=1e-3)
+    np.testing.assert_allclose(np.diff(rays[:, 0, 1]), -1 / camera.focal, rtol=1e-3)
+
+
+def test_guided_enlarging_finds_the_photos_edge():
+    """A map whose edge is half a coarse pixel off the truth gets the edge of the photo."""
+    fine = np.full((96, 96, 3), 0.2, np.float32)
+    fine[:, 50:] = 0.8
+    truth = np.where(np.arange(96) >= 50, 0.9, 0.3)[None].repeat(96, 0).astype(np.float32)
+    coarse, guide = truth.reshape(24, 4, 24, 4).mean((1, 3)), fine.reshape(24, 4, 24, 4, 3).mean((1, 3))
+    enlarged = inference.guided(coarse, guide, fine)
+    plain = inference.resample.values(coarse, (96, 96))
+    assert np.abs(enlarged - truth).mean() < 0.4 * np.abs(plain - truth).mean()
+    flat = inference.guided(np.full((24, 24), 0.37, np.float32), guide, fine)
+    np.testing.assert_allclose(flat, 0.37, atol=1e-3)
+
+
+def test_specks_are_taken_for_their_surroundings():
+    surface = np.ones((80, 80), bool)
+    surface[:20] = False  # sky
+    surface[5, 5] = True
+    surface[50, 50:52] = False
+    clean = inference._without_specks(surface)
+    assert not clean[:20].any() and clean[20:].all()
+
+
+def test_weights_round_trip(network, file):
+    loaded, facts = weights.load(file)
+    assert facts == {"step": 7} and loaded.architecture == TINY
+    for name, tensor in network.state_dict().items():
+        torch.testing.assert_close(loaded.state_dict()[name], tensor, atol=1e-3, rtol=1e-3)
+    assert not list(file.parent.glob("*.part"))
+
+
+def test_the_name_tells_weights_apart(file):
+    name = BundledPredictor(file).name
+    assert "step 7" in name and "sha256:" in name
+
+
+def test_bad_weights_are_refused(file, tmp_path):
+    whole = file.read_bytes()
+    broken = tmp_path / "broken.safetensors"
+    broken.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(WeightsError, match="truncated or damaged"):
+        BundledPredictor(broken)
+    tensors = load_file(file)
+    tensors["head.bias"] = torch.full_like(tensors["head.bias"], float("nan"))
+    meta = {"format": weights.FORMAT, "architecture": json.dumps(TINY.as_dict()), "facts": "{}"}
+    save_file(tensors, broken, meta)
+    with pytest.raises(WeightsError, match="NaN"):
+        BundledPredictor(broken)
+    del tensors["head.bias"]
+    save_file(tensors, broken, meta)
+    with pytest.raises(WeightsError, match=r"lacks head\.bias"):
+        BundledPredictor(broken)
+    save_file(tensors, broken, {})
+    with pytest.raises(WeightsError, match="has format None"):
+        BundledPredictor(broken)
+    save_file(tensors, broken, {**meta, "architecture": '{"widths": [1]}'})
+    with pytest.raises(WeightsError, match="describes no usable network"):
+        BundledPredictor(broken)
+
+
+def test_without_weights_auto_says_so(monkeypatch, tmp_path):
+    monkeypatch.setattr(bundled, "WEIGHTS", tmp_path / "weights.safetensors")
+    prediction = get_predictor("auto").predict(_photo(40, 40))
+    assert prediction.predictor == "classical" and "no weights of the bundled network" in prediction.warnings[0]
+    with pytest.raises(WeightsError, match="use --predictor classical"):
+        BundledPredictor(tmp_path / "weights.safetensors")
+
+
+def test_auto_is_bundled_where_its_weights_are(monkeypatch, file):
+    import materialist.predict.bundled.predictor as module
+
+    monkeypatch.setattr(bundled, "WEIGHTS", file)
+    monkeypatch.setattr(module, "WEIGHTS", file)
+    assert get_predictor("auto").name.startswith("bundled step 7")
+    assert get_predictor(f"bundled:{file}").name.startswith("bundled")
+
+
+def test_hdr_is_exposed_like_a_photo():
+    linear = np.linspace(0, 10, 3000, dtype=np.float32).reshape(50, 20, 3)
+    assert np.percentile(exposed(linear).max(-1), 97) == pytest.approx(0.9, rel=1e-3)
+    dark = linear / 100
+    np.testing.assert_array_equal(exposed(dark), dark)
+
+
+def test_the_same_photo_gives_the_same_maps(file):
+    """The same photo twice is the same maps: no hidden randomness."""
+    photo = _photo(48, 64)
+    first, second = BundledPredictor(file).predict(photo), BundledPredictor(file).predict(photo, seed=9)
+    np.testing.assert_array_equal(first.depth, second.depth)
+    assert linear_to_srgb(first.materials.albedo).shape == (48, 64, 3)

@@ -1,0 +1,80 @@
+"""Augmentation keeps labels, rays and pictures true to each other."""
+
+from dataclasses import replace
+
+import made_samples
+import numpy as np
+import pytest
+
+from materialist.train import augment
+from materialist.train.samples import read_sample
+
+
+@pytest.fixture
+def sample(tmp_path):
+    return read_sample(made_samples.write_set(tmp_path, 1) / "samples" / "0000000.npz")
+
+
+def _on_plane(sample, normal, tolerance):
+    surface = sample.mask > 0
+    points = np.dstack([sample.rays, -np.ones(surface.shape)]) * sample.depth[..., None]
+    distance = (points @ normal)[surface]
+    np.testing.assert_allclose(distance, -1.2, rtol=tolerance)
+    np.testing.assert_allclose(sample.normal[surface] @ normal, 1, atol=1e-3)
+
+
+def test_a_crop_keeps_its_rays(sample):
+    cut = augment.window(sample, 20, 10, 24, 32)
+    assert cut.depth.shape == (24, 32)
+    _on_plane(cut, made_samples.NORMAL, 2e-3)
+
+
+def test_a_resized_crop_stays_on_the_plane(sample):
+    # Depth comes from the nearest pixel, so it is off by less than a pixel's slope.
+    for size in (20, 96):
+        _on_plane(augment.resized(augment.window(sample, 24, 8, 24, 24), size, size), made_samples.NORMAL, 0.06)
+
+
+def test_flips_mirror_the_geometry(sample):
+    mirrored = augment.flip(sample)
+    _on_plane(mirrored, made_samples.NORMAL * [-1, 1, 1], 2e-3)
+    assert (mirrored.image[:, ::-1] == sample.image).all()
+    upside_down = augment.flip_vertical(sample)
+    _on_plane(upside_down, made_samples.NORMAL * [1, -1, 1], 2e-3)
+    twice = augment.flip(mirrored)
+    for name in ("image", "normal", "rays", "depth"):
+        np.testing.assert_array_equal(getattr(twice, name), getattr(sample, name))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_recolouring_is_the_render_of_the_new_albedo(sample, seed):
+    new = augment.recolour(sample, np.random.default_rng(seed))
+    surface = sample.mask > 0
+    assert new.albedo.min() >= 0 and new.albedo.max() <= 1
+    dielectric = (1 - sample.metallic)[..., None]
+    rest = sample.image - sample.albedo * dielectric * sample.shading
+    expected = new.albedo * dielectric * sample.shading + rest
+    np.testing.assert_allclose(new.image[surface], expected[surface], atol=1e-5)
+    metal = sample.metallic > 0.5
+    np.testing.assert_array_equal(new.albedo[metal], sample.albedo[metal])
+    np.testing.assert_array_equal(new.image[~surface], sample.image[~surface])
+
+
+def test_recolouring_changes_colours(sample):
+    changed = [
+        np.abs(augment.recolour(sample, np.random.default_rng(k)).albedo - sample.albedo).max() for k in range(6)
+    ]
+    assert np.median(changed) > 0.1
+
+
+def test_variants_are_repeatable_and_differ(sample):
+    first, again, other = (augment.augment(sample, 32, np.random.default_rng(k)) for k in (1, 1, 2))
+    np.testing.assert_array_equal(first.image, again.image)
+    assert first.image.shape == (32, 32, 3) and not np.array_equal(first.image, other.image)
+
+
+def test_without_shading_the_colours_stay(sample):
+    plain = augment.augment(replace(sample, shading=None), 48, np.random.default_rng(3))
+    paints = np.unique(sample.albedo.reshape(-1, 3), axis=0)
+    distance = np.abs(plain.albedo.reshape(-1, 1, 3) - paints[None]).max(-1).min(1)
+    assert np.median(distance) < 0.02, "pixels away from the stripes' edges have one of the old paints"

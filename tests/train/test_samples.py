@@ -1,0 +1,57 @@
+"""Reading samples, and the ways in which one can be broken."""
+
+import made_samples
+import numpy as np
+import pytest
+
+from materialist.errors import InputError
+from materialist.train.samples import SampleFolder, read_sample
+from materialist.train.sources import open_source
+
+
+def test_a_sample_in_our_conventions(tmp_path):
+    sample = open_source(made_samples.write_set(tmp_path)).read(1)
+    surface = sample.mask > 0
+    assert sample.image.shape == (48, 64, 3) and sample.depth.dtype == np.float32
+    assert 0.3 < surface.mean() < 1, "the made scene has ground and sky"
+    # All points lie on the plane that they were made from.
+    points = np.dstack([sample.rays, -np.ones((48, 64))]) * sample.depth[..., None]
+    np.testing.assert_allclose((points @ made_samples.NORMAL)[surface], -1.2, rtol=2e-3)
+    np.testing.assert_allclose(
+        sample.normal[surface], np.broadcast_to(made_samples.NORMAL, (surface.sum(), 3)), atol=0.01
+    )
+    assert (sample.normal[~surface] == 0).all() and (sample.depth[~surface] == 0).all()
+    rest = sample.image - sample.albedo * (1 - sample.metallic[..., None]) * sample.shading
+    dielectric = surface & (sample.metallic == 0)
+    np.testing.assert_allclose(rest[dielectric], 0.05, atol=2e-3)
+
+
+def test_a_growing_set_is_listed_again(tmp_path):
+    source = SampleFolder(made_samples.write_set(tmp_path, 2))
+    made_samples.write_set(tmp_path, 5)
+    assert len(source) == 2
+    source.refresh()
+    assert len(source) == 5 and source.seed() == 5
+
+
+def test_bad_sets_are_named(tmp_path):
+    with pytest.raises(InputError, match="no data folder"):
+        open_source(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="neither 'samples'"):
+        open_source(tmp_path)
+    (tmp_path / "samples").mkdir()
+    with pytest.raises(InputError, match="no samples yet"):
+        open_source(tmp_path)
+
+
+def test_damaged_samples_are_named(tmp_path):
+    made_samples.write_set(tmp_path, 1)
+    path = tmp_path / "samples" / "0000000.npz"
+    path.write_bytes(path.read_bytes()[:500])
+    with pytest.raises(InputError, match=r"0000000\.npz"):
+        read_sample(path)
+    arrays = made_samples.arrays()
+    del arrays["depth"]
+    np.savez(path, **arrays)
+    with pytest.raises(InputError, match="no array 'depth'"):
+        read_sample(path)
