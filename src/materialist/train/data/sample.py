@@ -1,0 +1,121 @@
+"""One labelled picture: a random world, rendered, denoised and exposed like a photograph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb, luminance
+from materialist.render.denoise import denoise
+from materialist.train.data import outdoors, packing, rooms
+from materialist.train.data.world import World
+from materialist.types import Array, Camera
+
+PROBE = 4
+"""Label rays a pixel and axis."""
+ATTEMPTS = 6
+"""Cameras that see too little are thrown away at most that often."""
+_KINDS = ((rooms.room, 0.45), (rooms.table_top, 0.17), (outdoors.still_life, 0.15), (outdoors.outdoor, 0.23))
+
+
+@dataclass(frozen=True)
+class Options:
+    """What decides, with the number of a sample, what it shows."""
+
+    size: int = 256
+    """Pixels on a side."""
+    seed: int = 0
+    spp: int = 36
+    """Samples per pixel before denoising."""
+    split: str = "train"
+    meshes: tuple[Path, ...] = ()
+    """Files that the split may use, sorted."""
+    envmaps: tuple[Path, ...] = ()
+    device: str = "auto"
+
+
+def make_sample(index: int, options: Options) -> dict[str, Array]:
+    """The arrays of sample `index`, as they are stored (docs/training_data.md); the same for the same arguments.
+
+    Raises SetupError where Mitsuba or the denoiser is missing.
+    """
+    for attempt in range(ATTEMPTS):
+        rng = np.random.default_rng([options.seed, index, attempt])
+        world = make_world(rng, options)
+        probe, tracer = _look(world, rng, options)
+        if attempt == ATTEMPTS - 1 or worth_seeing(probe):
+            break
+    return _developed(world, probe, tracer, rng, options)
+
+
+def make_world(rng: np.random.Generator, options: Options) -> World:
+    """A random scene; the held-out split prefers scenes with captured meshes and light."""
+    makers, shares = zip(*_KINDS)
+    weight = np.array(shares) * ([0.6, 1, 3.5, 0.8] if options.split == "heldout" else [1, 1, 1, 1])
+    return makers[rng.choice(len(makers), p=weight / weight.sum())](rng, options.meshes, options.envmaps)
+
+
+def _look(world: World, rng: np.random.Generator, options: Options):
+    from materialist.train.data.tracer import Tracer
+
+    camera = Camera(options.size, options.size, world.view.fov)
+    tracer = Tracer(packing.pack(world, rng), camera, device=options.device)
+    return tracer.probe(PROBE), tracer
+
+
+def worth_seeing(probe: dict[str, Array]) -> bool:
+    """Whether a view shows several things at a distance, rather than the inside of a cupboard."""
+    owner, depth = probe["owner"][..., 0], probe["depth"][..., 0]
+    seen = owner >= 0
+    _, counts = np.unique(owner[seen], return_counts=True)
+    if seen.mean() < 0.3 or (counts > owner.size / 400).sum() < 4:
+        return False
+    near = np.median(depth[seen]) * 0.25
+    return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
+
+
+def _developed(world: World, probe, tracer, rng: np.random.Generator, options: Options) -> dict[str, Array]:
+    """Render, denoise, expose, quantise."""
+    noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
+    guides = {"albedo": probe["albedo"].mean(2), "normal": probe["normal"].mean(2)}
+    image, shading = denoise(noisy, **guides), denoise(white, **guides)
+    labels = labels_of(probe)
+    gain = exposure(image, rng)
+    byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
+    half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
+    return {
+        "image": half(image * gain), "shading": half(shading * gain),
+        "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
+        "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
+        "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),
+        "kind": np.array(world.kind),
+    }  # fmt: skip
+
+
+def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
+    """Maps [H, W, ...] of a probe [H, W, N, ...]: of the surface at the pixel's centre, its texture averaged over the
+    rays of the pixel that see the same part; all 0 where there is no surface."""
+    n = probe["owner"].shape[2]
+    side = round(np.sqrt(n))
+    centre = side * (side // 2) + side // 2
+    owner = probe["owner"][..., centre]
+    mask = (owner >= 0) & (probe["surface"][..., centre] > 0.5)
+    same = ((probe["owner"] == owner[..., None]) & mask[..., None]).astype(np.float32)
+    share = same / np.maximum(same.sum(-1, keepdims=True), 1)
+    out = {k: (probe[k] * share).sum(2) for k in ("roughness", "metallic")}
+    out["albedo"] = (probe["albedo"] * share[..., None]).sum(2)
+    out["normal"] = probe["normal"][:, :, centre] * mask[..., None]
+    out["depth"] = probe["depth"][..., centre] * mask
+    out["mask"] = mask
+    return out
+
+
+def exposure(image: Array, rng: np.random.Generator) -> float:
+    """Factor that exposes linear radiance [H, W, 3] as cameras do, give or take: middle grey, some highlights lost."""
+    light = luminance(image)
+    middle = float(np.exp(np.log(np.maximum(light, 1e-4 * light.mean() + 1e-9)).mean()))
+    high = float(np.percentile(light, 97))
+    aim = np.sqrt((0.16 / max(middle, 1e-9)) * (0.8 / max(high, 1e-9)))
+    return float(np.clip(aim * np.exp(rng.normal(-0.05, 0.35)), 1e-6, 1e6))

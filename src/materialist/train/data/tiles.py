@@ -1,0 +1,256 @@
+"""The bank of texture tiles: seamless four-channel patterns that materials colour in.
+
+A tile says where a material's colours and finishes go, not what they are; one fixed bank serves every scene, so that
+the path tracer's kernel and its largest buffer never change. Channels, all in [0, 1]: 0 first to second colour,
+1 towards the third colour, 2 brightness grain (0.5 none), 3 first to second roughness.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from materialist.types import Array
+
+SIZE = 256
+"""Pixels on a side of a tile."""
+VARIANTS = 6
+"""Tiles of each kind."""
+
+
+@lru_cache(maxsize=1)
+def bank() -> tuple[Array, dict[str, range]]:
+    """([N, SIZE, SIZE, 4] uint8 tiles, kind -> the numbers of its tiles); the same in every process."""
+    tiles, where = [], {}
+    for k, (kind, make) in enumerate(_KINDS.items()):
+        where[kind] = range(len(tiles), len(tiles) + VARIANTS)
+        for v in range(VARIANTS):
+            channels = make(np.random.default_rng([41, k, v]))
+            tiles.append(np.stack([np.broadcast_to(c, (SIZE, SIZE)) for c in channels], -1))
+    return (np.clip(np.stack(tiles), 0, 1) * 255 + 0.5).astype(np.uint8), where
+
+
+def _noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] = (1, 1)) -> Array:
+    """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, mean 0.5, deviation 0.2; `stretch` (down, right) > 1 draws
+    it out along an axis."""
+    fy, fx = np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.rfftfreq(SIZE)[None, :] * stretch[1]
+    f = np.hypot(fy, fx)
+    f[0, 0] = 1
+    spectrum = np.fft.rfft2(rng.normal(size=(SIZE, SIZE)).astype(np.float32)) / f**slope
+    spectrum[0, 0] = 0
+    field = np.fft.irfft2(spectrum, (SIZE, SIZE))
+    return 0.5 + 0.2 * field / max(field.std(), 1e-9)
+
+
+_X, _Y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
+
+
+def _step(x: Array, soft: float = 0.01) -> Array:
+    return np.clip(x / soft + 0.5, 0, 1)
+
+
+def _plain(rng):
+    return 0.0, 0.0, _noise(rng, rng.uniform(0.6, 1.6)), _noise(rng, 1.5)
+
+
+def _cloudy(rng):
+    """Plaster, concrete, leather, worn paint: soft patches."""
+    soft = _noise(rng, rng.uniform(1.2, 2.0))
+    return soft, 1.2 * _step(_noise(rng, 1.4) - 0.78, 0.1), _noise(rng, 0.7), _noise(rng, 1.6)
+
+
+def _speckle(rng):
+    """Terrazzo, granite, gravel, asphalt."""
+    fine, coarse = _noise(rng, rng.uniform(0.3, 0.9)), _noise(rng, rng.uniform(0.9, 1.3))
+    return _step(coarse - 0.55, 0.1), _step(fine - rng.uniform(0.7, 0.8), 0.05), _noise(rng, 0.4), coarse
+
+
+def _marble(rng):
+    warp = _noise(rng, 2.2) * rng.uniform(1.5, 4)
+    n = int(rng.integers(1, 4))
+    vein = np.abs(np.sin(np.pi * (n * _X + int(rng.integers(0, 3)) * _Y + warp)))
+    return np.exp(-vein * rng.uniform(4, 12)), _noise(rng, 2.0) * 0.5, _noise(rng, 1.0), 0.3
+
+
+def _wood(rng):
+    """Grain along x."""
+    warp = _noise(rng, 2.3, (1, 4))
+    n = int(rng.integers(3, 12))
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * _Y + rng.uniform(1, 4) * warp))
+    fibre = _noise(rng, 0.7, (1, 16))
+    return np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1), 0.0, fibre, 0.5 * rings + 0.5 * fibre
+
+
+def _planks(rng):
+    """Floor boards or parquet along x, each of its own shade."""
+    rows, columns = int(rng.integers(4, 11)), int(rng.integers(1, 4))
+    r = np.floor(_Y * rows).astype(int)
+    x = (_X + rng.random(rows)[r]) % 1 * columns
+    c = np.floor(x).astype(int) % columns
+    shade = rng.random((rows, columns))[r, c]
+    gap = np.minimum(np.abs(_Y * rows - np.round(_Y * rows)), np.abs(x - np.round(x)) * rows / columns / 2)
+    seam = _step(0.035 - gap, 0.03)
+    fibre = _noise(rng, 0.9, (1, 14))
+    mix = np.clip(0.15 + 0.55 * shade + 0.6 * (fibre - 0.5), 0, 1)
+    return mix, seam * rng.uniform(0.5, 1), 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
+
+
+def _bricks(rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bool = True, gap: float = 0.06):
+    n = 2 * int(rng.integers(rows[0] // 2, rows[1] // 2 + 1))
+    m = max(1, round(n / aspect))
+    r = np.floor(_Y * n).astype(int)
+    x = _X * m + (0.5 * (r % 2) if shift else 0)
+    c = np.floor(x).astype(int) % m
+    across = np.minimum(x - np.floor(x), np.ceil(x) - x) * n / m
+    down = np.minimum(_Y * n - np.floor(_Y * n), np.ceil(_Y * n) - _Y * n)
+    wobble = 0.03 * (_noise(rng, 0.8) - 0.5)
+    joint = _step(gap + wobble - np.minimum(across, down), 0.05)
+    shade = rng.random((n, m))[r % n, c]
+    return shade, joint, 0.5 + 0.7 * (_noise(rng, 0.8) - 0.5), np.maximum(joint, 0.3 * _noise(rng, 1.2))
+
+
+def _tiling(rng):
+    """Square or oblong ceramic tiles."""
+    return _bricks(rng, (2, 10), float(rng.choice([1, 1, 2, 0.5])), bool(rng.random() < 0.25), rng.uniform(0.02, 0.05))
+
+
+def _checker(rng):
+    n = 2 * int(rng.integers(1, 6))
+    board = (np.floor(_X * n) + np.floor(_Y * n)) % 2
+    edge = np.minimum(np.abs(_X * n - np.round(_X * n)), np.abs(_Y * n - np.round(_Y * n)))
+    return board, 0.6 * _step(0.02 - edge, 0.02), 0.5 + 0.6 * (_noise(rng, 1.0) - 0.5), 0.2
+
+
+def _stripes(rng):
+    n, k = int(rng.integers(3, 16)), int(rng.integers(2, 5))
+    profile = rng.choice([0, 0.5, 1], size=n * k)
+    second = rng.choice([0, 0, 0, 1], size=n * k)
+    i = np.floor(_X * n * k).astype(int)
+    return profile[i], second[i], _noise(rng, 0.4), _noise(rng, 1.0)
+
+
+def _plaid(rng):
+    n = int(rng.integers(2, 6))
+    profile = lambda: np.repeat(rng.random(8) < 0.4, SIZE // 8).astype(float)  # noqa: E731
+    a, b, c = profile(), profile(), profile()
+    index = (np.arange(SIZE) * n) % SIZE
+    return (
+        0.5 * a[index][:, None] + 0.5 * b[index][None],
+        0.7 * c[index][:, None] * c[index][None],
+        _noise(rng, 0.3),
+        0.5,
+    )
+
+
+def _weave(rng):
+    """Cloth seen close: crossing threads."""
+    n = int(rng.integers(24, 56))
+    u, v = np.sin(2 * np.pi * n * _X), np.sin(2 * np.pi * n * _Y)
+    over = (np.floor(_X * n * 2) + np.floor(_Y * n * 2)) % 2
+    thread = np.where(over > 0, np.abs(u), np.abs(v))
+    melange = _noise(rng, 0.3, (1, 8)) * over + _noise(rng, 0.3, (8, 1)) * (1 - over)
+    return np.clip(melange * rng.uniform(0.2, 1.2), 0, 1), 0.0, 0.25 + 0.45 * thread, 0.5
+
+
+def _carpet(rng):
+    """Rug with borders and a mirrored ornament; the tile is the whole rug."""
+    quarter = _noise(rng, rng.uniform(1.2, 2.2))
+    field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4
+    edge = np.minimum(np.minimum(_X, 1 - _X), np.minimum(_Y, 1 - _Y))
+    bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
+    border = edge < rng.uniform(0.08, 0.2)
+    pick = rng.random(64) < 0.5
+    ornament = _step(field - 0.5, 0.02)
+    second = _step(np.abs(field - 0.5) - rng.uniform(0.06, 0.14), 0.02)
+    return np.where(border, pick[bands], ornament), np.where(border, pick[bands + 20], second), _noise(rng, 0.2), 0.5
+
+
+def _ornament(rng):
+    """Wallpaper or print: repeated mirrored motifs."""
+    n = int(2 ** rng.integers(1, 4))
+    base = _noise(rng, rng.uniform(1.5, 2.2))[::n, ::n]
+    base = np.tile((base + base[:, ::-1]) / 2, (n, n))
+    t = np.quantile(base, rng.uniform(0.55, 0.85))
+    return _step(base - t, 0.04), _step(base - t - 0.12, 0.04), _noise(rng, 0.6), 0.6 - 0.3 * _step(base - t, 0.04)
+
+
+def _spots(rng):
+    first, second = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE))
+    radius = rng.uniform(0.015, 0.08)
+    for _ in range(int(rng.integers(10, 60))):
+        x, y, r = rng.random(), rng.random(), radius * rng.uniform(0.5, 1.3)
+        disc = _step(r - np.hypot((_X - x + 0.5) % 1 - 0.5, (_Y - y + 0.5) % 1 - 0.5), 0.006)
+        first, second = np.maximum(first, disc), np.maximum(second, disc * (rng.random() < 0.4))
+    return first, second, _noise(rng, 1.0), 0.3
+
+
+def _picture(rng):
+    """A painting or photograph of sorts: sky, hills and blocks in three colours."""
+    line = 0.3 + 0.4 * rng.random() + 0.15 * (_noise(rng, 2.2)[:1] - 0.5) * 3
+    hills = _step(_Y - line, 0.02)
+    first = np.clip(hills * _noise(rng, 1.6) * 1.6, 0, 1)
+    second = np.clip((1 - hills) * (1 - _Y) * rng.uniform(0.5, 1.5), 0, 1)
+    for _ in range(int(rng.integers(0, 9))):
+        x, y, w, h = rng.random(), rng.random(), rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3)
+        block = (np.abs(_X - x) < w) & (np.abs(_Y - y) < h)
+        first, second = np.where(block, rng.random(), first), np.where(block, rng.random(), second)
+    return first, second, _noise(rng, 1.3), 0.3
+
+
+def _print(rng):
+    """Lines of text, labels, book pages."""
+    first, rows = np.zeros((SIZE, SIZE)), int(rng.integers(8, 28))
+    for r in range(rows):
+        if rng.random() < 0.85:
+            words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
+            inside = (np.abs(_X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(_Y * rows) == r)
+            first = np.maximum(first, inside * words[None] * (np.abs((_Y * rows) % 1 - 0.5) < 0.28))
+    block = (np.abs(_X - rng.random()) < 0.2) & (np.abs(_Y - rng.random()) < 0.15)
+    return first * 0.9, block * (rng.random() < 0.6) * 0.9, _noise(rng, 1.2), 0.5
+
+
+def _facade(rng):
+    """Rows of windows in a wall; channel 1 is the pane, channel 3 where it shines."""
+    n, m = int(rng.integers(2, 5)), int(rng.integers(2, 5))
+    x, y = (_X * m) % 1, (_Y * n) % 1
+    w, h = rng.uniform(0.18, 0.38), rng.uniform(0.22, 0.36)
+    frame = _step(np.minimum(w + 0.04 - np.abs(x - 0.5), h + 0.04 - np.abs(y - 0.5)), 0.02)
+    bars = np.minimum(np.abs(x - 0.5), np.abs(y - 0.5 - rng.uniform(-0.1, 0.1))) < 0.012
+    pane = _step(np.minimum(w - np.abs(x - 0.5), h - np.abs(y - 0.5)), 0.02) * (1 - bars)
+    wall = 0.35 * _noise(rng, 1.4) * (1 - frame) + frame
+    return wall, pane, 0.5 + 0.6 * (_noise(rng, 1.0) - 0.5) * (1 - pane), pane
+
+
+def _grass(rng):
+    blades = _noise(rng, 0.5, (3, 1))
+    return _noise(rng, 1.3), _step(_noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
+
+
+def _paving(rng):
+    return _bricks(rng, (2, 8), float(rng.choice([1, 1.5, 2])), True, rng.uniform(0.02, 0.06))
+
+
+def _rust(rng):
+    """Worn metal: channel 0 is where it is corroded or painted over."""
+    patch = _noise(rng, rng.uniform(1.3, 1.9))
+    first = _step(patch - rng.uniform(0.5, 0.75), rng.uniform(0.02, 0.2))
+    return first, 0.5 * _noise(rng, 0.8) * first, _noise(rng, 0.8), first
+
+
+def _brushed(rng):
+    return 0.0, 0.0, 0.5 + 0.5 * (_noise(rng, 0.4, (1, 40)) - 0.5), _noise(rng, 0.8, (1, 40))
+
+
+def _leaf(rng):
+    rib = np.abs(np.sin(np.pi * (6 * _Y + 3 * np.abs(_X - 0.5))))
+    return _noise(rng, 1.6), 0.5 * np.exp(-np.abs(_X - 0.5) * 30) + 0.2 * (rib < 0.15), _noise(rng, 1.0), 0.5
+
+
+_KINDS = {
+    "plain": _plain, "cloudy": _cloudy, "speckle": _speckle, "marble": _marble, "wood": _wood, "planks": _planks,
+    "bricks": _bricks, "tiling": _tiling, "checker": _checker, "stripes": _stripes, "plaid": _plaid, "weave": _weave,
+    "carpet": _carpet, "ornament": _ornament, "spots": _spots, "picture": _picture, "print": _print,
+    "facade": _facade, "grass": _grass, "paving": _paving, "rust": _rust, "brushed": _brushed, "leaf": _leaf,
+}  # fmt: skip
+KINDS = tuple(_KINDS)
