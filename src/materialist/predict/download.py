@@ -112,9 +112,10 @@ def _listing(model: HubModel) -> list[Remote]:
 def _fetch(model: HubModel, remote: Remote, target: Path, progress, *, fresh: bool) -> str:
     """One file, through a `.partial` beside it that a later call takes up; returns its sha256."""
     partial = target.with_name(target.name + ".partial")
-    if fresh:
-        partial.unlink(missing_ok=True)
     have = partial.stat().st_size if partial.is_file() else 0
+    if fresh or (remote.size and have > remote.size):
+        partial.unlink(missing_ok=True)
+        have = 0
     url = f"{endpoint()}/{model.repo}/resolve/main/{urllib.parse.quote(remote.name)}"
     try:
         if not (remote.size and have == remote.size):
@@ -146,6 +147,8 @@ def _stream(model: HubModel, url: str, partial: Path, have: int, remote: Remote,
                 done += len(chunk)
                 if progress:
                     progress(remote.name, done >> 20, max(1, total >> 20))
+        if done < total:
+            raise ConnectionError(f"after {done} of {total} bytes")
 
 
 def _open(model: HubModel, url: str, headers: dict[str, str] | None = None):

@@ -1,0 +1,74 @@
+"""Hub models with random weights, small enough for tests, saved the way their libraries save them."""
+
+import json
+from pathlib import Path
+
+import torch
+
+APPEARANCE = {
+    "target_names": ["albedo", "material"],
+    "albedo": {"prediction_space": "srgb"},
+    "material": {"prediction_space": "stack", "sub_target_names": ["roughness", "metallicity", None]},
+    "roughness": {"prediction_space": "linear"},
+    "metallicity": {"prediction_space": "linear"},
+}
+"""As the published 'appearance' model says it."""
+
+
+def save_marigold(folder: Path, kind: str, *, half: bool = False, **settings) -> Path:
+    """A Marigold pipeline of one kind (a class name of diffusers)."""
+    import diffusers
+    from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
+
+    targets = 2 if kind == "MarigoldIntrinsicsPipeline" else 1
+    with torch.random.fork_rng():
+        torch.manual_seed(7)
+        unet = diffusers.UNet2DConditionModel(
+            block_out_channels=(8, 16), layers_per_block=1, sample_size=8, in_channels=4 * (targets + 1),
+            out_channels=4 * targets, down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"),
+            up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"), cross_attention_dim=8, norm_num_groups=4,
+            attention_head_dim=4,
+        )  # fmt: skip
+        vae = diffusers.AutoencoderKL(
+            block_out_channels=(8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
+            down_block_types=("DownEncoderBlock2D",) * 2, up_block_types=("UpDecoderBlock2D",) * 2,
+        )  # fmt: skip
+        text = CLIPTextModel(
+            CLIPTextConfig(hidden_size=8, intermediate_size=16, num_attention_heads=2, num_hidden_layers=1,
+                           vocab_size=8, max_position_embeddings=16, bos_token_id=0, eos_token_id=1)
+        )  # fmt: skip
+    pipeline = getattr(diffusers, kind)(
+        unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(prediction_type="v_prediction"), text_encoder=text,
+        tokenizer=_tokenizer(folder, CLIPTokenizer), default_denoising_steps=1, default_processing_resolution=32,
+        **settings,
+    )  # fmt: skip
+    pipeline.save_pretrained(folder, variant="fp16" if half else None)
+    return folder
+
+
+def save_depth_anything(folder: Path, **settings) -> Path:
+    """A Depth Anything model."""
+    from transformers import DepthAnythingConfig, DepthAnythingForDepthEstimation, Dinov2Config
+
+    backbone = Dinov2Config(
+        hidden_size=16, num_hidden_layers=4, num_attention_heads=2, image_size=70, patch_size=14, mlp_ratio=1,
+        out_indices=[1, 2, 3, 4], reshape_hidden_states=False, apply_layernorm=True,
+    )  # fmt: skip
+    config = DepthAnythingConfig(
+        backbone_config=backbone, reassemble_hidden_size=16, neck_hidden_sizes=[4, 8, 8, 8], fusion_hidden_size=8,
+        head_hidden_size=4, **settings,
+    )  # fmt: skip
+    with torch.random.fork_rng():
+        torch.manual_seed(3)
+        DepthAnythingForDepthEstimation(config).save_pretrained(folder)
+    return folder
+
+
+def _tokenizer(folder: Path, cls):
+    """A vocabulary of a few letters."""
+    files = folder.parent / "vocabulary"
+    files.mkdir(parents=True, exist_ok=True)
+    words = {"<|startoftext|>": 0, "<|endoftext|>": 1, "a</w>": 2, "a": 3}
+    (files / "vocab.json").write_text(json.dumps(words))
+    (files / "merges.txt").write_text("#version: 0.2\n")
+    return cls(str(files / "vocab.json"), str(files / "merges.txt"), model_max_length=16)

@@ -1,0 +1,238 @@
+"""Marigold and Depth Anything, with small random models: what goes in, what comes out, and what is refused."""
+
+import os
+
+import numpy as np
+import pytest
+from made_matnet import made_photo
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.errors import InputError, SetupError, WeightsError
+from materialist.predict import get_predictor
+from materialist.predict.marigold import Marigold, appearance, unit_normals
+from materialist.predict.mix import MAPS
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+os.environ.setdefault("HF_HUB_OFFLINE", "1")
+
+
+@pytest.fixture(autouse=True)
+def models(tmp_path, monkeypatch):
+    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
+    return tmp_path / "models"
+
+
+@pytest.fixture
+def hub():
+    """The module that makes small models; skips where the extra 'hub' is not installed."""
+    for name in ("diffusers", "transformers"):
+        pytest.importorskip(name, reason="needs the optional extra 'hub'")
+    import made_hub
+
+    return made_hub
+
+
+@pytest.fixture
+def marigold(hub, models):
+    """All three Marigold models where a download would put them."""
+    for repo, kind, settings in (
+        ("iid-appearance", "MarigoldIntrinsicsPipeline",
+         {"prediction_type": "intrinsics", "target_properties": hub.APPEARANCE}),
+        ("normals", "MarigoldNormalsPipeline", {"prediction_type": "normals"}),
+        ("depth", "MarigoldDepthPipeline",
+         {"prediction_type": "depth", "scale_invariant": True, "shift_invariant": True}),
+    ):  # fmt: skip
+        list_files(hub.save_marigold(models / f"prs-eth--marigold-{repo}-v1-1", kind, half=repo == "depth", **settings))
+    return models
+
+
+def list_files(folder):
+    """The list of checksums that ends a download."""
+    from materialist.predict.weights import sha256
+
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "SHA256SUMS")
+    lines = [f"{sha256(path)}  {path.relative_to(folder).as_posix()}\n" for path in files]
+    (folder / "SHA256SUMS").write_text("".join(lines))
+
+
+def check(prediction, size):
+    """The conventions of `Prediction`."""
+    assert prediction.materials.albedo.shape == prediction.normal.shape == (*size, 3)
+    assert prediction.depth.shape == prediction.materials.roughness.shape == prediction.materials.metallic.shape == size
+    for values in vars(prediction.materials).values():
+        assert values.dtype == np.float32 and values.min() >= 0 and values.max() <= 1 and np.ptp(values) > 0
+    assert np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
+    assert prediction.depth.min() > 0 and np.isfinite(prediction.depth).all() and prediction.depth.dtype == np.float32
+
+
+def test_marigold_gives_all_maps_with_their_sources(marigold):
+    photo = made_photo()
+    prediction = get_predictor("marigold", device="cpu").predict(photo, seed=4)
+    check(prediction, (20, 31))
+    assert list(prediction.sources) == list(MAPS)
+    assert all("prs-eth/marigold" in text and "sha256:" in text for text in prediction.sources.values())
+    assert "far / near" in prediction.sources["depth"] and "fitted" in prediction.warnings[0]
+    again = get_predictor("marigold", device="cpu").predict(photo, seed=4)
+    assert np.array_equal(again.materials.albedo, prediction.materials.albedo)
+    other = get_predictor("marigold", device="cpu").predict(photo, seed=5)
+    assert not np.array_equal(other.materials.albedo, prediction.materials.albedo)
+
+
+def test_marigold_sees_srgb_and_only_the_wanted_models_run(marigold, monkeypatch):
+    from materialist.predict import marigold as module
+
+    seen, kinds, build = [], [], module._pipeline
+
+    def spy(folder, kind, gpu):
+        kinds.append(kind)
+        pipeline = build(folder, kind, gpu)
+        return type("Spy", (), {
+            "__call__": lambda self, image, **k: seen.append(image) or pipeline(image, **k),
+            "__getattr__": lambda self, name: getattr(pipeline, name),
+        })()  # fmt: skip
+
+    monkeypatch.setattr(module, "_pipeline", spy)
+    photo = made_photo()
+    prediction = get_predictor("classical", albedo="marigold", device="cpu").predict(photo)
+    assert kinds == ["MarigoldIntrinsicsPipeline"]
+    assert np.allclose(seen[0][0], linear_to_srgb(photo.linear))
+    assert prediction.sources["depth"] == prediction.sources["metallic"] == "classical"
+
+
+def test_one_marigold_model_from_a_folder(marigold):
+    folder = marigold / "prs-eth--marigold-normals-v1-1"
+    prediction = get_predictor("classical", normal=f"marigold:{folder}", device="cpu").predict(made_photo())
+    check_normals = np.linalg.norm(prediction.normal, axis=-1)
+    assert np.allclose(check_normals, 1, atol=1e-5) and prediction.sources["normal"].startswith("marigold (prs-eth--")
+    with pytest.raises(InputError, match="gives only normal"):
+        get_predictor("classical", albedo=f"marigold:{folder}")
+
+
+def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
+    from safetensors.torch import load_file, save_file
+
+    folder = marigold / "prs-eth--marigold-normals-v1-1"
+    weights = folder / "unet" / "diffusion_pytorch_model.safetensors"
+    state = load_file(weights)
+    del state["conv_in.bias"]
+    save_file(state, weights)
+    ask = lambda: get_predictor("classical", normal="marigold", device="cpu").predict(made_photo())  # noqa: E731
+    with pytest.raises(WeightsError, match=r"unet.*is damaged.*expected"):
+        ask()
+    list_files(folder)
+    with pytest.raises(WeightsError, match=r"unet.*lacks conv_in\.bias"):
+        ask()
+    weights.write_bytes(b"short")
+    list_files(folder)
+    with pytest.raises(WeightsError, match="UNet2DConditionModel"):
+        ask()
+    (folder / "model_index.json").write_text('{"_class_name": "StableDiffusionPipeline"}')
+    with pytest.raises(WeightsError, match="StableDiffusionPipeline"):
+        get_predictor("classical", normal=f"marigold:{folder}")
+    (folder / "model_index.json").write_text("no json")
+    with pytest.raises(WeightsError, match=r"model_index\.json"):
+        get_predictor("classical", normal=f"marigold:{folder}")
+
+
+def test_depth_anything_relative_and_metric(hub, models, tmp_path):
+    list_files(hub.save_depth_anything(models / "depth-anything--Depth-Anything-V2-Small-hf"))
+    photo = made_photo(30, 40)
+    prediction = get_predictor("classical", depth="depth-anything", device="cpu").predict(photo)
+    assert prediction.depth.shape == (30, 40) and prediction.depth.min() > 0 and np.ptp(prediction.depth) > 0
+    assert "Depth-Anything" in prediction.sources["depth"] or "V2 Small" in prediction.sources["depth"]
+    assert any("far / near = 4.0 was assumed" in note for note in prediction.warnings)
+    metric = hub.save_depth_anything(tmp_path / "metric", depth_estimation_type="metric", max_depth=20)
+    part = get_predictor("classical", depth=f"depth-anything:{metric}", device="cpu").predict(photo)
+    assert part.depth.min() > 0 and part.depth.max() < 20 and part.sources["depth"].endswith("metric")
+    with pytest.raises(InputError, match=r"gives only depth.*--depth"):
+        get_predictor("depth-anything")
+
+
+def test_depth_anything_sees_what_its_own_processor_would_show_it(hub, tmp_path, monkeypatch):
+    import torch
+    from PIL import Image
+    from transformers import DepthAnythingForDepthEstimation
+    from transformers.models.dpt.image_processing_pil_dpt import DPTImageProcessorPil
+
+    folder = hub.save_depth_anything(tmp_path / "model")
+    seen = []
+    forward = DepthAnythingForDepthEstimation.forward
+    monkeypatch.setattr(
+        DepthAnythingForDepthEstimation, "forward",
+        lambda self, pixel_values: seen.append(pixel_values) or forward(self, pixel_values),
+    )  # fmt: skip
+    smooth = np.add.outer(np.linspace(0, 0.5, 518), np.linspace(0, 0.4, 700))[..., None] * [1, 0.8, 0.6]
+    photo = made_photo(518, 700)
+    photo.linear[:] = srgb_to_linear(np.round(smooth * 255) / 255)
+    get_predictor("classical", depth=f"depth-anything:{folder}", device="cpu").predict(photo)
+    processor = DPTImageProcessorPil(  # as the published preprocessor_config.json has it
+        size={"height": 518, "width": 518}, ensure_multiple_of=14, keep_aspect_ratio=True,
+        image_mean=[0.485, 0.456, 0.406], image_std=[0.229, 0.224, 0.225],
+    )  # fmt: skip
+    picture = Image.fromarray((linear_to_srgb(photo.linear) * 255).round().astype(np.uint8))
+    wanted = torch.as_tensor(np.asarray(processor(picture)["pixel_values"]))
+    assert seen[0].shape == wanted.shape and (seen[0] - wanted).abs().max() < 0.02
+
+
+def test_a_damaged_depth_anything_is_refused(hub, tmp_path):
+    from safetensors.torch import load_file, save_file
+
+    folder = hub.save_depth_anything(tmp_path / "model")
+    weights = folder / "model.safetensors"
+    ask = lambda: get_predictor("classical", depth=f"depth-anything:{folder}", device="cpu").predict(made_photo())  # noqa: E731
+    state = load_file(weights)
+    name = next(iter(state))
+    save_file({k: v for k, v in state.items() if k != name}, weights)
+    with pytest.raises(WeightsError, match=r"DepthAnythingForDepthEstimation.*lacks"):
+        ask()
+    weights.write_bytes(b"x" * 40)
+    with pytest.raises(WeightsError, match="DepthAnythingForDepthEstimation"):
+        ask()
+
+
+def test_absent_models_say_how_to_get_them():
+    for spec, part, name in (
+        ("marigold", "albedo", "marigold-appearance"),
+        ("marigold", "depth", "marigold-depth"),
+        ("depth-anything", "depth", "depth-anything"),
+        ("marigold:someone/theirs", "normal", "someone/theirs"),
+    ):
+        with pytest.raises(WeightsError, match=f"models download {name}.*maps:DIR"):
+            get_predictor("classical", **{part: spec})
+    with pytest.raises(WeightsError, match="no folder"):
+        get_predictor("classical", depth="depth-anything:nowhere")
+
+
+def test_absent_libraries_say_how_to_get_them(models, monkeypatch):
+    import sys
+
+    folder = models / "prs-eth--marigold-normals-v1-1"
+    folder.mkdir(parents=True)
+    (folder / "SHA256SUMS").write_text("")
+    monkeypatch.setitem(sys.modules, "diffusers", None)
+    with pytest.raises(SetupError, match=r"needs diffusers.*materialist\[hub\]"):
+        get_predictor("classical", normal="marigold")
+
+
+def test_appearance_reads_the_order_and_the_colour_space_of_the_targets():
+    output = np.random.default_rng(1).random((2, 3, 4, 3)).astype(np.float32)
+    about = {
+        "target_names": ["material", "albedo"],
+        "material": {"sub_target_names": ["metallicity", None, "roughness"]},
+        "albedo": {"prediction_space": "linear"},
+    }
+    maps = appearance(output, about)
+    assert np.array_equal(maps["albedo"], output[1]) and np.array_equal(maps["roughness"], output[0, ..., 2])
+    assert np.array_equal(maps["metallic"], output[0, ..., 0])
+    about["albedo"] = {"prediction_space": "srgb"}
+    assert np.allclose(appearance(output, about)["albedo"], srgb_to_linear(output[1]))
+    assert list(appearance(output, {"target_names": ["albedo", "shading"], "shading": {}})) == ["albedo"]
+
+
+def test_normals_keep_their_direction_and_get_their_length():
+    output = np.array([[[0.3, 0, 0.4], [0, 0, 0]]], np.float32)
+    assert np.allclose(unit_normals(output), [[[0.6, 0, 0.8], [0, 0, 1]]])
+
+
+def test_every_map_has_a_marigold_model():
+    assert {name for part in Marigold()._parts for name in part.gives} == set(MAPS)

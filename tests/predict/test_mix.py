@@ -1,0 +1,102 @@
+"""A prior from several predictors."""
+
+import numpy as np
+import pytest
+from made_matnet import made_photo
+from test_moge import write as write_moge
+
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+from materialist.predict import get_predictor
+from materialist.predict.mix import MAPS
+from materialist.predict.normals import normals_from_depth
+
+H, W = 20, 32
+
+
+@pytest.fixture
+def photo():
+    return made_photo(H, W)
+
+
+@pytest.fixture
+def other(tmp_path):
+    """maps:DIR with every map, all unlike those of `classical`."""
+    folder = tmp_path / "other"
+    folder.mkdir()
+    rng = np.random.default_rng(8)
+    normal = rng.normal(size=(H, W, 3)) * 0.2 + [0, 0, 1]
+    maps = {
+        "albedo": rng.random((H, W, 3)), "roughness": rng.random((H, W)), "metallic": rng.random((H, W)),
+        "normal": normal / np.linalg.norm(normal, axis=-1, keepdims=True), "depth": 2 + rng.random((H, W)),
+    }  # fmt: skip
+    maps = {name: values.astype(np.float32) for name, values in maps.items()}
+    for name, values in maps.items():
+        write_exr(folder / f"{name}.exr", values)
+    return f"maps:{folder}", maps
+
+
+def all_maps(prediction):
+    return {**vars(prediction.materials), "normal": prediction.normal, "depth": prediction.depth}
+
+
+@pytest.mark.parametrize("name", ["albedo", "roughness", "metallic", "normal", "depth"])
+def test_the_named_map_comes_from_its_source_and_the_rest_from_the_rest(name, photo, other):
+    spec, theirs = other
+    mixed = get_predictor("classical", **{name: spec}).predict(photo)
+    plain = all_maps(get_predictor("classical").predict(photo))
+    for key, values in all_maps(mixed).items():
+        if key == "normal" and name == "depth":
+            continue
+        assert np.allclose(values, theirs[key] if key == name else plain[key], atol=1e-6), key
+    assert list(mixed.sources) == list(MAPS)
+    assert (
+        mixed.sources[name] == spec and mixed.sources["roughness" if name != "roughness" else "albedo"] == "classical"
+    )
+    assert mixed.predictor == f"{name}: {spec}; " + ", ".join(k for k in MAPS if k != name) + ": classical" or (
+        name != "albedo" and mixed.predictor.endswith(f"{name}: {spec}")
+    )
+
+
+def test_normals_that_follow_a_depth_follow_the_chosen_one(photo, other):
+    spec, theirs = other
+    mixed = get_predictor("classical", depth=spec).predict(photo)
+    assert np.allclose(mixed.normal, normals_from_depth(theirs["depth"], photo.camera, radius=2), atol=1e-6)
+    assert mixed.sources["normal"] == f"derived from the depth of {spec}"
+    kept = get_predictor(spec, depth="classical").predict(photo)
+    assert np.allclose(kept.normal, theirs["normal"], atol=1e-6) and kept.sources["normal"] == spec
+
+
+def test_each_source_runs_once_and_unused_ones_never_open(photo, other, monkeypatch):
+    from materialist.predict.maps import MapsPredictor
+
+    runs = []
+    predict = MapsPredictor.predict
+    monkeypatch.setattr(MapsPredictor, "predict", lambda self, *a, **k: runs.append(1) or predict(self, *a, **k))
+    spec, theirs = other
+    mixed = get_predictor("maps:nowhere", **dict.fromkeys(MAPS, spec)).predict(photo)
+    assert runs == [1] and np.array_equal(mixed.depth, theirs["depth"])
+
+
+def test_moge_gives_depth_normals_and_the_field_of_view(photo, tmp_path):
+    depth, _, seen = write_moge(tmp_path / "moge")
+    spec = f"moge:{tmp_path / 'moge'}"
+    predictor = get_predictor("classical", depth=spec, normal=spec)
+    prediction = predictor.predict(photo)
+    assert predictor.field_of_view == 61.23
+    assert np.array_equal(prediction.depth, np.where(seen, depth, 0))
+    assert prediction.sources["depth"] == prediction.sources["normal"] == spec
+    assert get_predictor("classical", normal=spec).field_of_view is None
+
+
+def test_bad_mixtures_are_refused(other, tmp_path):
+    write_moge(tmp_path / "moge")
+    for parts, word in (
+        ({"albedo": f"moge:{tmp_path / 'moge'}"}, "gives only normal, depth, not albedo"),
+        ({"depth": "nonsense"}, "no predictor 'nonsense'"),
+        ({"colour": "classical"}, "no map 'colour'.*albedo"),
+        ({"depth": "maps:nowhere"}, "no folder"),
+    ):
+        with pytest.raises(InputError, match=word):
+            get_predictor("classical", **parts)
+    assert get_predictor("classical", albedo=None, depth=None).name == "classical"

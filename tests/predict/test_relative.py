@@ -1,0 +1,49 @@
+"""Relative depths: the shift that normals reveal, and what happens without them."""
+
+import numpy as np
+import pytest
+
+from materialist.predict.normals import normals_from_depth
+from materialist.predict.relative import DEFAULT_RATIO, from_affine, from_inverse
+from materialist.types import Camera
+
+CAMERA = Camera(96, 72, 50.0)
+
+
+def room() -> np.ndarray:
+    """[72, 96] depth of a floor that meets a wall, with a box on it."""
+    inverse = np.maximum((np.arange(72)[:, None] + 0.5 - 20) / 52, 0.22) * np.ones((1, 96))
+    inverse[30:60, 20:45] = np.maximum(inverse[30:60, 20:45], 0.75 + 0.004 * np.arange(25))
+    return (1 / inverse).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("convert", "relative"), [(from_inverse, lambda z: 3 / z + 0.7), (from_affine, lambda z: 0.1 * z - 4)]
+)
+def test_normals_reveal_the_shift(convert, relative):
+    true = room()
+    depth, ratio = convert(relative(true).astype(np.float32), CAMERA, normals_from_depth(true, CAMERA))
+    span = np.percentile(true, 99.5) / np.percentile(true, 0.5)
+    assert ratio == pytest.approx(span, rel=0.12)
+    assert np.std(np.log(depth / true)) < 0.05
+
+
+def test_without_normals_the_ratio_is_the_documented_one():
+    true = room()
+    for convert, relative in ((from_inverse, 3 / true + 0.7), (from_affine, 0.1 * true - 4)):
+        for normal in (None, np.zeros((72, 96, 3), np.float32)):
+            depth, ratio = convert(relative.astype(np.float32), CAMERA, normal)
+            assert ratio == DEFAULT_RATIO and depth.dtype == np.float32
+            near, far = np.percentile(depth, (0.5, 99.5))
+            assert (near, far) == (pytest.approx(1, rel=1e-3), pytest.approx(DEFAULT_RATIO, rel=1e-3))
+            assert (np.diff(depth[40:, 5]) <= 0).all()  # the floor comes nearer downwards
+
+
+def test_outliers_and_constants_stay_positive_and_finite():
+    values = np.linspace(0, 1, 72 * 96, dtype=np.float32).reshape(72, 96)
+    values[0, 0], values[5, 5] = -50, 50
+    for convert in (from_inverse, from_affine):
+        depth, _ = convert(values, CAMERA)
+        assert np.isfinite(depth).all() and depth.min() > 0 and depth.max() < 200
+        flat, _ = convert(np.full((72, 96), 0.3, np.float32), CAMERA)
+        assert np.ptp(flat) == 0 and flat[0, 0] > 0
