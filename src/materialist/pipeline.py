@@ -16,8 +16,8 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.types import Array, FitReport, Geometry, Materials, Photo, Prediction, Scene
 
-FINAL_SPP = 49
-"""Samples per pixel of the re-rendering that a scene is judged by."""
+FINAL_SPP = 25
+"""Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
 

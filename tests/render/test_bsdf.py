@@ -68,6 +68,34 @@ def test_chi_squared(roughness, metallic, degrees, side, capsys, tmp_path, monke
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 
+@pytest.mark.parametrize("component", [0, 1])
+def test_a_component_is_drawn_with_its_own_density(component, capsys, tmp_path, monkeypatch):
+    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
+
+    monkeypatch.chdir(tmp_path)
+    parameters = (
+        '<rgb name="base_color" value="0.6"/><float name="roughness" value="0.5"/><float name="metallic" value="0.5"/>'
+    )
+    context = mi.BSDFContext()
+    context.component = component
+    draw, density = BSDFAdapter("materialist_disney", parameters, wi=tilted(50).tolist(), ctx=context)
+    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
+    assert test.run(significance_level=0.001), capsys.readouterr().out
+
+
+def test_the_components_add_up():
+    surface = make(roughness=0.4, metallic=0.3)
+    wi, wo = pairs(1000, 6, 0.4)
+    parts = []
+    for component in (0, 1):
+        context = mi.BSDFContext()
+        context.component = component
+        parts.append(np.array(surface.eval(context, interaction(wi), vector(wo))).T)
+    whole = np.array(surface.eval(mi.BSDFContext(), interaction(wi), vector(wo))).T
+    assert parts[0] + parts[1] == pytest.approx(whole, rel=1e-5, abs=1e-7)
+    assert (parts[0] > 0).mean() > 0.9 and (parts[1] > 0).mean() > 0.9
+
+
 def test_chi_squared_notices_a_wrong_density(capsys, tmp_path, monkeypatch):
     from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
 

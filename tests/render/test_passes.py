@@ -30,7 +30,7 @@ def test_many_small_passes_make_the_same_picture(monkeypatch, spp):
     calls = []
     load = scene.mi.render
     monkeypatch.setattr(scene.mi, "render", lambda *a, **k: calls.append((k["spp"], k["seed"])) or load(*a, **k))
-    image = scene.render(spp=spp, seed=2, max_depth=2)
+    image = scene.render_path(spp=spp, seed=2, max_depth=2)
     assert image.shape == (5, 9, 3) and image.mean() == pytest.approx(whole, rel=0.1 / np.sqrt(spp) + 0.01)
     assert len({seed for _, seed in calls}) == len(calls) == -(-spp // 4)
     assert spp <= sum(n for n, _ in calls) <= spp + 2 * len(calls) and max(n for n, _ in calls) <= 4

@@ -53,7 +53,7 @@ class Comparison:
         """PSNR away from depth edges and over all surface pixels, with the noise of the reference taken out."""
         image = linear_to_srgb(self.cached(bounces))
         # Errors against two independent references: their noise has mean zero in the product.
-        errors = [image - linear_to_srgb(self.path.render(spp=spp, seed=s, max_depth=bounces + 1)) for s in (1, 2)]
+        errors = [image - linear_to_srgb(self.path.render_path(spp=spp, seed=s, max_depth=bounces + 1)) for s in (1, 2)]
         square = (errors[0].astype(np.float64) * errors[1]).mean(-1)
         return [float(-10 * np.log10(max(square[mask].mean(), 1e-9))) for mask in (self.away, self.surface)]
 
@@ -78,7 +78,7 @@ def test_cached_shading_equals_path_tracing(comparison, bounces, away, everywher
 
 
 def test_cached_shading_has_no_bias(comparison):
-    reference = comparison.path.render(spp=100, seed=3, max_depth=2)
+    reference = comparison.path.render_path(spp=100, seed=3, max_depth=2)
     ratio = comparison.cached(1)[comparison.away].mean() / reference[comparison.away].mean()
     assert ratio == pytest.approx(1, abs=0.01)
 
@@ -92,14 +92,14 @@ def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
 def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int = 256) -> list[float]:
     """Cosines of the gradients of L1 + L2 in albedo, roughness and metallic, noise of the reference taken out."""
     c.path.set_materials(c.materials)
-    target = torch.from_numpy(c.path.render(spp=image_spp, seed=7, max_depth=max_depth))
+    target = torch.from_numpy(c.path.render_path(spp=image_spp, seed=7, max_depth=max_depth))
     # Darker all over: where a rendering meets the photo, the gradient of L1 is a coin toss in both.
     start = replace(
         c.materials, albedo=c.materials.albedo * 0.6, roughness=np.clip(c.materials.roughness + 0.15, 0, 1),
         metallic=c.materials.metallic * 0.6 + 0.2,
     )  # fmt: skip
     c.path.set_materials(start)
-    image = torch.from_numpy(c.path.render(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
+    image = torch.from_numpy(c.path.render_path(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
     weight = torch.autograd.grad(l1_l2(image - target), image)[0]
     leaves = [t.requires_grad_() for t in _tensors(start)]
     light = torch.from_numpy(c.envmap)

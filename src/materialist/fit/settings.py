@@ -121,7 +121,7 @@ DEFAULT = FitSettings(
     ),
     rounds=3,
     corrections=2,
-    correction_spp=9,
+    correction_spp=4,
     trust=0.08,
     light_grid=16,
 )

@@ -64,17 +64,34 @@ def _define():
             diffuse = (1 - metallic) * luma
             return dr.detach(dr.clip(specular / dr.maximum(specular + diffuse, 1e-6), 0.1, 1))
 
-        def _value(self, wi, wo, albedo, roughness, metallic):
-            """f_r cos(theta_o) for directions above the surface."""
+        def _share(self, ctx, cos_i, albedo, metallic):
+            """Probability of the specular lobe: 0 or 1 where the context asks for one component."""
+            if ctx.component in (0, 1):
+                return mi.Float(ctx.component)
+            return self._specular_share(cos_i, albedo, metallic)
+
+        def _value(self, ctx, wi, wo, albedo, roughness, metallic):
+            """f_r cos(theta_o) for directions above the surface, or the component of it that the context asks for."""
+            value = mi.Color3f(0)
+            if ctx.component != 1:
+                value += self._diffuse(wi, wo, albedo, roughness, metallic)
+            if ctx.component != 0:
+                value += self._specular(wi, wo, albedo, roughness, metallic)
+            return value
+
+        def _diffuse(self, wi, wo, albedo, roughness, metallic):
+            cos_d = dr.dot(dr.normalize(wi + wo), wo)
+            c0, c1, c2 = diffuse_polynomial(wo.z, wi.z, cos_d)
+            return albedo * (1 - metallic) * dr.inv_pi * (c0 + roughness * (c1 + roughness * c2)) * wo.z
+
+        def _specular(self, wi, wo, albedo, roughness, metallic):
             alpha = dr.maximum(roughness * roughness, MIN_ALPHA)
             h = dr.normalize(wi + wo)
             cos_d = dr.dot(h, wo)
-            c0, c1, c2 = diffuse_polynomial(wo.z, wi.z, cos_d)
-            diffuse = albedo * (1 - metallic) * dr.inv_pi * (c0 + roughness * (c1 + roughness * c2)) * wo.z
             base = DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
             fresnel = base + (1 - base) * schlick(cos_d)
             shape = ggx(h, alpha) * smith_g1(wi.z, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
-            return diffuse + fresnel * shape
+            return fresnel * shape
 
         def _pdf(self, wi, wo, share, roughness):
             alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
@@ -85,7 +102,7 @@ def _define():
         def sample(self, ctx, si, sample1, sample2, active=True):
             albedo, roughness, metallic = self._materials(si, active)
             wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-            share = self._specular_share(wi.z, albedo, metallic)
+            share = self._share(ctx, wi.z, albedo, metallic)
             alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
             take_specular = sample1 < share
             mirrored = mi.reflect(wi, visible_normal(wi, alpha, sample2))
@@ -94,7 +111,7 @@ def _define():
             bs = mi.BSDFSample3f()
             bs.pdf = dr.select(active, self._pdf(wi, wo, share, roughness), 0)
             active = active & (bs.pdf > 0)
-            value = self._value(wi, wo, albedo, roughness, metallic)
+            value = self._value(ctx, wi, wo, albedo, roughness, metallic)
             bs.wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
             bs.eta = 1.0
             bs.sampled_type = dr.select(
@@ -108,8 +125,8 @@ def _define():
             active = active & (si.wi.z * wo.z > 0)
             wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
             wo = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
-            share = self._specular_share(wi.z, albedo, metallic)
-            value = dr.select(active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0))
+            share = self._share(ctx, wi.z, albedo, metallic)
+            value = dr.select(active, self._value(ctx, wi, wo, albedo, roughness, metallic), mi.Color3f(0))
             return value, dr.select(active, self._pdf(wi, wo, share, roughness), 0)
 
         def eval(self, ctx, si, wo, active=True):

@@ -7,6 +7,9 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.types import Array
 
+PEAKED = 0.35
+"""Share of a map's light from the brightest hundredth of the sphere, from which it counts as peaked."""
+
 
 def on_mitsuba_grid(envmap, xp):
     """The data of Mitsuba's `envmap` emitter [2h + 1, 2h + 2, 3] for a map [h, 2h, 3]; `xp` is numpy or torch.
@@ -36,3 +39,14 @@ def check_envmap(envmap: Array) -> None:
     low, high = float(np.min(envmap)), float(np.max(envmap))
     if not (low >= 0 and np.isfinite(high)):
         raise InputError(f"The environment map has values from {low:g} to {high:g}; they must be finite and >= 0.")
+
+
+def is_peaked(envmap: Array) -> bool:
+    """Whether much of the light of [h, 2h, 3] comes from a small part of it: scattered directions rarely find a sun."""
+    luma = envmap.mean(-1)
+    h, w = luma.shape
+    area = np.repeat(np.sin(np.pi * (np.arange(h) + 0.5) / h), w)
+    order = np.argsort(-luma, axis=None)
+    light, area = (luma.ravel() * area)[order], area[order]
+    brightest = np.searchsorted(np.cumsum(area), 0.01 * area.sum()) + 1
+    return float(light[:brightest].sum()) > PEAKED * float(light.sum())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.render.envmap import check_envmap, half_turn, on_mitsuba_grid
+from materialist.render.envmap import check_envmap, half_turn, is_peaked, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Camera, Geometry, Materials, Mesh
 
@@ -38,6 +38,7 @@ class RenderScene:
         if not (geometry.mesh.face_plane == -1).any():
             raise InputError("The mesh has no depth surface to render; give a depth map with some values above 0.")
         self.mi = mi = setup(device)
+        self._peaked = False
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
         members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
@@ -78,20 +79,31 @@ class RenderScene:
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
+        self._peaked = is_peaked(envmap)
         self.params["light.data"] = self.mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
     def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
-        """Path-trace the picture.
+        """Path-trace the picture: by splitting paths (`render.split`), or under a peaked light by Mitsuba's `path`.
 
         Args:
-            spp: samples per pixel, rounded up a little for stratification. seed: equal seeds give equal pictures.
+            spp: samples per pixel, at least this many: camera rays that split, or paths. seed: equal seeds give equal
+                pictures.
             max_depth: path length; 2 is direct light alone, 1 the sky alone.
             hide_emitters: leave pixels of the sky black.
 
         Returns:
             [H, W, 3] float32 linear radiance.
         """
+        from materialist.render.split import DEEPEST, trace
+
+        _check_options(spp, max_depth)
+        if self._peaked or not 2 <= max_depth <= DEEPEST:
+            return self.render_path(spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
+        return trace(self.mi_scene, self.camera, spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
+
+    def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
+        """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""
         _check_options(spp, max_depth)
         mi = self.mi
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
