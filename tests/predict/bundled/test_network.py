@@ -45,7 +45,7 @@ def test_maps_are_in_range(network):
     for name, channels in (("albedo", 3), ("roughness", 1), ("metallic", 1), ("normal", 3), ("depth", 1), ("mask", 1)):
         assert maps[name].shape == (2, channels, 64, 96), name
     for name in ("albedo", "roughness", "metallic"):
-        assert 0 <= maps[name].min() and maps[name].max() <= 1
+        assert maps[name].min() >= 0 and maps[name].max() <= 1
     torch.testing.assert_close(maps["normal"].norm(dim=1), torch.ones(2, 64, 96), atol=1e-4, rtol=0)
 
 
@@ -86,7 +86,7 @@ def test_any_size(file, size):
     m = prediction.materials
     assert m.albedo.shape == (*size, 3) and m.roughness.shape == m.metallic.shape == prediction.depth.shape == size
     for array in (m.albedo, m.roughness, m.metallic):
-        assert array.dtype == np.float32 and 0 <= array.min() and array.max() <= 1
+        assert array.dtype == np.float32 and array.min() >= 0 and array.max() <= 1
     np.testing.assert_allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-4)
     known = prediction.depth > 0
     assert known.any() and np.isfinite(prediction.depth).all()

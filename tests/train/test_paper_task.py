@@ -1,0 +1,102 @@
+"""The paper's recipe on a MatNet of a few thousand parameters."""
+
+import made_samples
+import numpy as np
+import pytest
+import torch
+
+from materialist.errors import WeightsError
+from materialist.predict.matnet.network import MatNet, Size
+from materialist.train import tasks
+from materialist.train.paper_task import PaperTask, freeze, load_start
+from materialist.train.recipes import recipe
+from materialist.train.samples import SampleFolder
+from materialist.train.stream import epoch
+
+TINY = Size(width=12, blocks=4, heads=2, layers=(0, 1, 2, 3), pyramid=(8, 8, 8, 8), fused=8, grid=4)
+
+
+@pytest.fixture
+def network():
+    torch.manual_seed(0)
+    return MatNet(TINY)
+
+
+def test_the_recipe_is_the_papers():
+    paper = recipe("paper")
+    assert (paper.rate, paper.size, paper.clip, paper.ema, paper.warm_up, paper.last_rate) == (1e-5, 512, 1e9, 0, 0, 1)
+
+
+def test_what_is_frozen(network):
+    freeze(network)
+    learns = {name for name, p in network.named_parameters() if p.requires_grad}
+    assert not any(name.startswith("pretrained.") for name in learns)
+    assert all(name in learns for name, _ in network.named_parameters() if name.startswith("material_head."))
+    depth = {name for name in learns if name.startswith("depth_head.")}
+    assert depth and all(".refinenet" in name for name in depth)
+    assert {name.split(".refinenet")[1][0] for name in depth} == set("1234")
+
+
+def test_a_step_moves_only_what_learns(network, tmp_path):
+    freeze(network)
+    before = {k: v.clone() for k, v in network.state_dict().items()}
+    task = PaperTask()
+    source = SampleFolder(made_samples.write_set(tmp_path, 2))
+    batch = next(iter(epoch(source, task, number=1, size=32, batch=2, seed=0, workers=0)))
+    optimizer = torch.optim.AdamW([p for p in network.parameters() if p.requires_grad], lr=1e-3)
+    terms = task.terms(network, batch)
+    assert set(terms) == {"albedo", "roughness", "metallic", "normal", "depth"}
+    sum(terms.values()).backward()
+    optimizer.step()
+    moved = {k for k, v in network.state_dict().items() if not torch.equal(v, before[k])}
+    assert moved and not any(name.startswith("pretrained.") for name in moved)
+
+
+def test_the_notes_say_what_stands_in_for_lpips():
+    assert any("in place of LPIPS" in note for note in PaperTask().notes)
+    assert any("random weights" in note for note in PaperTask().notes)
+
+
+def test_only_flips_upside_down_and_crops(tmp_path):
+    source = SampleFolder(made_samples.write_set(tmp_path, 1))
+    seen = set()
+    for seed in range(8):
+        sample = PaperTask().prepare(source.read(0), 32, np.random.default_rng(seed))
+        assert sample.image.shape == (32, 32, 3) and sample.image.max() <= 1
+        surface = sample.mask > 0
+        seen.add(bool(sample.normal[surface][0, 1] < 0))
+        assert (sample.normal[surface][:, 0] == 0).all()
+    assert seen == {True, False}
+
+
+def test_small_pictures_are_enlarged_to_the_crop(tmp_path):
+    sample = SampleFolder(made_samples.write_set(tmp_path, 1)).read(0)
+    assert PaperTask().prepare(sample, 96, np.random.default_rng(0)).image.shape == (96, 96, 3)
+
+
+def test_starting_from_other_checkpoints(network, tmp_path):
+    torch.manual_seed(9)
+    other = MatNet(TINY).state_dict()
+    anything = {k: v for k, v in other.items() if not k.startswith("material_head.")}
+    torch.save(anything, tmp_path / "depth_anything.pth")
+    copied = load_start(network, tmp_path / "depth_anything.pth")
+    assert anything.keys() <= set(copied) and any(name.startswith("material_head.") for name in copied)
+    torch.testing.assert_close(network.state_dict()["pretrained.cls_token"], other["pretrained.cls_token"])
+    dino = {k.removeprefix("pretrained."): v for k, v in other.items() if k.startswith("pretrained.")}
+    torch.save(dino, tmp_path / "dinov2.pth")
+    assert len(load_start(MatNet(TINY), tmp_path / "dinov2.pth")) == len(dino)
+    torch.save({"x": torch.ones(3)}, tmp_path / "else.pth")
+    with pytest.raises(WeightsError, match="no encoder that fits"):
+        load_start(MatNet(TINY), tmp_path / "else.pth")
+
+
+def test_its_answers_are_maps(network, tmp_path):
+    sample = SampleFolder(made_samples.write_set(tmp_path, 1)).read(0)
+    prediction = PaperTask().predict(network, sample)
+    assert prediction.depth.shape == sample.depth.shape and (prediction.depth > 0).all()
+    assert prediction.materials.albedo.max() <= 1
+
+
+def test_the_task_is_chosen_by_the_recipe():
+    assert isinstance(tasks.task(recipe("paper")), PaperTask)
+    assert isinstance(tasks.task(recipe("bundled")), tasks.BundledTask)
