@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Json, Seed
+from materialist.cli.options import Device, DeviceOption, Json, Seed
 from materialist.cli.outcome import report_success
 
 
@@ -30,7 +30,7 @@ def data(
     size: Annotated[int, typer.Option(help="Pixels on a side.")] = 256,
     seed: Seed = 0,
     workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
-    spp: Annotated[int, typer.Option(help="Samples per pixel, before denoising.")] = 36,
+    spp: Annotated[int, typer.Option(help="Samples per pixel, before denoising.")] = 16,
     meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None,
     envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None,
     split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train,
@@ -38,6 +38,7 @@ def data(
     sheet: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
     ] = None,
+    device: DeviceOption = Device.auto,
     as_json: Json = False,
 ) -> None:
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
@@ -48,11 +49,15 @@ def data(
         report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
     from materialist.cli.progress import StageProgress
-    from materialist.train.data.produce import Options, produce
+    from materialist.train.data.produce import options_for, produce
 
-    options = Options(size=size, seed=seed, spp=spp, split=split.value, meshes=meshes, envmaps=envmaps)
+    options = options_for(
+        size=size, seed=seed, spp=spp, split=split.value, meshes=meshes, envmaps=envmaps, device=device.value
+    )
     with StageProgress(quiet=as_json) as progress:
         made = produce(output, options, count=count, workers=workers, resume=resume, progress=progress)
     lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
-    report_success("train data", as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,
-                   seconds=made.seconds)  # fmt: skip
+    report_success(
+        "train data", as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,
+        seconds=made.seconds,
+    )  # fmt: skip

@@ -30,7 +30,7 @@ class Made:
 
 
 def options_for(
-    *, size: int = 256, seed: int = 0, spp: int = 36, split: str = "train", meshes: Path | None = None,
+    *, size: int = 256, seed: int = 0, spp: int = 16, split: str = "train", meshes: Path | None = None,
     envmaps: Path | None = None, device: str = "auto",
 ) -> Options:  # fmt: skip
     """Checked options with the files of the split. Raises InputError for values or folders that cannot be used."""
@@ -143,9 +143,7 @@ def read_description(folder: str | Path) -> dict:
     try:
         found = json.loads(file.read_text("utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"{file} is not a data set's description ({error}); make one: materialist train data."
-        ) from error
+        raise InputError(f"{file} describes no data set ({error}); make one: materialist train data.") from error
     if not isinstance(found, dict) or found.get("format") != FORMAT:
         raise InputError(f"{file} has another format than {FORMAT}; make the set again with this version.")
     return found

@@ -27,7 +27,7 @@ class Options:
     size: int = 256
     """Pixels on a side."""
     seed: int = 0
-    spp: int = 36
+    spp: int = 16
     """Samples per pixel before denoising."""
     split: str = "train"
     meshes: tuple[Path, ...] = ()

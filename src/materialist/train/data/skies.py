@@ -17,9 +17,11 @@ ROWS = 192
 
 
 def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
-    """[h, 2h, 3] float32: a sky over ground, or (half of the time, where there are any) a capture."""
-    if captures and rng.random() < 0.45:
-        return captured(rng, captures)
+    """[h, 2h, 3] float32: a sky over ground, or (often, where there are any) a capture that is brighter above."""
+    if captures and rng.random() < 0.6:
+        picture = captured(rng, captures)
+        if luminance(picture[: len(picture) // 3]).mean() > 0.8 * luminance(picture).mean():
+            return picture
     return levelled(sky(rng))
 
 
