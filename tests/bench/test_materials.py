@@ -1,0 +1,108 @@
+"""`bench materials` and `bench predictor` on predictors whose answers are known."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import torch
+
+from materialist import bench
+from materialist.bench import materials
+from materialist.bench.predictor import forward, timed
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+from materialist.predict.bundled.network import Architecture, BundledNetwork
+from materialist.predict.normals import normals_from_depth
+from materialist.types import Camera
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A photo with true maps: a slanted plane, two paints."""
+    place = tmp_path / "data" / "plane"
+    (place / "maps").mkdir(parents=True)
+    albedo = np.where(np.arange(48)[None, :, None] < 24, [0.6, 0.3, 0.2], [0.2, 0.4, 0.5]).astype(np.float32)
+    albedo = np.repeat(albedo, 40, 0)
+    depth = np.linspace(3, 2, 40)[:, None] + np.linspace(0.4, 0, 48)[None]
+    depth = depth.astype(np.float32)
+    photo = linear_to_srgb(albedo * np.linspace(0.3, 1, 48)[None, :, None]) * 255 + 0.5
+    cv2.imwrite(str(place / "photo.png"), np.ascontiguousarray(photo.astype(np.uint8)[..., ::-1]))
+    write_exr(place / "maps" / "albedo.exr", albedo)
+    write_exr(place / "maps" / "depth.exr", depth)
+    write_exr(place / "maps" / "normal.exr", normals_from_depth(depth, Camera(48, 40, 35.0)))
+    for name, value in (("roughness", 0.4), ("metallic", 0.0)):
+        write_exr(place / "maps" / f"{name}.exr", np.full((40, 48), value, np.float32))
+    return tmp_path / "data"
+
+
+def test_a_perfect_predictor_scores_perfectly(folder, tmp_path):
+    maps = folder / "plane" / "maps"
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},classical")
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    best, guess = report["means"][f"maps:{maps}"], report["means"]["classical"]
+    assert best["albedo_psnr"] == best["roughness_psnr_pooled"] == 100
+    assert best["depth_si_log_rmse"] == 0 and best["depth_order"] == 1 and best["normal_angle"] < 0.1
+    assert guess["albedo_psnr"] < 60 and guess["roughness_psnr"] == pytest.approx(20, abs=0.1)
+    assert (tmp_path / "report" / "sheet.png").is_file()
+
+
+def test_a_folder_of_its_own_is_found(folder):
+    assert materials.photo_folders(folder / "plane") == [folder / "plane"]
+    (_, photo, truth), *others = materials.labelled(folder)
+    assert not others and photo.linear.shape == (40, 48, 3) and truth.depth.shape == (40, 48)
+
+
+def test_samples_are_seen_by_their_own_camera(tmp_path):
+    (tmp_path / "samples").mkdir()
+    size = (16, 24)
+    plane = {
+        "image": np.full((*size, 3), 0.5, np.float16), "albedo": np.full((*size, 3), 128, np.uint8),
+        "roughness": np.zeros(size, np.uint8), "metallic": np.zeros(size, np.uint8),
+        "normal": np.broadcast_to(np.array([0, 0, 127], np.int8), (*size, 3)), "depth": np.ones(size, np.float16),
+        "mask": np.ones(size, np.uint8), "fov": np.float32(48.0),
+    }  # fmt: skip
+    for k in range(5):
+        np.savez(tmp_path / "samples" / f"{k:07d}.npz", **plane)
+    found = list(materials.labelled(tmp_path, limit=2, photographic=False))
+    assert [name for name, _, _ in found] == ["0000000", "0000004"]
+    assert found[0][1].camera.fov == pytest.approx(48.0, rel=1e-5)
+
+
+def test_what_cannot_be_scored(tmp_path):
+    with pytest.raises(InputError, match="labelled pictures"):
+        bench.run("materials", output=tmp_path / "report")
+    with pytest.raises(InputError, match="neither 'samples'"):
+        bench.run("materials", data=tmp_path, output=tmp_path / "report2", predictor="classical")
+
+
+def test_lpips_is_left_out_where_it_is_not_installed():
+    picture = np.full((16, 16, 3), 0.5, np.float32)
+    found = materials.lpips(picture, picture)
+    assert found is None or found == pytest.approx(0, abs=1e-4)
+
+
+def test_times_of_a_known_wait():
+    calls = []
+    found = timed(lambda: calls.append(sum(range(2000))), warmups=3, runs=5)
+    assert len(calls) == 8
+    assert 0 < found["fastest_ms"] <= found["median_ms"] and found["fastest_ms"] <= found["mean_ms"]
+
+
+def test_the_forward_pass_alone():
+    tiny = Architecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+    seen = []
+    network = BundledNetwork(tiny).eval()
+    network.register_forward_pre_hook(lambda _, inputs: seen.append([tuple(t.shape) for t in inputs]))
+    forward(network, 70)()
+    assert seen == [[(1, 3, 64, 64), (1, 2, 64, 64)]]
+    assert not torch.is_inference_mode_enabled()
+
+
+def test_the_benchmark_of_time(tmp_path):
+    bench.run("predictor", output=tmp_path / "report", predictor="classical", size=48, warmups=1, runs=2)
+    rows = json.loads((tmp_path / "report" / "report.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["classical predict"] and rows[0]["median_ms"] > 0
+    with pytest.raises(InputError, match="runs 0"):
+        bench.run("predictor", output=tmp_path / "report2", runs=0)

@@ -1,0 +1,93 @@
+"""WHDR on hand-made judgements with known answers."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from materialist import bench
+from materialist.bench.whdr import find, whdr
+from materialist.errors import InputError
+
+
+def _points(*places, opaque=True):
+    return [{"id": k, "x": x, "y": y, "opaque": opaque} for k, (x, y) in enumerate(places)]
+
+
+def _says(point1, point2, darker, score=1.0):
+    return {"point1": point1, "point2": point2, "darker": darker, "darker_score": score}
+
+
+@pytest.fixture
+def albedo():
+    """Three columns: 0.2, 0.4 and 0.42, grey."""
+    return np.array([0.2, 0.4, 0.42], np.float32)[None, :, None] * np.ones((4, 1, 3), np.float32)
+
+
+POINTS = _points((0.1, 0.5), (0.5, 0.5), (0.9, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("comparisons", "expected"),
+    [
+        ([_says(0, 1, "1")], 0.0),  # the first point is the darker one, and the albedo says so
+        ([_says(0, 1, "2")], 1.0),
+        ([_says(1, 0, "2")], 0.0),
+        ([_says(1, 2, "E")], 0.0),  # 5 % apart: less than delta
+        ([_says(1, 2, "1")], 1.0),
+        ([_says(0, 1, "E")], 1.0),
+        ([_says(0, 1, "1", 3.0), _says(0, 2, "2", 1.0)], 0.25),  # weighted
+        ([_says(0, 1, "1"), _says(0, 1, "2", 0.0), _says(0, 1, "2", None), _says(0, 1, "?")], 0.0),  # do not count
+    ],
+)
+def test_known_answers(albedo, comparisons, expected):
+    error, count = whdr(albedo, {"intrinsic_points": POINTS, "intrinsic_comparisons": comparisons})
+    assert error == pytest.approx(expected) and count >= 1
+
+
+def test_the_threshold_is_relative(albedo):
+    judged = {"intrinsic_points": POINTS, "intrinsic_comparisons": [_says(1, 2, "1")]}
+    assert whdr(albedo, judged, delta=0.04)[0] == 0.0
+    assert whdr(albedo, judged, delta=0.06)[0] == 1.0
+
+
+def test_transparent_points_do_not_count(albedo):
+    judged = {"intrinsic_points": _points((0.1, 0.5), (0.5, 0.5), opaque=False),
+              "intrinsic_comparisons": [_says(0, 1, "2")]}  # fmt: skip
+    error, count = whdr(albedo, judged)
+    assert np.isnan(error) and count == 0
+
+
+def test_points_on_the_border_are_inside(albedo):
+    judged = {"intrinsic_points": _points((0.0, 0.0), (1.0, 1.0)), "intrinsic_comparisons": [_says(0, 1, "1")]}
+    assert whdr(albedo, judged) == (0.0, 1)
+
+
+def test_the_benchmark_from_a_folder(tmp_path):
+    data = tmp_path / "iiw"
+    data.mkdir()
+    picture = np.zeros((40, 60, 3), np.uint8)
+    picture[:, :30], picture[:, 30:] = 60, 200
+    cv2.imwrite(str(data / "17.png"), picture)
+    judged = {
+        "intrinsic_points": _points((0.25, 0.5), (0.75, 0.5), (0.75, 0.2)),
+        "intrinsic_comparisons": [_says(0, 1, "1"), _says(1, 2, "E")],
+    }
+    (data / "17.json").write_text(json.dumps(judged))
+    (data / "18.json").write_text("{}")  # no picture: not part of the set
+    bench.run("whdr", data=data, output=tmp_path / "report", predictor="classical", size=60)
+    means = json.loads((tmp_path / "report" / "report.json").read_text())["means"]
+    assert means["photo"]["whdr"] == 0 and means["constant"]["whdr"] == 0.5
+    assert 0 <= means["classical"]["whdr"] <= 1
+
+
+def test_what_is_no_data_set(tmp_path):
+    with pytest.raises(InputError, match="no picture with judgements"):
+        find(tmp_path)
+    with pytest.raises(InputError, match="needs the IIW data set"):
+        bench.run("whdr", output=tmp_path / "report")
+    cv2.imwrite(str(tmp_path / "1.png"), np.full((40, 40, 3), 99, np.uint8))
+    (tmp_path / "1.json").write_text("[]")
+    with pytest.raises(InputError, match="IIW's layout"):
+        bench.run("whdr", data=tmp_path, output=tmp_path / "report2", predictor="classical")
