@@ -71,8 +71,8 @@ def test_each_source_runs_once_and_unused_ones_never_open(photo, other, monkeypa
     from materialist.predict.maps import MapsPredictor
 
     runs = []
-    predict = MapsPredictor.predict
-    monkeypatch.setattr(MapsPredictor, "predict", lambda self, *a, **k: runs.append(1) or predict(self, *a, **k))
+    parts = MapsPredictor.parts
+    monkeypatch.setattr(MapsPredictor, "parts", lambda self, *a, **k: runs.append(1) or parts(self, *a, **k))
     spec, theirs = other
     mixed = get_predictor("maps:nowhere", **dict.fromkeys(MAPS, spec)).predict(photo)
     assert runs == [1] and np.array_equal(mixed.depth, theirs["depth"])
@@ -100,3 +100,13 @@ def test_bad_mixtures_are_refused(other, tmp_path):
         with pytest.raises(InputError, match=word):
             get_predictor("classical", **parts)
     assert get_predictor("classical", albedo=None, depth=None).name == "classical"
+
+
+def test_a_folder_needs_only_the_maps_that_are_wanted(photo, tmp_path):
+    albedo = np.full((H, W, 3), 0.25, np.float32)
+    write_exr(tmp_path / "albedo.exr", albedo)
+    mixed = get_predictor("classical", albedo=f"maps:{tmp_path}").predict(photo)
+    assert np.array_equal(mixed.materials.albedo, albedo) and mixed.sources["depth"] == "classical"
+    assert not any("There is no" in note for note in mixed.warnings)
+    with pytest.raises(InputError, match="no depth"):
+        get_predictor("classical", depth=f"maps:{tmp_path}").predict(photo)

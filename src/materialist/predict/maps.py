@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.predict import resample
 from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS
+from materialist.predict.mix import Part
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Materials, Photo, Prediction
 
@@ -50,20 +52,40 @@ class MapsPredictor:
         warnings: list[str] = []
         depth = self._needed("depth", size, warnings)
         albedo = self._needed("albedo", size, warnings)
-        normal = self._fitted("normal", size, warnings)
         materials = Materials(
             albedo=albedo,
             roughness=self._scalar("roughness", NEUTRAL_ROUGHNESS, size, warnings),
             metallic=self._scalar("metallic", NEUTRAL_METALLIC, size, warnings),
         )
+        normal = self._normal(photo, depth, warnings)
+        return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """Only the wanted maps, as `predict`; the folder need not hold any other. Raises InputError as `predict`."""
+        size, warnings, maps = photo.linear.shape[:2], [], {}
+        for name in wanted:
+            if name in ("roughness", "metallic"):
+                neutral = NEUTRAL_ROUGHNESS if name == "roughness" else NEUTRAL_METALLIC
+                maps[name] = self._scalar(name, neutral, size, warnings)
+            elif name == "normal":
+                maps[name] = self._normal(photo, maps.get("depth"), warnings)
+            else:
+                maps[name] = self._needed(name, size, warnings)
+        return Part(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
+
+    def _normal(self, photo: Photo, depth: Array | None, warnings: list[str]) -> Array:
+        """[H, W, 3] unit normals; where they are unknown, and where there is no file, from depth."""
+        size = photo.linear.shape[:2]
+        normal = self._fitted("normal", size, warnings)
+        known = normal is not None and np.linalg.norm(normal, axis=-1, keepdims=True) > 0.5
+        if normal is not None and np.all(known):
+            return normal
+        depth = self._needed("depth", size, warnings) if depth is None else depth
         from_depth = normals_from_depth(depth, photo.camera, radius=2)
         if normal is None:
-            normal = from_depth
             warnings.append("There is no normal map: the normals were derived from depth.")
-        else:
-            empty = np.linalg.norm(normal, axis=-1) < 0.5
-            normal = np.where(empty[..., None], from_depth, normal)
-        return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))
+            return from_depth
+        return np.where(known, normal, from_depth)
 
     def _scalar(self, name: str, neutral: float, size: tuple[int, int], warnings: list[str]) -> Array:
         """Roughness or metallic [H, W], or its neutral value where there is no file."""
