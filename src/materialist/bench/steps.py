@@ -38,11 +38,11 @@ def step_costs(photo: Photo, prior: Prediction, *, seed: int = 0, device: str = 
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     start = time.perf_counter()
     engine: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
-    render = engine.material_renderer(light)
+    problem = engine.material_problem(light)
     cache_seconds = time.perf_counter() - start
-    cached = _seconds_per_step(engine, render, photo, prior, CACHED_STEPS)[WARM_UP:]
+    cached = _seconds_per_step(engine, problem, photo, prior, CACHED_STEPS)[WARM_UP:]
     path: Any = PathEngine(RenderScene(geometry, camera, device=device), camera, engine.pixels.numpy(), seed=seed)
-    prb = _seconds_per_step(path, path.material_renderer(light), photo, prior, 1 + PRB_STEPS)[1:]
+    prb = _seconds_per_step(path, path.material_problem(light), photo, prior, 1 + PRB_STEPS)[1:]
     return {
         "cached_step": float(np.median(cached)),
         "prb_step": float(np.median(prb)),
@@ -51,7 +51,7 @@ def step_costs(photo: Photo, prior: Prediction, *, seed: int = 0, device: str = 
     }
 
 
-def _seconds_per_step(engine: Any, render: Any, photo: Photo, prior: Prediction, steps: int) -> list[float]:
+def _seconds_per_step(engine: Any, problem: Any, photo: Photo, prior: Prediction, steps: int) -> list[float]:
     """Seconds of each of the first `steps` steps of the default preset's material fit."""
     import torch
 
@@ -72,7 +72,8 @@ def _seconds_per_step(engine: Any, render: Any, photo: Photo, prior: Prediction,
     pairs = neighbours(pixels, linear_to_srgb(photo.linear)) if any(settings.smooth) else None
     target = torch.from_numpy(np.ascontiguousarray(photo.linear.reshape(-1, 3)))[engine.pixels]
     moments = [time.perf_counter()]
-    fit_materials(render, target, field, held, settings, pairs, progress=lambda *_: moments.append(time.perf_counter()))
+    tick = lambda *_: moments.append(time.perf_counter())  # noqa: E731
+    fit_materials(problem, target, field, held, settings, pairs, progress=tick)
     return list(np.diff(moments))
 
 

@@ -36,6 +36,16 @@ class LightProblem:
     for its rows, which are the first of `pixels`."""
 
 
+@dataclass(frozen=True)
+class MaterialProblem:
+    """Rendering as a function of the materials of P surface pixels, light fixed."""
+
+    render: Callable[[torch.Tensor], torch.Tensor]
+    """[P, 5] (albedo, roughness, metallic) -> radiance [P, 3], differentiable."""
+    tables: Tables | None = None
+    """The transport behind `render`, where the engine has one."""
+
+
 class Engine(Protocol):
     """A differentiable renderer of one camera and geometry."""
 
@@ -47,8 +57,8 @@ class Engine(Protocol):
         """Rendering as a function of the light."""
         ...
 
-    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
-        """Rendering as a function of the materials: [P, 5] (albedo, roughness, metallic) -> radiance [P, 3]."""
+    def material_problem(self, envmap: Array) -> MaterialProblem:
+        """Rendering as a function of the materials."""
         ...
 
 
@@ -122,9 +132,9 @@ class TransportEngine:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""
         return filter_tables(self.cache, self.cache.gather(envmap, self.radiance), self.guide)
 
-    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
+    def material_problem(self, envmap: Array) -> MaterialProblem:
         tables = self.tables(envmap)
-        return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
+        return MaterialProblem(lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4]), tables)
 
 
 class PathEngine:
@@ -165,7 +175,7 @@ class PathEngine:
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
 
-    def material_renderer(self, envmap: Array) -> Callable[[torch.Tensor], torch.Tensor]:
+    def material_problem(self, envmap: Array) -> MaterialProblem:
         light = torch.from_numpy(np.ascontiguousarray(envmap, dtype=np.float32))
         h, w = self.camera.height, self.camera.width
 
@@ -176,7 +186,7 @@ class PathEngine:
             )
             return image.reshape(-1, 3)[self.pixels]
 
-        return render
+        return MaterialProblem(render)
 
 
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 import torch
@@ -118,7 +117,7 @@ class Fit:
         settings = self.settings.materials
         if stages:
             settings = replace(settings, stages=stages)
-        render = self.engine.material_renderer(state.envmap)
+        problem = self.engine.material_problem(state.envmap)
         prior = self._prior_maps()
         held = remapped(prior) if settings.remap else prior
         first = all(stage["name"] != "materials" for stage in state.stages)
@@ -129,20 +128,21 @@ class Fit:
         )
         photo = self._photo()[self.engine.pixels]
         if settings.other_metallic is not None and settings.field == "maps" and first and not stages:
-            start = better_start(render, photo, start, held, settings, self._smooth, progress=self.progress)
+            start = better_start(problem, photo, start, held, settings, self._smooth, progress=self.progress)
         model = material_field(
             start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
         )
-        correction = torch.ones(1)
+        correction = None
         for k in range(corrections + 1):
-            corrected = partial(_corrected, render, correction)
-            results = fit_materials(corrected, photo, model, held, settings, pairs, progress=self.progress)
+            results = fit_materials(
+                problem, photo, model, held, settings, pairs, factor=correction, progress=self.progress
+            )
             state.stages += [r.summary() for r in results]
             state.maps = model().detach()
             if k < corrections:
-                correction = self._correction(state, render)
+                correction = self._correction(state, problem.render)
         if isinstance(self.engine, TransportEngine):
-            self.engine.set_radiance(self._image(render(state.maps)))
+            self.engine.set_radiance(self._image(problem.render(state.maps)))
 
     def _correction(self, state: FitState, render) -> torch.Tensor:
         """[P, 3] ratio of the path-traced to the cached rendering, both smoothed along surfaces.
@@ -208,10 +208,6 @@ class Fit:
         surface = np.zeros(self.photo.linear.shape[0] * self.photo.linear.shape[1], bool)
         surface[self.engine.pixels.numpy()] = True
         return surface.reshape(self.photo.linear.shape[:2])
-
-
-def _corrected(render, factor: torch.Tensor, maps: torch.Tensor) -> torch.Tensor:
-    return render(maps) * factor
 
 
 def _maps(materials: Materials) -> tuple[Array, Array, Array]:

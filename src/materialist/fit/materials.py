@@ -9,6 +9,7 @@ import torch
 from torch import nn
 
 from materialist.errors import InputError
+from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
 from materialist.fit.loop import Progress, StageResult, optimise
 from materialist.fit.losses import consistency, l1_l2, residual
@@ -43,7 +44,7 @@ def material_field(
 
 
 def better_start(
-    render: Callable[[torch.Tensor], torch.Tensor],
+    problem: MaterialProblem,
     photo: torch.Tensor,
     start: torch.Tensor,
     prior: torch.Tensor,
@@ -64,9 +65,9 @@ def better_start(
     candidates, costs = [], []
     for maps in (start, other):
         field = MaterialMaps(maps)
-        fit_materials(render, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
+        fit_materials(problem, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
         with torch.no_grad():
-            error = residual(render(field()), photo, settings.encoding, clipped=settings.clipped)
+            error = residual(problem.render(field()), photo, settings.encoding, clipped=settings.clipped)
             cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * weights).mean(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
@@ -74,44 +75,37 @@ def better_start(
 
 
 def fit_materials(
-    render: Callable[[torch.Tensor], torch.Tensor],
+    problem: MaterialProblem,
     photo: torch.Tensor,
     field: nn.Module,
     prior: torch.Tensor,
     settings: MaterialSettings,
     neighbours: Neighbours | None = None,
     *,
+    factor: torch.Tensor | None = None,
     progress: Progress | None = None,
 ) -> list[StageResult]:
     """Move `field` stage by stage: argmin L_re + delta L_cons.
 
     Args:
-        render: [P, 5] materials -> [P, 3] radiance.
+        problem: rendering under a fixed light.
         photo: [P, 3] linear.
         prior: [P, 5] the maps that L_cons holds on to.
         neighbours: pixel pairs for the smoothness term; needed when `settings.smooth` is not zero.
+        factor: [P, 3] multiplies the rendering: what the renderer is known to get wrong.
     """
+    factor = torch.ones(1) if factor is None else factor
+    objective = material_objective(problem, photo, prior, settings, neighbours, factor)
     results = []
     for stage in settings.stages:
         frozen = [name for name in _COLUMNS if name not in stage.targets]
         held = field().detach()
 
-        def maps(frozen=frozen, held=held) -> torch.Tensor:
+        def loss(_: int, frozen=frozen, held=held) -> torch.Tensor:
             values = field()
-            return torch.cat([(held if n in frozen else values)[:, c] for n, c in _COLUMNS.items()], 1)
-
-        def loss(_: int, maps=maps) -> torch.Tensor:
-            values = maps()
-            value = l1_l2(residual(render(values), photo, settings.encoding, clipped=settings.clipped))
-            parts = [values[:, c] for c in _COLUMNS.values()]
-            priors = [prior[:, c] for c in _COLUMNS.values()]
-            value = value + settings.delta * consistency(parts, priors, settings.weights)
-            if neighbours is not None and any(settings.smooth):
-                change = values - prior
-                for weight, column in zip(settings.smooth, _COLUMNS.values(), strict=True):
-                    if weight:
-                        value = value + weight * neighbours.total_variation(change[:, column])
-            return value
+            if not frozen:
+                return objective(values)
+            return objective(torch.cat([(held if n in frozen else values)[:, c] for n, c in _COLUMNS.items()], 1))
 
         def into_range() -> None:
             base = field.field if isinstance(field, Unified) else field
@@ -123,3 +117,32 @@ def fit_materials(
             optimise(name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress)
         )
     return results
+
+
+def material_objective(
+    problem: MaterialProblem,
+    photo: torch.Tensor,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    neighbours: Neighbours | None,
+    factor: torch.Tensor,
+) -> Callable[[torch.Tensor], torch.Tensor]:
+    """L_re + delta L_cons + smoothness as a function of the materials [P, 5]; in one kernel where there are tables."""
+    if problem.tables is not None:
+        from materialist.fit.fused import FusedLoss
+
+        return FusedLoss(problem.tables, factor, photo, prior, settings, neighbours)
+
+    def objective(values: torch.Tensor) -> torch.Tensor:
+        rendered = problem.render(values) * factor
+        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped))
+        parts = [values[:, c] for c in _COLUMNS.values()]
+        priors = [prior[:, c] for c in _COLUMNS.values()]
+        value = value + settings.delta * consistency(parts, priors, settings.weights)
+        if neighbours is not None:
+            for weight, part, held in zip(settings.smooth, parts, priors, strict=True):
+                if weight:
+                    value = value + weight * neighbours.total_variation(part - held)
+        return value
+
+    return objective

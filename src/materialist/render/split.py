@@ -8,6 +8,8 @@ path of its own: where light is hidden by a surface, that surface's light takes 
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -34,7 +36,7 @@ def trace(scene: mi.Scene, camera: Camera, *, spp: int, seed: int, max_depth: in
         hide_emitters: leave pixels of the sky black.
     """
     lanes = camera.width * camera.height
-    random = mi.PCG32(size=lanes, initstate=mi.UInt64(seed))
+    random: Any = mi.PCG32(size=lanes, initstate=mi.UInt64(seed))  # type: ignore[operator]
     corner, pixel = _corners(camera, lanes)
     total = _loop(scene, corner, pixel, random, dr.opaque(mi.UInt32, spp), max_depth - 1, not hide_emitters)
     dr.eval(total)
