@@ -1,6 +1,8 @@
 """Runs: they learn, stop on time, go on where they stopped, and several processes make one network."""
 
 import json
+import os
+import signal
 import socket
 
 import made_runs
@@ -59,6 +61,22 @@ def test_a_run_goes_on(run, data):
     trainer.run()
     after = checkpoint.load(folder)
     assert after["step"] == 63 and after["epoch"] > before["epoch"] and after["seconds"] > before["seconds"]
+
+
+def test_a_terminated_run_leaves_a_checkpoint(data, tmp_path):
+    trainer = made_runs.trainer(data, tmp_path / "run", steps=10_000)
+    step, seen = trainer._step, []
+
+    def third_step_is_the_last(batch):
+        seen.append(step(batch))
+        if len(seen) == 3:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return seen[-1]
+
+    trainer._step = third_step_is_the_last
+    assert trainer.run() == {}
+    assert checkpoint.load(tmp_path / "run")["step"] == 3
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_a_run_is_not_overwritten_nor_mixed_up(run, data):

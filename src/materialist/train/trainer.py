@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -71,28 +73,32 @@ class Trainer:
             self.note(text)
 
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
-        """Train until the budget is spent; returns the last scores. Always leaves a checkpoint."""
+        """Train until the budget is spent or SIGTERM comes; returns the last scores. Always leaves a checkpoint."""
         losses: dict[str, float] = {}
         count, since = 0, time.monotonic()
         saved = time.monotonic()
+        terminated = _Termination()
         for batch in self._batches():
             found = self._step(batch)
             for name, value in found.items():
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
-            stop = self.processes.agree(self.clock.done)
+            stop = self.processes.agree(self.clock.done or terminated.asked)
             if count == REPORT_STEPS or stop:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses, count, since = {}, 0, time.monotonic()
             if stop:
                 break
             if self.processes.first and time.monotonic() - saved > self.habits.checkpoint_seconds:
+                start = time.monotonic()
                 self.save()
                 self.score()
-                saved = since = time.monotonic()
+                saved = time.monotonic()
+                since += saved - start  # the curve tells the speed of training alone
         if self.processes.first:
             self.save()
-        return self.score() if self.processes.first else {}
+        terminated.restore()
+        return self.score() if self.processes.first and not terminated.asked else {}
 
     def save(self) -> None:
         """Write the checkpoint."""
@@ -186,6 +192,24 @@ class Trainer:
         self.epoch = state["epoch"]
         self.clock = Clock(budget, step=state["step"], seconds=state["seconds"])
         self.note(f"Resumed at step {self.clock.step}, after {self.clock.seconds / 60:.0f} minutes.")
+
+
+class _Termination:
+    """Notes a SIGTERM, so that the run can end with a checkpoint; outside the main thread nothing is noted."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: Any = None
+        if threading.current_thread() is threading.main_thread():
+            self._before = signal.signal(signal.SIGTERM, self._note)
+
+    def restore(self) -> None:
+        """Back to what was before."""
+        if self._before is not None:
+            signal.signal(signal.SIGTERM, self._before)
+
+    def _note(self, *_: Any) -> None:
+        self.asked = True
 
 
 def _groups(parameters: list[nn.Parameter], decay: float) -> list[dict[str, Any]]:
