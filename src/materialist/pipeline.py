@@ -16,7 +16,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.types import Array, FitReport, Geometry, Materials, Photo, Prediction, Scene
 
-FINAL_SPP = 25
+FINAL_SPP = 36
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")

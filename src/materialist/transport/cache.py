@@ -31,6 +31,9 @@ from materialist.types import Array, Camera, Geometry, Mesh
 ROUGHNESS_LEVELS = (0.04, 0.12, 0.2, 0.3, 0.42, 0.56, 0.75, 1.0)
 """Perceptual roughness at which the specular lobe is tabulated; between them it is interpolated linearly."""
 
+LEVEL_SHARE = (0.25, 0.375, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0)
+"""Samples of each level as a share of `specular_samples`: a narrow lobe needs fewer."""
+
 MISS = 0xFFFFFFFF
 _OFF_DIAGONAL = (0.13, 0.05)
 """Where in a pixel the primary ray passes, from the centre: not through the edge between its two triangles."""
@@ -63,7 +66,8 @@ class TransportCache:
     Args:
         geometry: the mesh; its faces carry the pixel whose radiance a ray that hits them sees.
         camera: pinhole camera of the photograph.
-        diffuse_samples, specular_samples: rays a pixel, for the diffuse lobe and for each roughness level.
+        diffuse_samples, specular_samples: rays a pixel, for the diffuse lobe and (times LEVEL_SHARE) for each
+            roughness level.
         seed: of the point sets; equal seeds give equal caches.
     """
 
@@ -117,7 +121,7 @@ class TransportCache:
     # -- directions ----------------------------------------------------------------------------------------------------
 
     def _count(self, k: int) -> int:
-        return self.diffuse_samples if k == 0 else self.specular_samples
+        return self.diffuse_samples if k == 0 else max(1, round(LEVEL_SHARE[k - 1] * self.specular_samples))
 
     def _alpha(self, k: int) -> float:
         return 1.0 if k == 0 else max(ROUGHNESS_LEVELS[k - 1] ** 2, MIN_ALPHA)
