@@ -74,3 +74,15 @@ def test_long_curves_are_thinned():
     curve = run(lambda step: 1000.0 - step, Schedule(max_steps=400, patience=0)).summary()["loss_curve"]
     assert len(curve) == 50
     assert curve[0] == 1000
+
+
+def test_the_best_parameters_are_kept_when_asked():
+    """A loss that is smallest at the third step, while the parameter walks on."""
+    values = [3.0, 2.0, 1.0, 5.0, 4.0]
+    for keep, expected in ((True, -0.2), (False, -0.5)):
+        parameter = torch.nn.Parameter(torch.zeros(1))
+        optimise(
+            "test", [parameter], lambda k, p=parameter: values[k] + (p - p.detach()).sum(),
+            Schedule(learning_rate=0.1, max_steps=5, patience=0, keep_best=keep),
+        )  # fmt: skip
+        assert parameter.item() == pytest.approx(expected, rel=1e-3)

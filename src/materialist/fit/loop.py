@@ -23,6 +23,8 @@ class Schedule:
     patience: int = 100
     """Stop when the loss improved by less than `min_improvement` (a fraction) over this many steps; 0: never."""
     min_improvement: float = 0.01
+    keep_best: bool = False
+    """End with the parameters of the smallest loss, not with the last."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +62,18 @@ def optimise(
 
     The loss that counts for early stopping is the best of each window of `patience` steps.
     """
-    optimiser = torch.optim.Adam(parameters, lr=schedule.learning_rate)
+    groups = list(parameters)
+    optimiser = torch.optim.Adam(groups, lr=schedule.learning_rate)
     scheduler = torch.optim.lr_scheduler.StepLR(optimiser, schedule.decay_every, schedule.decay)
+    tensors = [p for group in optimiser.param_groups for p in group["params"]]
+    best, kept = float("inf"), [t.detach().clone() for t in tensors] if schedule.keep_best else []
     start, losses = time.perf_counter(), []
     for step in range(schedule.max_steps):
         optimiser.zero_grad(set_to_none=True)
         value = loss(step)
         value.backward()
+        if schedule.keep_best and value.item() < best:
+            best, kept = value.item(), [t.detach().clone() for t in tensors]
         optimiser.step()
         scheduler.step()
         if after_step is not None:
@@ -77,6 +84,9 @@ def optimise(
             progress(name, step + 1, schedule.max_steps)
         if _stalled(losses, schedule):
             break
+    with torch.no_grad():
+        for tensor, value in zip(tensors, kept, strict=False):  # kept is empty unless asked for
+            tensor.copy_(value)
     return StageResult(name, len(losses), time.perf_counter() - start, tuple(losses))
 
 

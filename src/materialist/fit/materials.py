@@ -20,6 +20,10 @@ from materialist.types import Camera
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 
 
+CHOICE_PRICE = 0.25
+"""How much of the price of leaving the prior counts in the choice of a start: neither candidate is near its optimum."""
+
+
 def remapped(prior: torch.Tensor) -> torch.Tensor:
     """Roughness and metallic of [P, 5] maps moved to 0.7 x + 0.2, where gradients live (paper, Initialization)."""
     return torch.cat([prior[:, :3], 0.7 * prior[:, 3:] + 0.2], 1)
@@ -60,7 +64,8 @@ def better_start(
     """
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
-    weights = settings.delta * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
+    share = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
+    price = CHOICE_PRICE * settings.delta * share * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
     short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
     candidates, costs = [], []
     for maps in (start, other):
@@ -68,7 +73,7 @@ def better_start(
         fit_materials(problem, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
         with torch.no_grad():
             error = residual(problem.render(field()), photo, settings.encoding, clipped=settings.clipped)
-            cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * weights).mean(1)
+            cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
     return torch.where(costs[1] < costs[0], candidates[1], candidates[0])

@@ -84,7 +84,7 @@ class FitSettings:
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
 
 PAPER = FitSettings(
-    light=LightSettings(),
+    light=LightSettings(schedule=Schedule(keep_best=True)),
     materials=MaterialSettings(
         stages=(
             MaterialStage(("roughness", "metallic"), _MATERIAL),
