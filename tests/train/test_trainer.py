@@ -112,7 +112,7 @@ def test_checkpoints_are_whole_or_refused(tmp_path):
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(WeightsError, match="is damaged"):
         checkpoint.load(tmp_path)
-    with pytest.raises(WeightsError, match="start the run without --resume"):
+    with pytest.raises(WeightsError, match="give the folder of a run"):
         checkpoint.load(tmp_path / "nowhere")
 
 

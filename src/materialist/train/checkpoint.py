@@ -29,7 +29,7 @@ def load(folder: Path, device: Any = "cpu") -> dict[str, Any]:
     """The state in FOLDER/checkpoint.pt; raises WeightsError when there is none or it is damaged."""
     path = folder / NAME
     if not path.is_file():
-        raise WeightsError(f"{folder} holds no {NAME}; start the run without --resume.")
+        raise WeightsError(f"{folder} holds no {NAME}; give the folder of a run of: materialist train matnet.")
     try:
         state = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch raises what its unpickler or zip reader raises

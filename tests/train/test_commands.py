@@ -1,0 +1,49 @@
+"""`materialist train matnet` and `train export`, as a user calls them."""
+
+import json
+
+import made_samples
+import pytest
+from typer.testing import CliRunner
+
+from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return made_samples.write_set(tmp_path_factory.mktemp("data"), 2)
+
+
+def _call(*arguments):
+    result = CliRunner().invoke(app, ["train", *map(str, arguments)])
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout.strip().splitlines()[-1])
+
+
+def test_one_step_and_its_weights(data, tmp_path):
+    small = ("--size", 32, "--batch", 1, "--workers", 0, "--score-samples", 0, "--device", "cpu", "--json")
+    first = _call("matnet", "--data", data, "-o", tmp_path / "run", "--steps", 1, *small)
+    assert first["step"] == 1
+    again = _call("matnet", "--data", data, "-o", tmp_path / "run", "--steps", 1, "--resume", *small)
+    assert again["step"] == 2
+    written = _call("export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--json")
+    assert written["step"] == 2 and written["megabytes"] < 40, "what the package can hold"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["matnet", "-o", "run"], "--data"),
+        (["matnet", "--data", "DATA", "-o", "run"], "either --steps or --minutes"),
+        (["matnet", "--data", "nowhere", "-o", "run", "--steps", "1"], "no data folder nowhere"),
+        (["matnet", "--data", "DATA", "-o", "run", "--steps", "1", "--init", "x.pth"], "--init is for --config paper"),
+        (["export", "nowhere", "-o", "w.safetensors"], "give the folder of a run"),
+        (["export", "nowhere", "-o", "w.bin"], "not w.bin"),
+    ],
+)
+def test_bad_input_is_named(arguments, said, data, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_to_exit_code(app, ["train", *(str(data) if a == "DATA" else a for a in arguments)]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
