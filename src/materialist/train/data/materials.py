@@ -71,17 +71,19 @@ def any_colour(rng: np.random.Generator) -> Colour:
     kind = rng.random()
     if kind < 0.3:
         return hsv(rng.uniform(0.05, 0.15), rng.uniform(0, 0.12), rng.uniform(0.15, 0.95))
-    if kind < 0.5:
-        return hsv(rng.uniform(0.04, 0.13), rng.uniform(0.15, 0.6), rng.uniform(0.25, 0.9))
-    return hsv(rng.random(), rng.uniform(0.25, 0.95), rng.uniform(0.2, 0.95))
+    if kind < 0.55:
+        return hsv(rng.uniform(0.03, 0.13), rng.uniform(0.12, 0.6), rng.uniform(0.2, 0.9))
+    if kind < 0.8:
+        return hsv(rng.random(), rng.uniform(0.1, 0.5), rng.uniform(0.2, 0.9))
+    return hsv(rng.random(), rng.uniform(0.5, 0.97), rng.uniform(0.25, 0.95))
 
 
 def wall_paint(rng: np.random.Generator) -> Material:
     """Painted plaster: pale as a rule, deep colours now and then."""
-    if rng.random() < 0.72:
+    if rng.random() < 0.78:
         colour = hsv(rng.choice([rng.uniform(0.05, 0.17), rng.random()]), rng.uniform(0, 0.18), rng.uniform(0.7, 0.97))
     else:
-        colour = hsv(rng.random(), rng.uniform(0.2, 0.75), rng.uniform(0.25, 0.8))
+        colour = hsv(rng.random(), rng.uniform(0.15, 0.65), rng.uniform(0.25, 0.85))
     kind = str(rng.choice(["plain", "cloudy"], p=[0.75, 0.25]))
     other, dark = _near(rng, colour, 0.85, 1.05), _near(rng, colour, 0.6, 0.95)
     r = rng.uniform(0.45, 0.95)

@@ -29,10 +29,10 @@ def photographic(image: Array, rng: np.random.Generator) -> Array:
 
 
 def white_balanced(image: Array, rng: np.random.Generator) -> Array:
-    """Gains that take back some of the light's colour, as cameras guess it from the picture, and miss a little."""
+    """Gains that pull the picture a little towards grey, as cameras guess; samples are balanced already."""
     lit = np.minimum(image, 1)
     grey = np.mean(lit**2, (0, 1)) ** 0.5 + 1e-4  # bright areas count more, as they do in cameras
-    gains = (grey.mean() / grey) ** rng.uniform(0.0, 0.95)
+    gains = (grey.mean() / grey) ** rng.uniform(0.0, 0.35)
     gains = np.clip(gains, 0.4, 2.5) * np.exp(rng.normal(0, 0.04, 3))
     gains = gains / (gains * grey).sum() * grey.sum()
     return (image * gains).astype(np.float32)

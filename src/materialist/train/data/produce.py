@@ -34,8 +34,8 @@ def options_for(
     envmaps: Path | None = None, device: str = "auto",
 ) -> Options:  # fmt: skip
     """Checked options with the files of the split. Raises InputError for values or folders that cannot be used."""
-    if not 32 <= size <= 2048:
-        raise InputError(f"The size is {size}; give 32 to 2048 pixels.")
+    if not 32 <= size <= 2048 or size % 4:
+        raise InputError(f"The size is {size}; give 32 to 2048 pixels, a multiple of 4.")
     if not 1 <= spp <= 4096:
         raise InputError(f"spp is {spp}; give 1 to 4096 samples per pixel.")
     if seed < 0:
@@ -153,5 +153,5 @@ def _same(old: dict, new: dict, folder: Path) -> None:
     for name in ("size", "seed", "split", "options"):
         if old.get(name) != new[name]:
             raise InputError(
-                f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; resume with the same or name another."
+                f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; resume with that or name another."
             )

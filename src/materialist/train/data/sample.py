@@ -70,7 +70,7 @@ def worth_seeing(probe: dict[str, Array]) -> bool:
     owner, depth = probe["owner"][..., 0], probe["depth"][..., 0]
     seen = owner >= 0
     _, counts = np.unique(owner[seen], return_counts=True)
-    if seen.mean() < 0.3 or (counts > owner.size / 400).sum() < 4:
+    if seen.mean() < 0.3 or (counts > owner.size / 400).sum() < 6:
         return False
     near = np.median(depth[seen]) * 0.25
     return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
@@ -82,7 +82,7 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: O
     guides = {"albedo": probe["albedo"].mean(2), "normal": probe["normal"].mean(2)}
     image, shading = denoise(noisy, **guides), denoise(white, **guides)
     labels = labels_of(probe)
-    gain = exposure(image, rng)
+    gain = exposure(image, rng) * balance(shading, rng)
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
     half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
     return {
@@ -116,6 +116,15 @@ def exposure(image: Array, rng: np.random.Generator) -> float:
     """Factor that exposes linear radiance [H, W, 3] as cameras do, give or take: middle grey, some highlights lost."""
     light = luminance(image)
     middle = float(np.exp(np.log(np.maximum(light, 1e-4 * light.mean() + 1e-9)).mean()))
-    high = float(np.percentile(light, 97))
-    aim = np.sqrt((0.16 / max(middle, 1e-9)) * (0.8 / max(high, 1e-9)))
-    return float(np.clip(aim * np.exp(rng.normal(-0.05, 0.35)), 1e-6, 1e6))
+    # Lamps in the picture must not make the rest black, nor a bright window.
+    high = min(float(np.percentile(light, 93)), 12 * middle)
+    aim = (0.17 / max(middle, 1e-9)) ** 0.6 * (0.75 / max(high, 1e-9)) ** 0.4
+    return float(np.clip(aim * np.exp(rng.normal(0, 0.3)), 1e-6, 1e6))
+
+
+def balance(shading: Array, rng: np.random.Generator) -> Array:
+    """[3] gains, about 1, that make most of the light's colour white, as the maker of a camera would have it."""
+    light = np.median(shading.reshape(-1, 3), 0) + 1e-6 + 1e-3 * shading.mean()
+    strength = rng.uniform(0.4, 1.0) if rng.random() < 0.85 else rng.uniform(0.0, 0.4)
+    gains = (luminance(light) / light) ** strength * np.exp(rng.normal(0, 0.04, 3))
+    return np.clip(gains, 0.2, 5).astype(np.float32)

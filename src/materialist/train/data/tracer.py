@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.errors import InputError
 from materialist.render.variant import setup
 from materialist.train.data import scatter, tiles
 from materialist.train.data.packing import Packed
@@ -20,6 +21,10 @@ from materialist.types import Array, Camera
 
 MAX_DEPTH = 5
 """Surfaces a path may meet."""
+KEEP = (0.6, 0.5)
+"""Probability that a path goes on from its first and from a later surface."""
+VECTOR = 16
+"""Lanes whose paths end together: a vector of the processor costs as much for one path as for all of them."""
 CLAMP = 30.0
 """Largest contribution of one light sample after the first surface, against fireflies; mean light is about 1."""
 
@@ -41,6 +46,8 @@ class Tracer:
         self.mi = mi = setup(device)
         import drjit as dr
 
+        if camera.width * camera.height % VECTOR:
+            raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
         self.camera = camera
         zero = dr.opaque(mi.Float, 0.0)
 
@@ -74,15 +81,16 @@ class Tracer:
         rows = max(1, int(np.sqrt(spp)))
         spp = rows * rows
         lane = dr.arange(mi.UInt32, h * w * spp)
-        pixel, sample = lane // spp, lane % spp
+        # Lanes that end together belong to pixels far from each other: their common fate leaves no streaks.
+        place, sample = lane % (h * w), lane // (h * w)
+        pixel = place // VECTOR + (place % VECTOR) * (h * w // VECTOR)
         rng = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))
         jitter = mi.Point2f(mi.Float(sample % rows) + rng.next_float32(), mi.Float(sample // rows) + rng.next_float32())
         ray = self._camera_ray(pixel, jitter / rows)
         total, white = self._paths(ray, pixel, sample, rng, dr.opaque(mi.UInt32, seed))
         dr.eval(*total, *white)
-        pictures = [dr.block_sum(c, spp) / spp for c in (*total, *white)]
-        dr.eval(*pictures)
-        both = np.stack([np.array(c) for c in pictures], -1).reshape(h, w, 6)
+        planes = [np.array(c).reshape(spp, h * w // VECTOR, VECTOR).mean(0).T for c in (*total, *white)]
+        both = np.stack([p.reshape(h, w) for p in planes], -1)
         return np.ascontiguousarray(both[..., :3]), np.ascontiguousarray(both[..., 3:])
 
     def probe(self, side: int) -> dict[str, Array]:
@@ -130,11 +138,23 @@ class Tracer:
         import drjit as dr
 
         mi = self.mi
-        even = _Even(mi, pixel, sample, seed)
+        even, lanes = _Even(mi, pixel, sample, seed), dr.width(pixel)
         zero, one = mi.Color3f(0), mi.Color3f(1)
-        state = (mi.Ray3f(ray), rng, mi.UInt32(0), one, mi.Color3f(0), zero, mi.Color3f(0), mi.Float(-1), mi.Bool(True))
+        fate = mi.PCG32(initstate=mi.UInt64(seed) + 311, initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR))
+        state = (
+            mi.Ray3f(ray),
+            rng,
+            fate,
+            mi.UInt32(0),
+            one,
+            mi.Color3f(0),
+            zero,
+            mi.Color3f(0),
+            mi.Float(-1),
+            mi.Bool(True),
+        )
 
-        def body(ray, rng, depth, beta, beta_white, total, white, pdf, active):
+        def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
             hit = self._hit(ray, active)
             draws = even.draw(rng, depth)
             look = self.surfaces.look(hit, draws.texel)
@@ -171,14 +191,14 @@ class Tracer:
             active &= (wo.z > 0) & (pdf > 0) & (dr.dot(hit.ng, d) > 0)
             beta_white = dr.select(first, mi.Color3f(diffuse), beta_white * full) / dr.maximum(pdf, 1e-20)
             beta = beta * full / dr.maximum(pdf, 1e-20)
-            keep = dr.select(depth < 2, 1, dr.clip(dr.max(beta), 0.05, 0.9))
-            active &= draws.survive < keep
+            keep = dr.select(first, *KEEP)
+            active &= fate.next_float32() < keep
             beta, beta_white = beta / keep, beta_white / keep
-            return mi.Ray3f(start, d), rng, depth + 1, beta, beta_white, total, white, pdf, active
+            return mi.Ray3f(start, d), rng, fate, depth + 1, beta, beta_white, total, white, pdf, active
 
-        labels = ("ray", "rng", "depth", "beta", "beta_white", "total", "white", "pdf", "active")
+        labels = ("ray", "rng", "fate", "depth", "beta", "beta_white", "total", "white", "pdf", "active")
         out = dr.while_loop(state, lambda *s: s[-1], body, labels=labels, mode="symbolic")
-        return out[5], out[6]
+        return out[6], out[7]
 
 
 def _mesh(mi, packed: Packed):
@@ -206,17 +226,17 @@ class _Even:
     def draw(self, rng, depth):
         """The numbers that one surface needs; `rng` goes on."""
         dr, mi = self.dr, self.mi
-        free = [rng.next_float32() for _ in range(9)]
+        free = [rng.next_float32() for _ in range(8)]
         index = mi.Float(self.sample)
         even = [s + index * step for s, step in zip(self.shift, self._STEPS)]
         u = [dr.select(depth == 0, e - dr.floor(e), f) for e, f in zip(even, free)]
         u = [dr.minimum(x, 0.99999994) for x in u]
-        return Draws(u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7]), free[8])
+        return Draws(u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7]))
 
 
 class Draws:
     """Uniform random numbers for one surface of a path."""
 
-    def __init__(self, which, light, lobe, bsdf, texel, survive):
+    def __init__(self, which, light, lobe, bsdf, texel):
         self.which, self.light, self.lobe, self.bsdf = which, light, lobe, bsdf
-        self.texel, self.survive = texel, survive
+        self.texel = texel

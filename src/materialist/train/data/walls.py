@@ -174,9 +174,12 @@ def _dressing(rng, wall: Wall, hole, cloth) -> Parts:
             continue
         hang = s.sheet((0, 0, 0), np.array([width, 0, 0]), np.array([0, top + 0.12 - drop, 0]), 48)
         waves, phase, deep = rng.uniform(4, 9), rng.uniform(0, 6), rng.uniform(0.02, 0.05)
-        wave = lambda p, w=waves, f=phase, a=deep: p + np.stack(  # noqa: E731
-            [0 * p[:, 0], 0 * p[:, 0], a * np.sin(p[:, 0] / width * 2 * np.pi * w + f + 0.3 * p[:, 1])], -1)  # fmt: skip
-        parts += wall.hung([Part(s.warped(hang, wave), cloth)], start, drop, 0.1)
+
+        def folded(p, waves=waves, phase=phase, deep=deep):
+            out = deep * np.sin(p[:, 0] / width * 2 * np.pi * waves + phase + 0.3 * p[:, 1])
+            return p + out[:, None] * [0, 0, 1]
+
+        parts += wall.hung([Part(s.warped(hang, folded), cloth)], start, drop, 0.1)
     rod = [Part(s.tube([(0, 0, 0), (right - left + 0.8, 0, 0)], 0.012, 6), m.metal(rng))]
     return parts + wall.hung(rod, left - 0.4, top + 0.13, 0.1)
 

@@ -1,0 +1,102 @@
+"""Small worlds for the tests, and Mitsuba's own path tracer on them as the slow twin."""
+
+import numpy as np
+
+from materialist.render.envmap import half_turn, on_mitsuba_grid
+from materialist.train.data import materials as m
+from materialist.train.data import solids as s
+from materialist.train.data.world import Part, Portal, World, look
+
+X, Y, Z = np.eye(3)
+
+
+def plain(colour, roughness=0.6, metallic=0.0, emission=(0.0, 0.0, 0.0)):
+    """One colour all over."""
+    return m.Material(0, (colour,) * 3, 0.0, (roughness,) * 2, (metallic,) * 2, emission=emission)
+
+
+def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> World:
+    """A closed box of 2 m with a metal and a painted block, lit by a window in its right side and by a lamp."""
+    grey, red = plain((0.6, 0.6, 0.55)), plain((0.7, 0.2, 0.15), 0.4)
+    parts = [
+        Part(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey), Part(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
+        Part(s.sheet((-1, 0, -1), 2 * X, 2 * Y), grey), Part(s.sheet((1, 0, 1), -2 * X, 2 * Y), grey),
+        Part(s.sheet((-1, 0, 1), -2 * Z, 2 * Y), red),
+        Part(s.moved(s.slab(np.array([0.5, 0.7, 0.5]), 0.05), (0.3, 0, -0.3), 0.5), plain((0.9, 0.7, 0.4), 0.3, 1.0)),
+        Part(s.moved(s.slab(np.array([0.4, 0.4, 0.4])), (-0.4, 0, 0), 0.2), red),
+    ]  # fmt: skip
+    hole = (0.6, 1.4, 0.6, 1.5) if window else (2.0, 2.0, 2.0, 2.0)
+    from materialist.train.data.walls import Wall, surface
+
+    side = Wall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [hole] if window else [])
+    parts += surface(side, grey)
+    if lamp:
+        glow = plain((0.8, 0.8, 0.8), emission=(8.0, 6.0, 4.0))
+        parts.append(Part(s.sheet((-0.3, 1.95, -0.3), 0.6 * X, 0.6 * Z), glow))
+    envmap = np.full((32, 64, 3), sky, np.float32)
+    envmap[:12] *= np.array([1.0, 1.5, 3.0], np.float32)
+    envmap[10, 40] *= 60
+    portals = [Portal(side.point(0.6, 0.6), 0.8 * Z, 0.9 * Y)] if window and portal else []
+    return World(parts, envmap, look((0.1, 1.0, 0.95), (0, 0.6, -0.5), 70), portals)
+
+
+def still() -> World:
+    """Blocks on a ground under the open sky."""
+    parts = [
+        Part(s.sheet((-2, 0, 2), 4 * X, -4 * Z), plain((0.5, 0.45, 0.4))),
+        Part(s.moved(s.slab(np.array([0.5, 0.7, 0.5]), 0.1), (0.3, 0, -0.3), 0.5), plain((0.9, 0.7, 0.4), 0.3, 1.0)),
+        Part(s.moved(s.ball(32), (-0.4, 0.35, 0), scale=0.35), plain((0.2, 0.4, 0.7), 0.25)),
+    ]
+    return World(parts, room(window=True, lamp=False).envmap, look((0, 1.2, 2.5), (0, 0.3, 0), 45))
+
+
+def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
+    """[H, W, 3] of the world by Mitsuba's path integrator with the project's BSDF; materials without a pattern."""
+    from materialist.render.variant import setup
+
+    mi = setup()
+    rotation, origin = world.view.to_scene, world.view.position
+    from materialist.bench.lights import directions
+
+    description = {"type": "scene", "integrator": {"type": "path", "max_depth": depth, "rr_depth": 100}}
+    for k, part in enumerate(world.parts):
+        material = part.material
+        flat = lambda v, c: {  # noqa: E731
+            "type": "bitmap", "raw": True, "data": mi.TensorXf(np.full((2, 2, c), v, np.float32)),
+        }  # fmt: skip
+        colour = {**flat(0, 3), "data": mi.TensorXf(np.tile(np.float32(material.colours[0]), (2, 2, 1)))}
+        props = mi.Properties()
+        props["bsdf"] = mi.load_dict(
+            {"type": "materialist_disney", "base_color": colour, "roughness": flat(material.roughness[0], 1),
+             "metallic": flat(material.metallic[0], 1)}
+        )  # fmt: skip
+        if max(material.emission) > 0:
+            radiance = np.array(material.emission) * material.colours[0]
+            props["light"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": radiance.tolist()}})
+        solid = part.solid
+        mesh = mi.Mesh(f"part{k}", len(solid.vertices), len(solid.faces), has_vertex_normals=True, props=props)
+        params = mi.traverse(mesh)
+        params["vertex_positions"] = np.ravel((solid.vertices - origin) @ rotation).astype(np.float32)
+        params["vertex_normals"] = np.ravel(solid.normals @ rotation).astype(np.float32)
+        params["faces"] = np.ravel(solid.faces).astype(np.uint32)
+        params.update()
+        description[f"part{k}"] = mesh
+    del directions
+    grid = on_mitsuba_grid(world.envmap, np)
+    to_camera = np.eye(4)
+    to_camera[:3, :3] = rotation.T
+    description["sky"] = {
+        "type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
+        "to_world": mi.ScalarTransform4f(to_camera) @ half_turn(mi),
+    }  # fmt: skip
+    description["sensor"] = {
+        "type": "perspective", "fov": world.view.fov, "fov_axis": "x", "near_clip": 1e-3, "far_clip": 1e3,
+        "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0]),
+        "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
+        "sampler": {"type": "multijitter"},
+    }  # fmt: skip
+    scene = mi.load_dict(description)
+    params = mi.traverse(scene)
+    params["sky.data"] = mi.TensorXf(grid)
+    params.update()
+    return np.array(mi.render(scene, spp=spp, seed=3))[..., :3]
