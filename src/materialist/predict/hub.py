@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import SetupError, WeightsError
-from materialist.predict.models import CHECKSUMS, INSTEAD, HubModel, hub_model, is_hub_id, require
+from materialist.predict.models import CHECKSUMS, INSTEAD, KNOWN, hub_model, is_hub_id, require
 from materialist.predict.weights import SHOWN, verify_folder
 
 INSTALL = "pip install 'materialist[hub]'"
@@ -16,9 +16,13 @@ INSTALL = "pip install 'materialist[hub]'"
 def library(name: str) -> Any:
     """The optional library, imported. Raises SetupError that says how to install it."""
     try:
-        return importlib.import_module(name)
+        module = importlib.import_module(name)
     except ImportError as error:
         raise SetupError(f"This predictor needs {name} ({error}); install it with: {INSTALL}, or {INSTEAD}.") from error
+    # What matters is raised; their bars and hints would run through ours.
+    module.utils.logging.set_verbosity_error()
+    module.utils.logging.disable_progress_bar()
+    return module
 
 
 def locate(where: str, default: str) -> tuple[Path, str]:
@@ -26,11 +30,12 @@ def locate(where: str, default: str) -> tuple[Path, str]:
 
     Raises WeightsError when it is not there; nothing is downloaded.
     """
-    if where and Path(where).expanduser().is_dir():
+    known = any(where == model.name for model in KNOWN)
+    if where and not known and Path(where).expanduser().is_dir():
         return Path(where).expanduser(), Path(where).name
-    if where and not is_hub_id(where) and where not in _known():
+    if where and not known and not is_hub_id(where):
         raise WeightsError(f"There is no folder {where} with a model; give one, or a hub id as owner/name.")
-    model: HubModel = hub_model(where or default)
+    model = hub_model(where or default)
     return require(model), model.repo
 
 
@@ -42,7 +47,8 @@ def checked(folder: Path) -> str:
 def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     """`cls.from_pretrained` of a local folder, where every tensor that the model needs must be there and fit.
 
-    The libraries themselves fill what is missing with random numbers and only log it. Raises WeightsError.
+    The libraries themselves fill what is missing with random numbers and only log it. Tensors too many do no harm:
+    older files carry some that are no longer used. Raises WeightsError.
     """
     where = folder / subfolder if subfolder else folder
     try:
@@ -56,9 +62,8 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
             f"models download NAME --force, or {INSTEAD}."
         ) from error
     faults = []
-    for key, word in (("missing_keys", "lacks"), ("unexpected_keys", "has the unknown")):
-        if names := sorted(map(str, info.get(key) or ())):
-            faults.append(f"{word} {', '.join(names[:SHOWN])}" + (" and more" if len(names) > SHOWN else ""))
+    if names := sorted(map(str, info.get("missing_keys") or ())):
+        faults.append(f"lacks {', '.join(names[:SHOWN])}" + (" and more" if len(names) > SHOWN else ""))
     if odd := sorted(
         str(item[0] if isinstance(item, tuple | list) else item) for item in info.get("mismatched_keys", ())
     ):
@@ -73,9 +78,3 @@ def on_gpu(device: str) -> bool:
     import torch
 
     return device == "cuda" or (device == "auto" and torch.cuda.is_available())
-
-
-def _known() -> tuple[str, ...]:
-    from materialist.predict.models import KNOWN
-
-    return tuple(model.name for model in KNOWN)

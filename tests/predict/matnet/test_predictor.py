@@ -160,3 +160,12 @@ def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
         path = saved(folder / "matnet_weights.pth", state)
         (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
     assert get_predictor("matnet").name == get_predictor("matnet:someone/theirs").name
+
+
+def test_loading_draws_no_random_numbers(tmp_path, state):
+    path = saved(tmp_path / "w.pth", state)
+    torch.manual_seed(1)
+    wanted = torch.rand(3)
+    torch.manual_seed(1)
+    MatNetPredictor(path)
+    assert torch.equal(torch.rand(3), wanted)

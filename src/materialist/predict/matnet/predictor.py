@@ -34,9 +34,8 @@ class MatNetPredictor:
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
-        with torch.device("meta"):
+        with torch.random.fork_rng(devices=[]):  # the start values are replaced; nobody's random numbers change
             network = MatNet(size)
-        network = network.to_empty(device="cpu")
         load_weights(network, state, path)
         cuda = device == "cuda" or (device == "auto" and torch.cuda.is_available())
         self.network = network.to("cuda" if cuda else "cpu").eval()
