@@ -198,3 +198,15 @@ def test_published_maps_are_read():
     prediction = get_predictor(f"maps:{SHARED / 'maps'}").predict(Photo(linear, Camera(512, 512, 35.0), linear))
     assert prediction.warnings == ()
     assert prediction.depth.min() > 16 and np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-4)
+
+
+def test_normals_without_a_negative_value_are_normals_when_they_have_unit_length(tmp_path):
+    """A room whose floor, back wall and left wall are square to the camera."""
+    maps = good_maps()
+    normal = np.zeros_like(maps["normal"])
+    normal[..., 2] = 1
+    normal[: len(normal) // 2] = [0, 1, 0]
+    normal[:, :2] = [1, 0, 0]
+    maps["normal"] = normal
+    read = get_predictor(write(tmp_path, **maps)).predict(photo())
+    assert (read.normal >= -1e-6).all()

@@ -221,9 +221,10 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     _check_finite(values, path)
     length = np.linalg.norm(values, axis=-1)
     known = length > 0.2
-    if path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SLIGHT:
+    wrong = (np.abs(length[known] - 1) > SLIGHT).mean() > 0.05 if known.any() else True
+    if wrong and path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SLIGHT:
         raise InputError(f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR.")
-    if (np.abs(length[known] - 1) > SLIGHT).mean() > 0.05 if known.any() else True:
+    if wrong:
         raise InputError(f"{path} does not hold unit vectors (median length {np.median(length):.3g}).")
     if (values[known][:, 2] < 0).mean() > 0.5:
         raise InputError(f"{path} points away from the viewer; normals are in the camera frame with +Z to the viewer.")
