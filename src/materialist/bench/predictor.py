@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def run(
         source = opened(spec, device)
         network = getattr(source, "network", None)
         weights = {} if network is None else {"parameters_m": sum(p.numel() for p in network.parameters()) / 1e6}
-        work = {"predict": lambda s=source: s.predict(photo, seed=seed)}
+        work: dict[str, Callable[[], Any]] = {"predict": partial(source.predict, photo, seed=seed)}
         if network is not None:
             work = {"network": forward(network, size), **work}
         for name, call in work.items():

@@ -126,4 +126,4 @@ def _gain(albedo: Array, rng: np.random.Generator) -> Array:
 def _each(sample: Sample, work) -> Sample:
     """The sample with `work(array, name)` applied to every array it has."""
     arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__}
-    return Sample(**{name: None if array is None else work(array, name) for name, array in arrays.items()})
+    return replace(sample, **{name: work(array, name) for name, array in arrays.items() if array is not None})

@@ -35,7 +35,7 @@ class PaperTask:
             "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)." if init is None
             else f"MatNet starts from {self.init}."
         )  # fmt: skip
-        self.notes = (
+        self.notes: tuple[str, ...] = (
             "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
             "backbone cannot be had here.",
             start,

@@ -64,7 +64,7 @@ def tensors(sample: Sample) -> dict[str, Tensor]:
 class BundledTask:
     """The bundled network, on procedural pictures."""
 
-    notes = (
+    notes: tuple[str, ...] = (
         "Albedo is compared by L1, L2, gradients at four scales, and after one factor a picture; there is no LPIPS: "
         "its backbone is not part of this project.",
     )
