@@ -102,7 +102,7 @@ def windows(rng: np.random.Generator, wall: Wall, count: int) -> tuple[Parts, li
     frame = m.plastic(rng) if rng.random() < 0.15 else m.wood(rng) if rng.random() < 0.3 else _white(rng)
     bottom = float(rng.choice([0.05, rng.uniform(0.4, 1.0)], p=[0.2, 0.8]))
     top = min(wall.height - rng.uniform(0.1, 0.5), bottom + rng.uniform(1.0, 2.2))
-    width = rng.uniform(0.7, min(2.4, wall.length * 0.7 / count))
+    width = rng.uniform(0.5, max(0.6, min(2.4, wall.length * 0.7 / count)))
     cloth = m.fabric(rng)
     dressed = rng.random() < 0.5
     panes = (int(rng.integers(1, 4)), int(rng.integers(1, 3)))
