@@ -148,6 +148,19 @@ def test_the_processes_share_the_samples(data):
     np.testing.assert_allclose(key(together), key(alone[0]["image"]), rtol=1e-6)
 
 
+def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
+    source = SampleFolder(made_samples.write_set(tmp_path, 4))
+    bad = tmp_path / "samples" / "0000002.npz"
+    bad.write_bytes(b"no sample")
+    args = {"number": 1, "size": 32, "seed": 0, "workers": 0, "batch": 4}
+    assert len(list(stream.epoch(source, BundledTask(), **args))) == 1
+    assert "0000002.npz" in caplog.text
+    for path in (tmp_path / "samples").iterdir():
+        path.write_bytes(b"no sample")
+    with pytest.raises(InputError, match="cannot be read"):
+        list(stream.epoch(source, BundledTask(), **args))
+
+
 def test_kept_aside_samples_are_never_trained_on():
     trained = stream.trained_on(100)
     assert len(trained) == 98 and not {39, 79} & set(trained)

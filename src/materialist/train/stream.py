@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 
 import cv2
@@ -9,9 +10,12 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
+from materialist.errors import InputError
 from materialist.train.samples import Sample, Source
 from materialist.train.tasks import Task, tensors
 
+ATTEMPTS = 4
+"""Samples tried in place of one that cannot be read, before the run ends with its error."""
 KEPT_ASIDE = 40
 """Every how-manieth sample is never trained on, but looked at."""
 
@@ -24,7 +28,21 @@ class _Variants(Dataset):
 
     def __getitem__(self, key: tuple[int, tuple[int, ...]]) -> dict[str, torch.Tensor]:
         index, seed = key
-        return tensors(self.task.prepare(self.source.read(index), self.size, np.random.default_rng(seed)))
+        rng = np.random.default_rng(seed)
+        return tensors(self.task.prepare(self._read(index, rng), self.size, rng))
+
+    def _read(self, index: int, rng: np.random.Generator) -> Sample:
+        """Sample number `index`, or another one where it cannot be read: one bad file must not end a night's run."""
+        chosen = trained_on(len(self.source))
+        for attempt in range(ATTEMPTS):
+            try:
+                return self.source.read(index)
+            except InputError as error:
+                if attempt == ATTEMPTS - 1:
+                    raise
+                logging.getLogger(__name__).warning("%s Another sample is used.", error)
+                index = int(rng.choice(chosen))
+        raise AssertionError("the last attempt returns or raises")
 
 
 def epoch(
