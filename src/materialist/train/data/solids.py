@@ -111,6 +111,24 @@ def blob(rng: np.random.Generator, size: Array, roughness: float, n: int = 48) -
     return grounded(replace(body, uv=body.uv * half.mean()))
 
 
+def pot(control: Array, thickness: float, n: int = 40) -> Solid:
+    """Open vessel through `control` [K, 2] (radius, height), as `bench.shapes.vessel` with an eighth of its faces.
+
+    Texture coordinates are in metres.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    height = np.linspace(control[0, 1], control[-1, 1], 18)
+    radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
+    outside = np.stack([radius, height], -1)
+    inside = np.stack([np.maximum(radius - thickness, 0.1 * radius), np.maximum(height, thickness)], -1)[::-1]
+    rim = [[radius[-1] - 0.25 * thickness, height[-1] + 0.35 * thickness],
+           [radius[-1] - 0.75 * thickness, height[-1] + 0.35 * thickness]]  # fmt: skip
+    profile = np.concatenate([[[1e-4, 0]], outside, rim, inside, [[1e-4, thickness]]])
+    solid = lathe(profile, n)
+    return replace(solid, uv=solid.uv * [np.pi * radius.mean(), 2 * height[-1]])
+
+
 def grounded(solid: Solid) -> Solid:
     """The solid moved up or down to stand on y = 0."""
     return replace(solid, vertices=solid.vertices - [0, solid.vertices[:, 1].min(), 0])

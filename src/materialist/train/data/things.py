@@ -75,8 +75,7 @@ def vase(rng, size):
     widths[0] = max(widths[0], 0.5)
     control = np.stack([widths * radius, heights * height], -1)
     control = control[np.concatenate([[True], np.diff(control[:, 1]) > 0.04 * height])]
-    solid = shapes.vessel(control, thickness=0.04 * size)
-    parts = [Part(s.metric(solid, np.pi * radius, 2 * height), m.any_object(rng))]
+    parts = [Part(s.pot(control, 0.04 * size), m.any_object(rng))]
     if rng.random() < 0.35:
         parts += _twigs(rng, height * 0.7, size * rng.uniform(0.7, 1.5), widths[-1] * radius * 0.6)
     return parts
@@ -106,7 +105,7 @@ def cup(rng, size):
     if rng.random() < 0.35:
         parts += _dish(rng, size * 1.8, material)
         lift = 0.12 * size
-    body = s.metric(shapes.vessel(control, 0.05 * size), np.pi * radius, 2 * height)
+    body = s.pot(control, 0.05 * size)
     parts.append(Part(s.moved(body, (0, lift, 0)), material))
     phi = np.linspace(-np.pi / 2, np.pi / 2, 12)
     loop = np.stack(
@@ -123,7 +122,7 @@ def cup(rng, size):
 def _dish(rng, width, material):
     r = width / 2
     control = np.array([(0.5, 0), (0.6, 0.3), (0.95, 0.8), (1, 1)]) * [r, width * rng.uniform(0.08, 0.2)]
-    return [Part(s.metric(shapes.vessel(control, 0.03 * width), np.pi * r, width), material)]
+    return [Part(s.pot(control, 0.03 * width), material)]
 
 
 def bowl(rng, size):
@@ -132,7 +131,7 @@ def bowl(rng, size):
     power = rng.uniform(0.3, 0.8)
     t = np.linspace(0, 1, 6)
     control = np.stack([r * (0.4 + 0.6 * t**power), height * t], -1)
-    parts = [Part(s.metric(shapes.vessel(control, 0.03 * size), np.pi * r, 2 * height + r), m.any_object(rng))]
+    parts = [Part(s.pot(control, 0.03 * size), m.any_object(rng))]
     if rng.random() < 0.5:
         food = m.any_object(rng)
         for _ in range(int(rng.integers(2, 8))):
@@ -181,7 +180,7 @@ def plant(rng, size):
     """Pot plant: a pot, stems, leaves."""
     pot = size * rng.uniform(0.25, 0.4)
     control = np.array([(0.75, 0), (0.9, 0.5), (1, 1)]) * [pot * 0.5, pot]
-    parts = [Part(s.metric(shapes.vessel(control, 0.05 * pot), 1.5 * pot, 2 * pot), m.any_object(rng))]
+    parts = [Part(s.pot(control, 0.05 * pot), m.any_object(rng))]
     soil = shapes.lathe(np.array([[pot * 0.46, 0], [1e-4, 0]]), 24)
     parts.append(Part(s.moved(soil, (0, 0.85 * pot, 0)), m.Material(0, (m.hsv(0.07, 0.5, 0.25),) * 3, 0.8, (0.9, 0.9))))
     leaf, height = m.foliage(rng), size - pot
