@@ -5,6 +5,7 @@ import numpy as np
 from materialist.render.envmap import half_turn, on_mitsuba_grid
 from materialist.train.data import materials as m
 from materialist.train.data import solids as s
+from materialist.train.data.walls import Wall, surface
 from materialist.train.data.world import Part, Portal, World, look
 
 X, Y, Z = np.eye(3)
@@ -26,8 +27,6 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
         Part(s.moved(s.slab(np.array([0.4, 0.4, 0.4])), (-0.4, 0, 0), 0.2), red),
     ]  # fmt: skip
     hole = (0.6, 1.4, 0.6, 1.5) if window else (2.0, 2.0, 2.0, 2.0)
-    from materialist.train.data.walls import Wall, surface
-
     side = Wall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [hole] if window else [])
     parts += surface(side, grey)
     if lamp:
@@ -56,8 +55,6 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
 
     mi = setup()
     rotation, origin = world.view.to_scene, world.view.position
-    from materialist.bench.lights import directions
-
     description = {"type": "scene", "integrator": {"type": "path", "max_depth": depth, "rr_depth": 100}}
     for k, part in enumerate(world.parts):
         material = part.material
@@ -81,7 +78,6 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
         params["faces"] = np.ravel(solid.faces).astype(np.uint32)
         params.update()
         description[f"part{k}"] = mesh
-    del directions
     grid = on_mitsuba_grid(world.envmap, np)
     to_camera = np.eye(4)
     to_camera[:3, :3] = rotation.T

@@ -1,0 +1,195 @@
+"""The data set on disk: contract, determinism, stops and refusals."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from materialist.color import srgb_to_linear
+from materialist.errors import InputError
+from materialist.train.data import heldout
+from materialist.train.data.produce import options_for, produce, read_description, sample_path
+from materialist.train.data.sample import make_sample
+from materialist.train.data.sheet import write_sheet
+
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
+SIZE = 32
+CONTRACT = {
+    "image": (np.float16, 3), "shading": (np.float16, 3), "albedo": (np.uint8, 3), "roughness": (np.uint8, 0),
+    "metallic": (np.uint8, 0), "normal": (np.int8, 3), "depth": (np.float16, 0), "mask": (np.uint8, 0),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def options():
+    return options_for(size=SIZE, seed=11, spp=4, device="cpu")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, options):
+    folder = tmp_path_factory.mktemp("set") / "data"
+    result = produce(folder, options, count=6)
+    assert (result.rendered, result.existing) == (6, 0)
+    return folder
+
+
+def arrays(folder, index):
+    with np.load(sample_path(folder, index)) as file:
+        return dict(file)
+
+
+def test_every_sample_keeps_the_contract(made):
+    for k in range(6):
+        sample = arrays(made, k)
+        for name, (kind, channels) in CONTRACT.items():
+            assert sample[name].dtype == kind, name
+            assert sample[name].shape == (SIZE, SIZE, *([channels] if channels else [])), name
+        mask = sample["mask"] > 0
+        assert set(np.unique(sample["mask"])) <= {0, 1}
+        assert 25 <= float(sample["fov"]) <= 75
+        assert np.isfinite(sample["image"].astype(np.float32)).all()
+        assert (sample["image"] >= 0).all()
+        assert ((sample["depth"] > 0) == mask).all()
+        length = np.linalg.norm(sample["normal"].astype(float) / 127, axis=-1)
+        np.testing.assert_allclose(length[mask], 1, atol=0.02)
+        assert not sample["normal"][~mask].any()
+
+
+def test_normals_agree_with_the_slope_of_depth(made):
+    """Where depth is smooth, the normal of the depth's surface is the label's, facing the viewer."""
+    agree = []
+    for k in range(6):
+        sample = arrays(made, k)
+        depth, fov = sample["depth"].astype(float), float(sample["fov"])
+        x = ((np.arange(SIZE) + 0.5) / SIZE * 2 - 1) * np.tan(np.radians(fov / 2))
+        points = np.stack(np.broadcast_arrays(x[None], -x[:, None], -1.0), -1) * depth[..., None]
+        across, down = points[1:-1, 2:] - points[1:-1, :-2], points[2:, 1:-1] - points[:-2, 1:-1]
+        slope = np.cross(down, across)
+        slope /= np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-9)
+        middle = depth[1:-1, 1:-1]
+        bend = abs(depth[1:-1, 2:] + depth[1:-1, :-2] - 2 * middle) + abs(
+            depth[2:, 1:-1] + depth[:-2, 1:-1] - 2 * middle
+        )
+        smooth = (bend < 0.004 * middle) & (sample["mask"][1:-1, 1:-1] > 0)
+        agree.append((slope * sample["normal"][1:-1, 1:-1] / 127.0).sum(-1)[smooth])
+    agree = np.concatenate(agree)
+    assert len(agree) > 500
+    assert np.median(agree) > 0.995
+    assert (agree > 0.9).mean() > 0.85
+
+
+def test_what_remains_of_the_image_without_its_diffuse_part_is_no_less_than_nothing(made):
+    for k in range(6):
+        sample = arrays(made, k)
+        diffuse = srgb_to_linear(sample["albedo"] / 255.0) * (1 - sample["metallic"][..., None] / 255.0)
+        rest = sample["image"].astype(np.float32) - diffuse * sample["shading"].astype(np.float32)
+        surface = sample["mask"] > 0
+        assert np.median(rest[surface]) > -0.02
+        # Four samples a pixel leave noise, which the denoiser takes from the two pictures apart.
+        assert (rest > -0.05 - 0.25 * sample["image"].astype(np.float32))[surface].mean() > 0.9
+
+
+def test_a_sample_depends_on_seed_and_number_alone(made, options, tmp_path):
+    again = make_sample(4, options)
+    stored = arrays(made, 4)
+    for name in CONTRACT:
+        assert np.array_equal(again[name], stored[name]), name
+    other = make_sample(4, options_for(size=SIZE, seed=12, spp=4, device="cpu"))
+    assert not np.array_equal(other["albedo"], stored["albedo"])
+
+
+def test_resume_makes_what_is_missing_and_nothing_else(made, options):
+    gone, kept = sample_path(made, 2), sample_path(made, 3)
+    before, stamp = arrays(made, 2), kept.stat().st_mtime_ns
+    gone.unlink()
+    (made / "samples" / "0000005.99.tmp").write_bytes(b"half a sample")
+    result = produce(made, options, count=6, resume=True)
+    assert (result.rendered, result.existing) == (1, 5)
+    assert all(np.array_equal(v, arrays(made, 2)[k]) for k, v in before.items())
+    assert kept.stat().st_mtime_ns == stamp
+    assert not list((made / "samples").glob("*.tmp"))
+
+
+def test_an_existing_folder_is_refused(made, options):
+    with pytest.raises(InputError, match="--resume"):
+        produce(made, options, count=6)
+
+
+def test_resuming_with_other_options_is_refused(made):
+    with pytest.raises(InputError, match="seed 11, not 12"):
+        produce(made, options_for(size=SIZE, seed=12, spp=4, device="cpu"), count=6, resume=True)
+
+
+def test_the_description(made):
+    found = read_description(made)
+    assert (found["format"], found["size"], found["seed"], found["split"]) == (1, SIZE, 11, "train")
+    assert found["options"]["spp"] == 4
+    with pytest.raises(InputError, match=r"dataset\.json"):
+        read_description(made / "samples")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [({"size": 30}, "30"), ({"size": 33}, "33"), ({"spp": 0}, "spp is 0"), ({"seed": -1}, "-1"),
+     ({"split": "dev"}, "'dev'"), ({"meshes": Path("/nowhere")}, "/nowhere")],
+)  # fmt: skip
+def test_options_that_cannot_be(wrong, said):
+    with pytest.raises(InputError, match=said):
+        options_for(**wrong)
+
+
+def test_counts_that_cannot_be(options, tmp_path):
+    with pytest.raises(InputError, match="count is 0"):
+        produce(tmp_path / "x", options, count=0)
+
+
+def test_a_folder_without_meshes_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"\.ply"):
+        options_for(meshes=tmp_path)
+
+
+def test_the_splits_share_no_file(tmp_path):
+    for name in (*sorted(heldout.MESHES), "teapot", "vase"):
+        (tmp_path / f"{name}.ply").touch()
+    train = heldout.files(tmp_path, ".ply", heldout.MESHES, "train")
+    aside = heldout.files(tmp_path, ".ply", heldout.MESHES, "heldout")
+    assert [p.stem for p in train] == ["teapot", "vase"]
+    assert {p.stem for p in aside} == heldout.MESHES
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="../shared/data is absent")
+def test_a_fifth_of_the_captures_is_kept_aside():
+    for folder, ending, aside in (("meshes", ".ply", heldout.MESHES), ("envmaps", ".exr", heldout.ENVMAPS)):
+        names = sorted(p.stem for p in (SHARED / folder).rglob(f"*{ending}"))
+        assert aside <= set(names)
+        assert abs(len(aside) / len(names) - 0.2) < 0.02
+
+
+def test_the_sheet(made, tmp_path):
+    assert write_sheet(made, tmp_path / "sheet.png", count=3) == 3
+    assert (tmp_path / "sheet.png").stat().st_size > 5000
+    with pytest.raises(InputError, match="no samples"):
+        write_sheet(tmp_path, tmp_path / "none.png")
+
+
+def test_a_killed_run_leaves_whole_samples_only(tmp_path):
+    command = [sys.executable, "-m", "materialist", "train", "data", "-o", str(tmp_path / "d"), "--count", "500",
+               "--size", "32", "--spp", "4", "--seed", "11", "--device", "cpu"]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while len(list((tmp_path / "d" / "samples").glob("*.npz"))) < 2 and time.monotonic() < deadline:
+        assert process.poll() is None
+        time.sleep(0.1)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    files = sorted((tmp_path / "d" / "samples").glob("*.npz"))
+    assert len(files) >= 2
+    for file in files:
+        with np.load(file) as sample:
+            assert set(CONTRACT) <= set(sample.files)
+            assert sample["image"].shape == (SIZE, SIZE, 3)

@@ -1,0 +1,158 @@
+"""The path tracer of the data set against Mitsuba's own, against closed forms, and against itself."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from materialist.errors import InputError
+from materialist.train.data import packing, tracer
+from materialist.train.data import solids as s
+from materialist.train.data.sample import labels_of
+from materialist.train.data.world import Part, World, look
+from materialist.types import Camera
+
+sys.path.insert(0, str(Path(__file__).parent))
+from made_worlds import X, Z, plain, reference, room, still
+
+SIZE = 32
+
+
+def traced(world, spp=400, seed=1, size=SIZE):
+    packed = packing.pack(world, np.random.default_rng(0))
+    return tracer.Tracer(packed, Camera(size, size, world.view.fov), device="cpu").render(spp=spp, seed=seed)
+
+
+def probed(world, side=4, size=SIZE):
+    packed = packing.pack(world, np.random.default_rng(0))
+    return tracer.Tracer(packed, Camera(size, size, world.view.fov), device="cpu").probe(side)
+
+
+@pytest.mark.parametrize(
+    ("world", "tolerance"),
+    [
+        (still(), 0.01),
+        (room(window=True, lamp=False), 0.03),
+        (room(window=False, lamp=True, sky=0.0), 0.02),
+        (room(window=True, lamp=True), 0.02),
+    ],
+    ids=["sky", "window", "lamp", "window and lamp"],
+)
+def test_equals_mitsubas_integrator(world, tolerance):
+    ours, _ = traced(world)
+    theirs = reference(world, SIZE, 576, tracer.MAX_DEPTH + 1)
+    blocks = lambda a: a.reshape(4, 8, 4, 8, 3).mean((1, 3))  # noqa: E731
+    np.testing.assert_allclose(ours.mean((0, 1)), theirs.mean((0, 1)), rtol=tolerance)
+    np.testing.assert_allclose(blocks(ours), blocks(theirs), rtol=8 * tolerance, atol=0.02 * theirs.mean())
+
+
+def test_a_portal_changes_the_noise_alone():
+    with_portal, _ = traced(room(window=True, lamp=False))
+    without, _ = traced(room(window=True, lamp=False, portal=False), spp=1600)
+    np.testing.assert_allclose(with_portal.mean((0, 1)), without.mean((0, 1)), rtol=0.03)
+
+
+def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
+    """Shading = (1/pi) * integral of F_d(wi) F_d(wo) cos over the hemisphere, by quadrature, times the radiance."""
+    ground = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
+    world = World([ground], np.full((16, 32, 3), 2.0, np.float32), look((0, 1, 1e-3), (0, 0, 0), 10))
+    image, shading = traced(world, spp=100)
+    theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
+    wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    from materialist.render.brdf import diffuse_coefficients, specular_split
+
+    up = np.array([0.0, 0.0, 1.0])
+    c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])
+    expected = 2.0 * (c * wi[..., 2]).mean() * 2 * np.pi / np.pi
+    np.testing.assert_allclose(shading.mean((0, 1)), expected, rtol=0.01)
+    s0, s1 = specular_split(0.8, up, wi, np.broadcast_to(up, wi.shape))
+    specular = 2.0 * ((0.04 * s0 + s1) * wi[..., 2]).mean() * 2 * np.pi
+    np.testing.assert_allclose(image.mean((0, 1)), 0.5 * expected + specular, rtol=0.01)
+
+
+def test_the_image_is_albedo_times_shading_plus_what_does_not_depend_on_albedo():
+    """Direct light alone, on two albedos with the same random numbers: the difference is (A1 - A2) * shading."""
+
+    def ground(value):
+        part = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((value,) * 3, 0.5))
+        return World([part], still().envmap, look((0, 1, 1), (0, 0, 0), 30))
+
+    bright, shading = traced(ground(0.6), spp=900)
+    dark, _ = traced(ground(0.2), spp=900)
+    np.testing.assert_allclose((bright - dark).mean((0, 1)), 0.4 * shading.mean((0, 1)), rtol=0.02)
+
+
+def test_equal_seeds_give_equal_pictures():
+    a, b, c = (traced(still(), spp=4, seed=k)[0] for k in (3, 3, 4))
+    assert np.array_equal(a, b)
+    assert not np.array_equal(a, c)
+
+
+def test_labels_of_a_ground_seen_from_a_known_camera():
+    """Depth and normal against the plane's equation, in the camera frame."""
+    colour = (0.5, 0.3, 0.1)
+    ground = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain(colour, 0.7))
+    world = World([ground], np.ones((8, 16, 3), np.float32), look((0, 2, 0), (0, 0, -3), 40))
+    labels = labels_of(probed(world))
+    up = world.view.to_scene.T @ np.array([0, 1, 0])
+    assert labels["mask"].all()
+    np.testing.assert_allclose(labels["normal"], np.broadcast_to(up, (SIZE, SIZE, 3)), atol=1e-5)
+    camera = Camera(SIZE, SIZE, 40)
+    x = (np.arange(SIZE) + 0.5 - SIZE / 2) / camera.focal
+    rays = np.stack(np.broadcast_arrays(x[None, :], -x[:, None], -1.0), -1)
+    # The centre of a 4 x 4 probe is an eighth of a pixel off the pixel's centre.
+    expected = -2.0 / (rays @ up)
+    np.testing.assert_allclose(labels["depth"], expected, rtol=0.02)
+    np.testing.assert_allclose(labels["albedo"], np.broadcast_to(colour, (SIZE, SIZE, 3)), rtol=1e-5)
+    np.testing.assert_allclose(labels["roughness"], 0.7, rtol=1e-5)
+
+
+def test_normals_face_the_viewer_even_from_behind():
+    behind = Part(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
+    world = World([behind], np.ones((8, 16, 3), np.float32), look((0, 0, 0), (0, 0, -1), 40))
+    labels = labels_of(probed(world))
+    np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
+
+
+def test_the_sky_has_no_labels():
+    labels = labels_of(probed(still()))
+    sky = ~labels["mask"]
+    assert 0.05 < sky.mean() < 0.95
+    for name in ("depth", "normal", "albedo", "roughness", "metallic"):
+        assert not labels[name][sky].any(), name
+    assert (labels["depth"][~sky] > 0).all()
+
+
+def test_texture_labels_average_the_part_that_the_centre_sees():
+    probe = {
+        "owner": np.array([[[0, 0, 1, 0]]]), "surface": np.ones((1, 1, 4)), "depth": np.array([[[1.0, 2, 3, 4]]]),
+        "normal": np.zeros((1, 1, 4, 3)), "albedo": np.array([[[[0.1] * 3, [0.2] * 3, [0.9] * 3, [0.6] * 3]]]),
+        "roughness": np.array([[[0.1, 0.2, 0.9, 0.6]]]), "metallic": np.zeros((1, 1, 4)),
+    }  # fmt: skip
+    labels = labels_of(probe)  # the centre of 2 x 2 is the last
+    assert labels["depth"][0, 0] == 4
+    np.testing.assert_allclose(labels["albedo"][0, 0], 0.3)
+    np.testing.assert_allclose(labels["roughness"][0, 0], 0.3)
+
+
+def test_a_second_world_compiles_nothing():
+    import drjit as dr
+
+    traced(still(), spp=4)
+    traced(room(window=True, lamp=True), spp=4)
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        traced(room(window=True, lamp=False), spp=4)
+        traced(replace(still(), view=look((1, 1, 2), (0, 0, 0), 60)), spp=4)
+        history = dr.kernel_history()
+    large = [k for k in history if k.get("operation_count", 0) > 500]
+    assert len(large) == 2
+    assert all(k["cache_hit"] for k in large)
+
+
+def test_sizes_that_do_not_fill_vectors_are_refused():
+    packed = packing.pack(still(), np.random.default_rng(0))
+    with pytest.raises(InputError, match="33 x 33"):
+        tracer.Tracer(packed, Camera(33, 33, 40.0), device="cpu")
