@@ -21,6 +21,7 @@ _HOME = {
     "read_photo": "io.photo",
     "save_scene": "io.package",
     "load_scene": "io.package",
+    "export": "export.run",
     **dict.fromkeys(
         ("Camera", "FitReport", "Geometry", "Materials", "Mesh", "Photo", "Prediction", "Scene"),
         "types",
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from materialist.errors import SceneError as SceneError
     from materialist.errors import SetupError as SetupError
     from materialist.errors import WeightsError as WeightsError
+    from materialist.export.run import export as export
     from materialist.io.package import load_scene as load_scene
     from materialist.io.package import save_scene as save_scene
     from materialist.io.photo import read_photo as read_photo

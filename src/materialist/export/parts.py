@@ -1,0 +1,102 @@
+"""The scene as the other programs want it: meshes with one material each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.render.scene import part
+from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene
+
+FEWEST = 100
+"""Triangles below which a reduced mesh would no longer show the scene."""
+_NEUTRAL = (0.5, 0.5, 0.0)
+"""Albedo, roughness and metallic of a plane that no pixel lies on, as the renderer has it."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh and its material: the depth surface with the maps, or a continued plane with their mean."""
+
+    name: str
+    """`surface`, `plane0`, `plane1`, ..."""
+    mesh: Mesh
+    """Faces of this part alone; uv as everywhere: u right, v DOWN."""
+    materials: Materials
+    """Maps [H, W], looked up by uv without filtering; [1, 1] for a constant."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether one value stands for the whole part."""
+        return self.materials.roughness.size == 1
+
+
+def scene_parts(scene: Scene, max_triangles: int | None = None) -> list[Part]:
+    """The depth surface, then the continued planes, with the materials the renderer gives them.
+
+    Args:
+        max_triangles: rebuild the mesh from a coarser depth map where the scene's has more triangles than this; the
+            texture keeps its size. None: the scene's own mesh.
+
+    Raises:
+        InputError: a mesh without a depth surface, or too small a number of triangles.
+    """
+    geometry = scene.geometry
+    if not (geometry.mesh.face_plane == -1).any():
+        raise InputError("The mesh has no depth surface to export; give a depth map with some values above 0.")
+    if max_triangles is not None and max_triangles < FEWEST:
+        raise InputError(f"The most triangles are {max_triangles}; give at least {FEWEST}.")
+    materials = scene.materials
+    if max_triangles is not None and len(geometry.mesh.faces) > max_triangles:
+        geometry, materials = _reduced(scene, max_triangles)
+    planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
+    constants = [Part(f"plane{k}", part(geometry.mesh, k), _mean(materials, geometry.plane_label == k)) for k in planes]
+    return [Part("surface", part(geometry.mesh, -1), scene.materials), *constants]
+
+
+def _mean(materials: Materials, members: Array) -> Materials:
+    """[1, 1] mean of the maps over the pixels [H, W] of a plane."""
+    if not members.any():
+        albedo, roughness, metallic = _NEUTRAL
+        return Materials(
+            np.full((1, 1, 3), albedo, np.float32),
+            np.full((1, 1), roughness, np.float32),
+            np.full((1, 1), metallic, np.float32),
+        )
+    return Materials(
+        materials.albedo[members].mean(0, dtype=np.float64).astype(np.float32)[None, None],
+        materials.roughness[members].mean(dtype=np.float64).astype(np.float32)[None, None],
+        materials.metallic[members].mean(dtype=np.float64).astype(np.float32)[None, None],
+    )
+
+
+def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
+    """Geometry of a coarser depth map with at most `most` triangles, and the maps at its size."""
+    from materialist.geometry.build import build_geometry
+
+    camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
+    completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
+    tau = float(scene.provenance.get("tau", 6.0))
+    for _ in range(12):
+        width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))
+        rows = ((np.arange(height) + 0.5) * camera.height / height).astype(int)
+        columns = ((np.arange(width) + 0.5) * camera.width / width).astype(int)
+        pick = np.ix_(rows, columns)
+        coarse = Camera(width, height, camera.fov)
+        if not (scene.depth[pick] > 0).any():
+            break
+        geometry = build_geometry(scene.depth[pick], scene.normal[pick], coarse, tau=tau, completion=completion)
+        if len(geometry.mesh.faces) <= most:
+            m = scene.materials
+            maps = Materials(m.albedo[pick], m.roughness[pick], m.metallic[pick])
+            return replace(geometry, mesh=_unsquashed(geometry.mesh, camera, coarse)), maps
+        factor *= 0.95 * np.sqrt(min(1.0, most / len(geometry.mesh.faces)))
+    raise InputError(f"The scene cannot be shown with {most} triangles; allow more.")
+
+
+def _unsquashed(mesh: Mesh, camera: Camera, coarse: Camera) -> Mesh:
+    """The mesh on the photo's frame: the coarse picture's sides are rounded, so its pixels are not quite square."""
+    stretch = (camera.height / camera.width) / (coarse.height / coarse.width)
+    return replace(mesh, vertices=mesh.vertices * np.array([1, stretch, 1], np.float32))

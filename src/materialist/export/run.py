@@ -1,0 +1,128 @@
+"""`materialist.export`: which format, where to, and is it free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from materialist.errors import InputError
+from materialist.export.parts import Part, scene_parts
+from materialist.types import Scene
+
+FORMATS = ("glb", "blend", "usd", "mitsuba", "html")
+SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
+"""Format -> suffix of its single file."""
+FOLDERS = ("blend", "usd", "mitsuba")
+"""Formats that may also be a folder: PATH without a suffix of its own."""
+PAGE_TRIANGLES = 60_000
+"""Triangles in an HTML page unless the caller says otherwise."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written."""
+
+    path: Path
+    """The file or folder to open."""
+    beside: tuple[Path, ...] = ()
+    """Further files that belong to it."""
+    notes: tuple[str, ...] = ()
+    """What the reader should know or do next."""
+
+
+def export(
+    scene: Scene,
+    path: str | Path,
+    *,
+    to: str | None = None,
+    force: bool = False,
+    max_triangles: int | None = None,
+    blender: str | None = None,
+    shadow_catcher: bool = False,
+) -> Exported:
+    """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
+
+    Args:
+        path: a file with the suffix of the format; for blend, usd and mitsuba a folder (a name without suffix).
+        to: `glb`, `blend`, `usd`, `mitsuba` or `html`; None: by the suffix of PATH.
+        force: replace PATH where it is an earlier export.
+        max_triangles: rebuild the mesh from a coarser depth map where it has more than these.
+        blender: for blend, the `blender` program or a Python that has `bpy`; None: look for one.
+        shadow_catcher: for blend, start with the reconstruction as a shadow catcher over the photo.
+
+    Raises:
+        InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
+        SetupError: the extra for the format is missing, or `blender` does not work.
+    """
+    path = Path(path)
+    to = check_format(path, to)
+    if blender is not None and to != "blend" or shadow_catcher and to != "blend":
+        raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
+    if to == "html" and max_triangles is None:
+        max_triangles = PAGE_TRIANGLES
+    write = _writer(to)
+    if to == "blend":
+        return write(path, scene, scene_parts(scene, max_triangles), force, blender, shadow_catcher)
+    return write(path, scene, scene_parts(scene, max_triangles), force)
+
+
+def check_format(path: Path, to: str | None) -> str:
+    """The format of an export to PATH. Raises InputError where it is unknown or PATH's suffix is another's."""
+    suffix = path.suffix.lower()
+    if to is None:
+        named = [name for name, end in SUFFIX.items() if end == suffix]
+        if not named:
+            raise InputError(f"{path} does not say its format; give to= one of {', '.join(FORMATS)}.")
+        to = named[0]
+    if to not in FORMATS:
+        raise InputError(f"The format is '{to}'; choose one of {', '.join(FORMATS)}.")
+    folder = to in FOLDERS and suffix not in (".usda", ".usdc", ".usd", ".xml", *SUFFIX.values())
+    if not folder and suffix != SUFFIX.get(to):
+        expected = [f"NAME{SUFFIX[to]}"] if to in SUFFIX else []
+        expected += ["a folder name"] if to in FOLDERS else []
+        raise InputError(f"The output {path} does not fit the format {to}; give {' or '.join(expected)}.")
+    return to
+
+
+def _writer(to: str) -> Callable[..., Exported]:
+    """The function that writes a format, loaded when it is needed."""
+    if to == "blend":
+        from materialist.export.blender import export_blend
+
+        return export_blend
+    if to == "usd":
+        from materialist.export.usd import export_usd
+
+        return export_usd
+    return {"glb": _glb, "mitsuba": _mitsuba, "html": _html}[to]
+
+
+def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.export.glb import write_glb, write_hdr
+    from materialist.export.target import whole_files
+
+    light = path.with_suffix(".hdr")
+    with whole_files([path, light], force) as (mesh_file, light_file):
+        write_glb(mesh_file, scene, parts)
+        write_hdr(light_file, scene.envmap)
+    note = f"glTF holds no environment light: {light.name} is it, its centre column along the camera's -Z."
+    return Exported(path, (light,), (note,))
+
+
+def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.export.mitsuba_xml import write_mitsuba
+    from materialist.export.target import whole_folder
+
+    with whole_folder(path, force, format="mitsuba") as folder:
+        write_mitsuba(folder, scene, parts)
+    return Exported(path / "scene.xml", (), (f"Render it with: mitsuba -m scalar_rgb {path / 'scene.xml'}",))
+
+
+def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.export.page import write_page
+    from materialist.export.target import whole_files
+
+    with whole_files([path], force) as (page,):
+        write_page(page, scene, parts)
+    return Exported(path)
