@@ -71,7 +71,9 @@ class _Document:
         self.data = bytearray()
         self.content: dict[str, list] = {
             "meshes": [], "materials": [], "textures": [], "images": [], "accessors": [], "bufferViews": [],
-            "samplers": [{"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP}],
+            "samplers": [
+                {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP}
+            ],
         }  # fmt: skip
 
     def add_part(self, part: Part) -> int:
@@ -80,10 +82,9 @@ class _Document:
         attributes = {
             "POSITION": self._accessor(mesh.vertices.astype("<f4"), "VEC3", bounds=True),
             "NORMAL": self._accessor(_unit(mesh.normals).astype("<f4"), "VEC3"),
-            "TEXCOORD_0": self._accessor(mesh.uv.astype("<f4"), "VEC2"),
         }
-        if part.constant:
-            del attributes["TEXCOORD_0"]
+        if not part.constant:
+            attributes["TEXCOORD_0"] = self._accessor(mesh.uv.astype("<f4"), "VEC2")
         indices = self._accessor(mesh.faces.astype("<u4").ravel(), "SCALAR", indices=True)
         primitive = {"attributes": attributes, "indices": indices, "material": self._material(part)}
         return self._add("meshes", {"name": part.name, "primitives": [primitive]})

@@ -57,7 +57,7 @@ def export(
     """
     path = Path(path)
     to = check_format(path, to)
-    if blender is not None and to != "blend" or shadow_catcher and to != "blend":
+    if to != "blend" and (blender is not None or shadow_catcher):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and max_triangles is None:
         max_triangles = PAGE_TRIANGLES

@@ -40,7 +40,7 @@ def whole_files(paths: list[Path], force: bool = False) -> Iterator[list[Path]]:
     for path in paths:
         ensure_free(path, force, folder=False)
     # The suffix stays last: some writers choose the format by it.
-    temporaries = [_beside(path, f"partial{k}").with_suffix(path.suffix) for k, path in enumerate(paths)]
+    temporaries = [_beside(path, "partial", path.suffix) for path in paths]
     try:
         yield temporaries
         for temporary, path in zip(temporaries, paths):
@@ -77,8 +77,8 @@ def whole_folder(path: Path, force: bool = False, **facts: object) -> Iterator[P
             shutil.rmtree(aside, ignore_errors=True)
 
 
-def _beside(path: Path, kind: str) -> Path:
-    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{os.getpid()}")
+def _beside(path: Path, kind: str, suffix: str = "") -> Path:
+    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{os.getpid()}{suffix}")
 
 
 def _reason(error: OSError) -> str:

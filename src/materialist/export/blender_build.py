@@ -1,0 +1,179 @@
+"""Build a .blend from the files beside this script; Blender 4.2 or later.
+
+    blender -b --factory-startup --python build.py -- -o scene.blend
+    python build.py -- -o scene.blend        (with the module bpy: pip install bpy)
+
+Options: --shadow-catcher shows the photo, with the reconstruction catching the shadows and reflections of what you
+add; --render FILE.png or .exr renders the scene too, with --samples N.
+"""
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+
+
+def main() -> None:
+    """Read the options after `--`, build, save, and render where asked."""
+    parser = argparse.ArgumentParser(prog="build.py")
+    parser.add_argument("-o", "--output", default=str(HERE / "scene.blend"))
+    parser.add_argument("--shadow-catcher", action="store_true")
+    parser.add_argument("--render")
+    parser.add_argument("--samples", type=int, default=128)
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
+    facts = json.loads((HERE / "scene.json").read_text("utf-8"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    add_meshes(scene, facts)
+    add_camera(scene, facts)
+    add_light(scene)
+    set_rendering(scene, options.samples)
+    if options.shadow_catcher:
+        catch_shadows(scene, facts)
+    bpy.ops.file.pack_all()
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(options.output).resolve()), compress=True)
+    if options.render:
+        scene.render.filepath = str(Path(options.render).resolve())
+        exr = options.render.lower().endswith(".exr")
+        scene.render.image_settings.file_format = "OPEN_EXR" if exr else "PNG"
+        if exr:
+            scene.render.image_settings.color_depth = "32"
+        bpy.ops.render.render(write_still=True)
+
+
+def add_meshes(scene, facts) -> None:
+    """The parts in a collection of their own. Our frame is +Y up and looks along -Z; Blender's is +Z up, along +Y."""
+    collection = bpy.data.collections.new("Reconstruction")
+    scene.collection.children.link(collection)
+    with np.load(HERE / "meshes.npz") as arrays:
+        for name in facts["parts"]:
+            x, y, z = arrays[f"{name}_vertices"].T
+            mesh = bpy.data.meshes.new(name)
+            faces = arrays[f"{name}_faces"]  # [F, 3]
+            mesh.from_pydata(np.stack([x, -z, y], 1), [], faces)
+            mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), bool))
+            uv = arrays[f"{name}_uv"][faces.ravel()]  # [3 F, 2], v down
+            uv[:, 1] = 1 - uv[:, 1]
+            mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.ravel())
+            x, y, z = arrays[f"{name}_normals"].T
+            mesh.normals_split_custom_set_from_vertices(np.stack([x, -z, y], 1))
+            mesh.materials.append(material(name, facts["parts"][name]))
+            mesh.update()
+            collection.objects.link(bpy.data.objects.new(name, mesh))
+
+
+def material(name, constants):
+    """Principled material of a part: from its maps, or with `constants` (albedo, roughness, metallic) where it has any."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes.clear()
+    surface = nodes.new("ShaderNodeBsdfPrincipled")
+    surface.distribution = "GGX"
+    surface.inputs["IOR"].default_value = 1.5
+    links.new(surface.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    if constants:
+        surface.inputs["Base Color"].default_value = (*constants["albedo"], 1)
+        surface.inputs["Roughness"].default_value = constants["roughness"]
+        surface.inputs["Metallic"].default_value = constants["metallic"]
+        return made
+    for row, (slot, file) in enumerate((("Base Color", "albedo"), ("Metallic", "metallic"), ("Roughness", "roughness"))):
+        texture = nodes.new("ShaderNodeTexImage")
+        texture.location = (-400, 300 - 300 * row)
+        texture.image = image(f"{file}.exr", "Linear Rec.709" if file == "albedo" else "Non-Color")
+        texture.interpolation, texture.extension = "Closest", "EXTEND"
+        links.new(texture.outputs["Color"], surface.inputs[slot])
+    return made
+
+
+def image(file, space):
+    """A picture beside the script in a colour space."""
+    loaded = bpy.data.images.load(str(HERE / file))
+    loaded.colorspace_settings.name = space
+    return loaded
+
+
+def add_camera(scene, facts) -> None:
+    """The photo's camera: at the origin, looking along +Y, with the photo as background."""
+    camera = bpy.data.cameras.new("Photo")
+    camera.sensor_fit = "HORIZONTAL"
+    camera.angle = math.radians(facts["fov"])
+    camera.clip_start, camera.clip_end = facts["near"], facts["far"]
+    camera.show_background_images = True
+    background = camera.background_images.new()
+    background.image = image("photo.png", "sRGB")
+    background.alpha, background.display_depth = 1.0, "BACK"
+    placed = bpy.data.objects.new("Photo", camera)
+    placed.rotation_euler = (math.pi / 2, 0, 0)
+    scene.collection.objects.link(placed)
+    scene.camera = placed
+    scene.render.resolution_x, scene.render.resolution_y = facts["width"], facts["height"]
+    scene.render.resolution_percentage = 100
+
+
+def add_light(scene) -> None:
+    """The environment map. The centre of Blender's lies along +X, the centre of ours along the view, +Y."""
+    world = bpy.data.worlds.new("Light")
+    scene.world = world
+    world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    where, turn = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeMapping")
+    turn.inputs["Rotation"].default_value = (0, 0, -math.pi / 2)
+    texture = nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image("envmap.exr", "Linear Rec.709")
+    light, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    links.new(where.outputs["Generated"], turn.inputs["Vector"])
+    links.new(turn.outputs["Vector"], texture.inputs["Vector"])
+    links.new(texture.outputs["Color"], light.inputs["Color"])
+    links.new(light.outputs["Background"], output.inputs["Surface"])
+    for column, node in enumerate((where, turn, texture, light, output)):
+        node.location = (250 * column, 0)
+
+
+def set_rendering(scene, samples) -> None:
+    """Cycles as the scene was fitted: light by way of up to three surfaces, a box filter, plain sRGB."""
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = samples, False, False
+    cycles.pixel_filter_type = "BOX"
+    cycles.diffuse_bounces = cycles.glossy_bounces = 2
+    cycles.sample_clamp_indirect = cycles.blur_glossy = 0
+    scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
+
+
+def catch_shadows(scene, facts) -> None:
+    """Shadow-catching proxy over the photo, at the photo's own resolution."""
+    for thing in bpy.data.collections["Reconstruction"].objects:
+        thing.is_shadow_catcher = True
+    scene.render.film_transparent = True
+    scene.render.resolution_x, scene.render.resolution_y = facts["photo_width"], facts["photo_height"]
+    if hasattr(scene, "compositing_node_group"):  # Blender 5
+        tree = bpy.data.node_groups.new("Over the photo", "CompositorNodeTree")
+        scene.compositing_node_group = tree
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        output = tree.nodes.new("NodeGroupOutput")
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        tree.nodes.clear()
+        output = tree.nodes.new("CompositorNodeComposite")
+    photo, layers = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
+    photo.image = scene.camera.data.background_images[0].image
+    over = tree.nodes.new("CompositorNodeAlphaOver")
+    pictures = [socket for socket in over.inputs if socket.type == "RGBA"]  # background, foreground
+    tree.links.new(photo.outputs["Image"], pictures[0])
+    tree.links.new(layers.outputs["Image"], pictures[1])
+    tree.links.new(over.outputs["Image"], output.inputs["Image"])
+    for column, node in enumerate((photo, layers, over, output)):
+        node.location = (300 * column, 0)
+
+
+if __name__ == "__main__":
+    main()

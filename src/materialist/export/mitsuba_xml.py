@@ -1,0 +1,103 @@
+"""Mitsuba 3 scene: `scene.xml`, binary PLY meshes and float32 EXR maps, for `mi.load_file` or the `mitsuba` program.
+
+The material is Mitsuba's own `principled` by default. With `mi.load_file(..., bsdf="materialist_disney")`, after
+`materialist.render.variant.setup()`, it is the paper's, and the picture this program's but for noise.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from materialist.export.parts import Part
+from materialist.io.exr import write_exr
+from materialist.render.envmap import on_mitsuba_grid
+from materialist.render.scene import MAX_DEPTH
+from materialist.types import Array, Camera, Materials, Mesh, Scene
+
+DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH), "bsdf": "principled"}
+"""Parameters of the file and their values: `mi.load_file(path, spp=256)` sets another."""
+
+
+def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
+    """Fill an empty folder with `scene.xml` and what it refers to, all by relative names."""
+    root = ET.Element("scene", version="3.0.0")
+    for name, value in DEFAULTS.items():
+        ET.SubElement(root, "default", name=name, value=value)
+    _value(root, "boolean", "embree_use_robust_intersections", "true")
+    _value(_node(root, "integrator", "path"), "integer", "max_depth", "$max_depth")
+    _sensor(root, scene.camera)
+    # The light on Mitsuba's own grid, whose rows run from pole to pole; its columns are padded on loading.
+    write_exr(folder / "envmap_mitsuba.exr", on_mitsuba_grid(scene.envmap, np)[:, 1:-1])
+    light = _node(root, "emitter", "envmap")
+    _value(light, "string", "filename", "envmap_mitsuba.exr")
+    ET.SubElement(_transform(light), "rotate", y="1", angle="180")
+    for part in parts:
+        (folder / f"{part.name}.ply").write_bytes(_ply(part.mesh))
+        shape = _node(root, "shape", "ply")
+        _value(shape, "string", "filename", f"{part.name}.ply")
+        _material(folder, shape, part)
+    ET.indent(root)
+    ET.ElementTree(root).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
+
+
+def _sensor(root: ET.Element, camera: Camera) -> None:
+    sensor = _node(root, "sensor", "perspective")
+    _value(sensor, "float", "fov", repr(camera.fov))
+    _value(sensor, "string", "fov_axis", "x")
+    _value(sensor, "float", "near_clip", "1e-4")
+    _value(sensor, "float", "far_clip", "1e7")
+    ET.SubElement(_transform(sensor), "lookat", origin="0, 0, 0", target="0, 0, -1", up="0, 1, 0")
+    _value(_node(sensor, "sampler", "multijitter"), "integer", "sample_count", "$spp")
+    film = _node(sensor, "film", "hdrfilm")
+    _value(film, "integer", "width", str(camera.width))
+    _value(film, "integer", "height", str(camera.height))
+    _value(film, "string", "pixel_format", "rgb")
+    _value(film, "string", "component_format", "float32")
+    _node(film, "rfilter", "box")
+
+
+def _material(folder: Path, shape: ET.Element, part: Part) -> None:
+    """Both sides shade alike; the three textures have the same names in `principled` and in `materialist_disney`."""
+    bsdf = _node(_node(shape, "bsdf", "twosided"), "bsdf", "$bsdf")
+    names = {"base_color": "albedo", "roughness": "roughness", "metallic": "metallic"}
+    for name, key in names.items():
+        file = f"{part.name}_{key}.exr"
+        write_exr(folder / file, _at_least_2x2(part.materials, key))
+        texture = _node(bsdf, "texture", "bitmap", name=name)
+        _value(texture, "string", "filename", file)
+        _value(texture, "boolean", "raw", "true")
+        _value(texture, "string", "filter_type", "nearest")
+        _value(texture, "string", "wrap_mode", "clamp")
+
+
+def _at_least_2x2(materials: Materials, key: str) -> Array:
+    """A map [H, W] or [H, W, 3]; a constant is repeated, since Mitsuba takes no texture below 2 x 2."""
+    values = getattr(materials, key)
+    return np.repeat(np.repeat(values, 2, 0), 2, 1) if values.shape[:2] == (1, 1) else values
+
+
+def _ply(mesh: Mesh) -> bytes:
+    """Binary PLY without the face attributes of the scene package, which Mitsuba warns about; its v is ours, DOWN."""
+    columns = "x y z nx ny nz u v".split()
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
+    header += [f"property float {name}" for name in columns]
+    header += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
+    vertices = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], 1).astype("<f4")  # [V, 8]
+    faces = np.empty(len(mesh.faces), [("count", "u1"), ("indices", "<i4", 3)])
+    faces["count"], faces["indices"] = 3, mesh.faces
+    return "\n".join(header).encode() + vertices.tobytes() + faces.tobytes()
+
+
+def _node(parent: ET.Element, kind: str, plugin: str, **attributes: str) -> ET.Element:
+    return ET.SubElement(parent, kind, {"type": plugin, **attributes})
+
+
+def _value(parent: ET.Element, kind: str, name: str, value: str) -> None:
+    ET.SubElement(parent, kind, name=name, value=value)
+
+
+def _transform(parent: ET.Element) -> ET.Element:
+    return ET.SubElement(parent, "transform", name="to_world")

@@ -1,0 +1,50 @@
+"""A small scene that no mirroring or transposing leaves alone: a room's corner with a box, each part in a colour."""
+
+from functools import cache
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.geometry.build import build_geometry
+from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
+
+
+@cache
+def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str = "planes") -> Scene:
+    """Floor, back wall, a box to the left, sky in the upper right corner; light from the right."""
+    camera = Camera(width, height, fov)
+    rays = pixel_rays(camera)
+    x, y = rays[..., 0], rays[..., 1]
+    floor = np.where(y < -0.02, 1.0 / np.maximum(-y, 1e-3), 1e6)  # [H, W] the plane y = -1
+    depth = np.minimum(floor, 6.0).astype(np.float32)
+    normal = np.where((floor < 6)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
+    label = np.where(floor < 6, 1, 0)
+    box = (np.abs(x + 0.2) < 0.1) & (np.abs(y + 0.1) < 0.12)
+    depth[box], normal[box], label[box] = 3.0, (0, 0, 1), 2
+    depth[: height // 8, -width // 6 :] = 0
+    albedo = np.array([(0.6, 0.5, 0.2), (0.2, 0.5, 0.7), (0.8, 0.1, 0.1)], np.float32)[label]
+    checks = (np.indices((height, width)) // 4).sum(0) % 2
+    albedo = (albedo * (0.7 + 0.3 * checks[..., None])).astype(np.float32)
+    roughness = np.linspace(0.3, 0.9, width, dtype=np.float32)[None].repeat(height, 0)
+    metallic = np.where(label == 2, 0.8, 0.1).astype(np.float32)
+    materials = Materials(albedo, roughness, metallic)
+    photo = Photo(albedo * 0.8, camera, albedo * 0.8, path='<b>ro"om</b>.png')
+    report = FitReport(
+        ({"name": "light", "steps": 3, "seconds": 0.5},),
+        {"rerender_psnr_path": 31.25, "poor_fraction": float("nan")},
+        ("too </script> dark",),
+    )
+    return Scene(
+        camera, photo, Prediction(materials, normal, depth, "made"), materials, normal, depth,
+        build_geometry(depth, normal, camera, completion=completion), sky(), photo.linear * 0.9, report,
+        {"tau": 6.0, "seed": 0},
+    )  # fmt: skip
+
+
+def sky(height: int = 16) -> np.ndarray:
+    """[h, 2h, 3] light, bright and reddish to the right and above, bluish behind."""
+    rows, columns = np.indices((height, 2 * height))
+    up, around = np.cos(np.pi * (rows + 0.5) / height), np.pi * ((columns + 0.5) / height - 1)
+    right, ahead = np.sin(around), np.cos(around)
+    red = 0.6 + 1.5 * np.clip(right, 0, 1) * (1 + up)
+    return np.stack([red, 0.5 + 0.5 * np.clip(up, 0, 1) + 0 * right, 0.7 + np.clip(-ahead, 0, 1)], -1).astype(np.float32)
