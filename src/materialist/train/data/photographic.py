@@ -114,5 +114,5 @@ def _compressed(encoded: Array, rng: np.random.Generator) -> Array:
     if rng.random() < 0.75:
         quality = int(rng.uniform(55, 98) if rng.random() < 0.5 else rng.uniform(85, 100))
         _, packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-        pixels = cv2.imdecode(packed, cv2.IMREAD_COLOR)[..., ::-1]
+        return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.float32)[..., ::-1] / 255
     return pixels.astype(np.float32) / 255

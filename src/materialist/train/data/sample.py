@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,12 @@ PROBE = 4
 """Label rays a pixel and axis."""
 ATTEMPTS = 6
 """Cameras that see too little are thrown away at most that often."""
-_KINDS = ((rooms.room, 0.45), (rooms.table_top, 0.17), (outdoors.still_life, 0.15), (outdoors.outdoor, 0.23))
+_KINDS: tuple[tuple[Callable[..., World], float], ...] = (
+    (rooms.room, 0.45),
+    (rooms.table_top, 0.17),
+    (outdoors.still_life, 0.15),
+    (outdoors.outdoor, 0.23),
+)
 
 
 @dataclass(frozen=True)

@@ -104,9 +104,9 @@ class Surfaces:
         column = mi.UInt32(mi.Int32(dr.floor((s - dr.floor(s)) * side + texel.x - 0.5)) + side) % side
         line = mi.UInt32(mi.Int32(dr.floor((t - dr.floor(t)) * side + texel.y - 0.5)) + side) % side
         word = dr.gather(mi.UInt32, self.bank, (mi.UInt32(r[5].w) * side + line) * side + column, hit.valid)
-        f = [mi.Float((word >> (8 * k)) & 255) / 255 for k in range(4)]
-        colours = [mi.Color3f(v.x, v.y, v.z) for v in r[:3]]
-        albedo = dr.lerp(dr.lerp(colours[0], colours[1], f[0]), colours[2], f[1])
+        f: list[Any] = [mi.Float((word >> (8 * k)) & 255) / 255 for k in range(4)]
+        colours: list[Any] = [mi.Color3f(v.x, v.y, v.z) for v in r[:3]]
+        albedo: Any = dr.lerp(dr.lerp(colours[0], colours[1], f[0]), colours[2], f[1])
         albedo = dr.clip(albedo * dr.exp(r[2].w * (f[2] - 0.5)), *_ALBEDO_RANGE)
         roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _LEAST_ROUGHNESS, 1)
         metallic = dr.lerp(r[3].x, r[3].y, f[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from materialist.bench.shapes import Solid, lathe
 from materialist.types import Array
@@ -13,7 +14,7 @@ _AXES = ((0, 2, 1), (1, 0, 2), (2, 0, 1))
 """Normal axis, axis of u, axis of v of each pair of sides, so that v is the vertical of upright sides."""
 
 
-def slab(size: Array, radius: float = 0.0) -> Solid:
+def slab(size: ArrayLike, radius: float = 0.0) -> Solid:
     """Box of extent `size` [3] standing on y = 0 with edges rounded by `radius`; texture coordinates in metres."""
     half = np.asarray(size, float) / 2
     radius = float(min(radius, 0.95 * half.min()))
@@ -38,7 +39,7 @@ def _side(half: Array, radius: float, arc: Array, axis: int, u: int, v: int, sig
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     place = inner + radius * normal
     handed = np.linalg.det(np.stack([np.eye(3)[u], np.eye(3)[v], np.eye(3)[axis] * sign]))
-    faces = _grid_faces(*a.shape, flip=handed < 0)
+    faces = _grid_faces(len(a), a.shape[1], flip=handed < 0)
     uv = np.stack([a, b], -1).reshape(-1, 2)
     return Solid(place.reshape(-1, 3), faces, normal.reshape(-1, 3), uv)
 
@@ -58,7 +59,7 @@ def _grid_faces(n: int, m: int, flip: bool = False) -> Array:
     return (faces[:, ::-1] if flip else faces).astype(np.int32)
 
 
-def sheet(origin: Array, right: Array, up: Array, n: int = 1) -> Solid:
+def sheet(origin: ArrayLike, right: Array, up: Array, n: int = 1) -> Solid:
     """Rectangle from `origin` along `right` and `up` (all [3], metres), facing right x up, in n x n pieces."""
     t = np.linspace(0, 1, n + 1)
     a, b = np.meshgrid(t, t, indexing="ij")
@@ -103,7 +104,7 @@ def ball(n: int = 48) -> Solid:
     return replace(sphere, uv=sphere.uv * [np.pi, np.pi])
 
 
-def blob(rng: np.random.Generator, size: Array, roughness: float, n: int = 48) -> Solid:
+def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 48) -> Solid:
     """Smooth lumpy body of about extent `size` [3] standing on y = 0: stones, fruit, bread, bushes."""
     bump, fine = lumps(rng, roughness, 0.35), lumps(rng, roughness * 0.35, 1.2)
     half = np.asarray(size, float) / 2
@@ -139,10 +140,10 @@ def metric(solid: Solid, width: float, height: float) -> Solid:
     return replace(solid, uv=solid.uv * [width, height])
 
 
-def tube(points: Array, radius: Array | float, n: int = 8) -> Solid:
+def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     """Round tube along points [P, 3] with one radius or [P] radii; open ends."""
-    points = np.asarray(points, float)
-    along = np.gradient(points, axis=0)
+    line = np.asarray(points, float)
+    along = np.gradient(line, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
     helper = np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
     side = np.cross(along, helper)
@@ -150,10 +151,10 @@ def tube(points: Array, radius: Array | float, n: int = 8) -> Solid:
     other = np.cross(along, side)
     phi = np.linspace(0, 2 * np.pi, n + 1)[None, :, None]
     normal = np.cos(phi) * side[:, None] + np.sin(phi) * other[:, None]
-    radius = np.broadcast_to(radius, len(points)).astype(float)
-    vertices = points[:, None] + radius[:, None, None] * normal
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=-1))])
-    uv = np.stack(np.broadcast_arrays(phi[..., 0] * radius.mean(), length[:, None]), -1)
+    width = np.broadcast_to(np.asarray(radius, float), len(line))
+    vertices = line[:, None] + width[:, None, None] * normal
+    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
+    uv = np.stack(np.broadcast_arrays(phi[..., 0] * width.mean(), length[:, None]), -1)
     faces = _grid_faces(*vertices.shape[:2])
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
@@ -167,7 +168,7 @@ def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: fl
     size = (length * rng.uniform(0.6, 1.2, n))[:, None]
     rows = []
     for t, w in ((0.0, 0.1), (0.35, 1.0), (0.7, 0.8), (1.0, 0.05)):
-        spine = roots + directions * size * t + [0, -1, 0] * size * 0.35 * t * t
+        spine = roots + directions * size * t + np.array([0, -1, 0]) * size * 0.35 * t * t
         rows += [spine - side * width / 2 * w * size / length, spine + side * width / 2 * w * size / length]
     vertices = np.stack(rows, 1)  # [N, 8, 3]
     one = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
@@ -188,7 +189,9 @@ def joined(parts: list[Solid]) -> Solid:
     )
 
 
-def moved(solid: Solid, at: Array = (0.0, 0.0, 0.0), turn: float = 0.0, tip: float = 0.0, scale: float = 1.0) -> Solid:
+def moved(
+    solid: Solid, at: ArrayLike = (0.0, 0.0, 0.0), turn: float = 0.0, tip: float = 0.0, scale: float = 1.0
+) -> Solid:
     """The solid scaled, tipped about X, turned about Y (radians) and moved by `at` [3]."""
     c, s, ct, st = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, ct, -st], [0, st, ct]])

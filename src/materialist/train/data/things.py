@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from materialist.bench import shapes
 from materialist.bench.shapes import Solid
@@ -258,7 +259,7 @@ _SHARES = np.array([share for _, share in _TABLE]) / sum(share for _, share in _
 device, box = _device, _box
 
 
-def placed(parts: Parts, at, turn: float = 0.0) -> Parts:
+def placed(parts: Parts, at: ArrayLike, turn: float = 0.0) -> Parts:
     """The parts turned about Y and moved by `at` [3]."""
     return [Part(s.moved(p.solid, at, turn), p.material) for p in parts]
 

@@ -22,7 +22,8 @@ VARIANTS = 6
 @lru_cache(maxsize=1)
 def bank() -> tuple[Array, dict[str, range]]:
     """([N, SIZE, SIZE, 4] uint8 tiles, kind -> the numbers of its tiles); the same in every process."""
-    tiles, where = [], {}
+    tiles: list[Array] = []
+    where: dict[str, range] = {}
     for k, (kind, make) in enumerate(_KINDS.items()):
         where[kind] = range(len(tiles), len(tiles) + VARIANTS)
         for v in range(VARIANTS):
