@@ -47,4 +47,5 @@ def sky(height: int = 16) -> np.ndarray:
     up, around = np.cos(np.pi * (rows + 0.5) / height), np.pi * ((columns + 0.5) / height - 1)
     right, ahead = np.sin(around), np.cos(around)
     red = 0.6 + 1.5 * np.clip(right, 0, 1) * (1 + up)
-    return np.stack([red, 0.5 + 0.5 * np.clip(up, 0, 1) + 0 * right, 0.7 + np.clip(-ahead, 0, 1)], -1).astype(np.float32)
+    green, blue = 0.5 + 0.5 * np.clip(up, 0, 1), 0.7 + np.clip(-ahead, 0, 1)
+    return np.stack([red, green, blue], -1).astype(np.float32)

@@ -86,7 +86,7 @@ def _constants(part: Part) -> dict | None:
 
 
 def _find_blender(named: str | None) -> list[str] | None:
-    """The start of a command that runs a script in Blender, or None. Raises SetupError for a name that is no program."""
+    """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
     if named is not None:
         found = shutil.which(named)
         if found is None:

@@ -69,7 +69,7 @@ def add_meshes(scene, facts) -> None:
 
 
 def material(name, constants):
-    """Principled material of a part: from its maps, or with `constants` (albedo, roughness, metallic) where it has any."""
+    """Principled material of a part: from its maps, or with `constants` (albedo, roughness, metallic) if it has any."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
@@ -83,7 +83,9 @@ def material(name, constants):
         surface.inputs["Roughness"].default_value = constants["roughness"]
         surface.inputs["Metallic"].default_value = constants["metallic"]
         return made
-    for row, (slot, file) in enumerate((("Base Color", "albedo"), ("Metallic", "metallic"), ("Roughness", "roughness"))):
+    for row, (slot, file) in enumerate(
+        (("Base Color", "albedo"), ("Metallic", "metallic"), ("Roughness", "roughness"))
+    ):
         texture = nodes.new("ShaderNodeTexImage")
         texture.location = (-400, 300 - 300 * row)
         texture.image = image(f"{file}.exr", "Linear Rec.709" if file == "albedo" else "Non-Color")

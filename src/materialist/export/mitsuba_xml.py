@@ -81,7 +81,7 @@ def _at_least_2x2(materials: Materials, key: str) -> Array:
 
 def _ply(mesh: Mesh) -> bytes:
     """Binary PLY without the face attributes of the scene package, which Mitsuba warns about; its v is ours, DOWN."""
-    columns = "x y z nx ny nz u v".split()
+    columns = ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
     header += [f"property float {name}" for name in columns]
     header += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
