@@ -103,6 +103,18 @@ class Geometry:
 
 
 @dataclass(frozen=True)
+class Lamp:
+    """A small glowing sphere that somebody put into the scene."""
+
+    position: tuple[float, float, float]
+    """Centre, camera frame, scene units."""
+    power: tuple[float, float, float]
+    """Radiant flux in R, G, B: radiance of the photo x scene units squared x steradian."""
+    radius: float
+    """Scene units, > 0."""
+
+
+@dataclass(frozen=True)
 class FitReport:
     """What happened, stage by stage, and how good the result is; the content of report.json."""
 
@@ -133,3 +145,5 @@ class Scene:
     report: FitReport = FitReport()
     provenance: dict[str, Any] = field(default_factory=dict)
     """Tool version, predictor, weights hash, options, seed."""
+    lamps: tuple[Lamp, ...] = ()
+    """Lights beside the environment map; a photograph has none until somebody adds one."""

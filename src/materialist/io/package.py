@@ -18,7 +18,7 @@ from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.io.ply import read_ply, write_ply
 from materialist.io.target import MARKER, interrupted_replacement, whole_folder
-from materialist.types import Array, Camera, FitReport, Geometry, Materials, Photo, Prediction, Scene
+from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 
 FORMAT = "materialist-scene"
 VERSION = 1
@@ -65,6 +65,7 @@ def load_scene(path: str | Path) -> Scene:
             rerender=_exr(folder / "rerender.exr", (*shape, 3)),
             report=_report_from_json(_read_json(folder / "report.json")),
             provenance=meta["provenance"],
+            lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
         )
     except (KeyError, TypeError) as error:
         raise SceneError(f"{folder / MARKER} is incomplete ({error}); save the scene again.") from error
@@ -118,7 +119,13 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "sources": scene.prior.sources,
         },
         "provenance": scene.provenance,
+        **({"lamps": [asdict(lamp) for lamp in scene.lamps]} if scene.lamps else {}),
     }
+
+
+def _lamp(entry: dict[str, Any]) -> Lamp:
+    """A lamp of scene.json; its lists become tuples."""
+    return Lamp(tuple(entry["position"]), tuple(entry["power"]), entry["radius"])
 
 
 def _write_original(photo: Photo, folder: Path) -> str:

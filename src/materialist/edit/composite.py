@@ -1,0 +1,97 @@
+"""The edit brought back into the photograph: everything it does not reach stays as it was taken."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.edit.layers import Layers, denoised, render_layers
+from materialist.edit.lights import Studio
+from materialist.edit.upsample import GuidedUpsample, matte, strips
+from materialist.types import Array, Photo, Scene
+
+FLOOR = 0.02
+"""Radiance added to both sides of edited / base: below it a ratio says nothing."""
+MOST = 1.0
+"""Largest factor on what the photo has and the fit has not."""
+
+
+def composite(
+    scene: Scene,
+    edited: Scene,
+    *,
+    spp: int = 256,
+    seed: int = 0,
+    full_render: bool = False,
+    denoise: bool = True,
+    device: str = "auto",
+    progress=None,
+) -> Array:
+    """The photograph with the edit in it.
+
+    Args:
+        scene: the fitted scene; its photo is what stays.
+        edited: the same scene after `edit`, `relight`, ...
+        spp: paths per pixel, of each of the two renderings.
+        full_render: the plain rendering of the edited scene at working size, as in the paper, and no photo.
+        denoise: clean the renderings before they are compared (where the denoiser is installed).
+
+    Returns:
+        [H0, W0, 3] float32 linear, at the photo's native size; bit for bit the photo's own values where the edit does
+        not reach, everywhere if it changes nothing. HDR photos stay HDR. With `full_render` [H, W, 3].
+    """
+    studio = Studio(scene, device=device)
+    if full_render:
+        return plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+    layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
+    return into_photo(scene.photo, layers)
+
+
+def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
+    """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo."""
+    picture = studio.twins(edited)[1](spp, seed)
+    guides = (studio.scene.materials.albedo, edited.materials.albedo, edited.normal)
+    return denoised(picture, picture, guides)[1] if denoise else picture
+
+
+def into_photo(photo: Photo, layers: Layers) -> Array:
+    """[H0, W0, 3] the photo with the difference of two renderings added (see docs/editing.md for the formula).
+
+    out = edited + t (photo - base): what the photo has beyond the fit, its fine texture, its grain, the fit's error,
+    is kept with the factor t = edited / base (per channel, at most MOST), as a texture is under other light. At the
+    border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
+    """
+    out = photo.original.copy()
+    if not layers.reached.any():
+        return out
+    factor = np.clip((layers.edited + FLOOR) / (layers.base + FLOOR), 0, MOST)
+    stack = np.concatenate([layers.edited - layers.base, factor - 1, layers.base], -1)  # [H, W, 9]
+    stack[~layers.reached, :6] = 0
+    upsample = GuidedUpsample(photo.linear, photo.original)
+    alpha = matte(layers.changed, photo.original)
+    for rows in strips(out.shape[0]):
+        share = alpha[rows][..., None]
+        large = share * upsample(stack, layers.changed, rows) + (1 - share) * upsample(stack, ~layers.changed, rows)
+        change, excess, base = large[..., :3], large[..., 3:6], large[..., 6:]
+        held = out[rows] if photo.hdr else _unclipped(out[rows], base)
+        moved = np.maximum(held + change + excess * (held - base), 0)
+        out[rows] = np.where((change != 0).any(-1, keepdims=True), moved, out[rows])
+    return out
+
+
+def developed(scene: Scene, edited: Scene, picture: Array) -> Scene:
+    """The edited scene as a scene of its own, whose photo is the composite [H0, W0, 3]: edits of it start there."""
+    from dataclasses import replace
+
+    import cv2
+
+    camera = scene.camera
+    size = (camera.width, camera.height)
+    same = picture.shape[:2] == size[::-1]
+    linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    photo = replace(scene.photo, linear=linear.astype(np.float32), original=picture, source=None)
+    return replace(edited, photo=photo)
+
+
+def _unclipped(photo: Array, base: Array) -> Array:
+    """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
+    return np.where(photo >= 0.995, np.maximum(photo, base), photo)

@@ -1,0 +1,122 @@
+"""The base and the edited picture, rendered with the same random numbers, and what truly differs between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.types import Array, Scene
+
+Render = Callable[[int, int], Array]
+"""render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Two renderings at working size and their cleaned difference."""
+
+    base: Array
+    """[H, W, 3] float32 linear: the fitted scene."""
+    edited: Array
+    """[H, W, 3] float32 linear: the edited scene; exactly `base` where the edit does not reach."""
+    reached: Array
+    """[H, W] bool: pixels that the edit changes by more than the noise."""
+    changed: Array
+    """[H, W] bool: pixels whose own surface, or what stands there, the edit replaced; part of `reached`."""
+    raw: Array
+    """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
+
+
+def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None) -> Layers:
+    """Render a fitted scene (`lights.Studio`) and an edit of it, and separate the edit from the noise.
+
+    `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
+    noise. See `difference`.
+    """
+    scene = studio.scene
+    base, other = studio.twins(edited)
+    changed = changed_pixels(scene, edited)
+    guides = (scene.materials.albedo, edited.materials.albedo, scene.normal)
+    return difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
+
+
+def changed_pixels(scene: Scene, edited: Scene) -> Array:
+    """[H, W] bool: where the maps of the two scenes differ; everywhere under another light."""
+    if not np.array_equal(scene.envmap, edited.envmap) or scene.lamps != edited.lamps:
+        return np.ones(scene.depth.shape, bool)
+    a, b = scene.materials, edited.materials
+    changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
+    return changed & (scene.depth > 0)
+
+
+def difference(
+    base: Render, edited: Render, changed: Array, guides: tuple[Array, Array, Array], *, spp: int, seed: int,
+    clean: bool = True, progress=None,
+) -> Layers:  # fmt: skip
+    """Layers of any two renderings of one view.
+
+    Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
+    the difference counts where its mean over a neighbourhood stands out from what two half renderings disagree on
+    (a shrinkage by the estimated noise, as of Wiener), and is exactly zero where no path differs.
+
+    Args:
+        changed: [H, W] bool: pixels that the edit replaces.
+        guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3].
+        clean: denoise both pictures before they are compared, where the denoiser is installed.
+    """
+    if spp < 2:
+        raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
+    tick = progress or (lambda *_: None)
+    halves: list[list[Array]] = []
+    for k in range(2):
+        pair = []
+        for j, render in enumerate((base, edited)):
+            tick("render", 2 * k + j, 4)
+            pair.append(render(-(-spp // 2), 2 * seed + k))
+        halves.append(pair)
+    tick("render", 4, 4)
+    (b0, e0), (b1, e1) = halves
+    b, e = (b0 + b1) / 2, (e0 + e1) / 2
+    differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
+    raw = e
+    if not differs.any():
+        return Layers(b, b, differs, changed & differs, raw)
+    gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
+    if clean:
+        b, e = denoised(b, e, guides)
+    reached = differs & (gain > 0)
+    e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
+    return Layers(b, e, reached, changed & reached, raw)
+
+
+def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) -> Array:
+    """[H, W] in [0, 1]: how far the mean of a difference over a window stands out from its noise.
+
+    d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
+    window and s its standard error, from (d0 - d1) / 2, the gain is max(0, 1 - (sigmas s / m)^2), the positive part
+    of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise.
+    """
+    import cv2
+
+    mean, half = ((d0 + d1) / 2).sum(-1), ((d0 - d1) / 2).sum(-1)  # summed over RGB, where a change is seen first
+    box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (window, window), borderType=cv2.BORDER_REFLECT)  # noqa: E731
+    m, variance = box(mean), box(half**2) / window**2
+    gain = 1 - sigmas**2 * variance / np.maximum(m**2, 1e-30)
+    return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
+
+
+def denoised(base: Array, edited: Array, guides: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    """Both pictures without noise; as they are where the denoiser is not installed."""
+    from materialist.errors import SetupError
+    from materialist.render.denoise import denoise
+
+    try:
+        return (
+            denoise(base, albedo=guides[0], normal=guides[2]),
+            denoise(edited, albedo=guides[1], normal=guides[2]),
+        )
+    except SetupError:
+        return base, edited

@@ -1,0 +1,129 @@
+"""Rendering of an edited scene beside the fitted one, and lamps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from materialist.edit.layers import Render
+from materialist.errors import InputError
+from materialist.types import Array, Lamp, Scene
+
+PATHS_PER_RAY = 3
+"""Paths that `RenderScene.render` follows from one camera ray (see render.split)."""
+
+
+class Studio:
+    """Renderings of one fitted scene and of its edits, always with the same random numbers on both sides.
+
+    What is alike is built once: scenes of one geometry and lamps share a Mitsuba scene, and a base picture that was
+    rendered before is not rendered again.
+    """
+
+    def __init__(self, scene: Scene, *, device: str = "auto"):
+        self.scene, self.device = scene, device
+        self._built: list[tuple[Scene, Any]] = []
+        self._base: dict[tuple[bool, int, int], Array] = {}
+
+    def twins(self, edited: Scene) -> tuple[Render, Render]:
+        """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
+
+        The splitting tracer serves smooth light; with lamps or a peaked light on either side both go to Mitsuba's
+        path tracer, which aims at the lights.
+        """
+        by_path = any(_needs_path(s) for s in (self.scene, edited))
+
+        def base(spp: int, seed: int) -> Array:
+            key = (by_path, spp, seed)
+            if key not in self._base:
+                self._base[key] = self._render(self.scene, by_path, spp, seed)
+            return self._base[key]
+
+        return base, lambda spp, seed: self._render(edited, by_path, spp, seed)
+
+    def _render(self, scene: Scene, by_path: bool, spp: int, seed: int) -> Array:
+        target = self._target(scene)
+        target.set_materials(scene.materials)
+        target.set_envmap(scene.envmap)
+        if by_path:
+            return target.render_path(spp=spp, seed=seed)
+        return target.render(spp=-(-spp // PATHS_PER_RAY), seed=seed)
+
+    def _target(self, scene: Scene):
+        for other, target in self._built:
+            if other.geometry is scene.geometry and other.lamps == scene.lamps:
+                return target
+        target = _built(scene, self.device)
+        # The base, and the last edit of another shape: a moving lamp must not fill the memory.
+        self._built = [*self._built[:1], (scene, target)]
+        return target
+
+
+def _needs_path(scene: Scene) -> bool:
+    from materialist.render.envmap import is_peaked
+
+    return bool(scene.lamps) or is_peaked(scene.envmap)
+
+
+def _built(scene: Scene, device: str):
+    from materialist.render.scene import RenderScene
+
+    target = RenderScene(scene.geometry, scene.camera, device=device)
+    if scene.lamps:
+        add_lamps(target, scene.lamps)
+    return target
+
+
+def add_lamps(target, lamps: tuple[Lamp, ...]) -> None:
+    """Put lamps into a `RenderScene`: small glowing spheres, which the path tracer aims at."""
+    mi = target.mi
+    shapes = {f"lamp{k}": _sphere(mi, lamp) for k, lamp in enumerate(lamps)}
+    shapes |= {name: shape for name, shape in _parts(target.mi_scene).items()}
+    target.mi_scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **shapes})
+    target.params = mi.traverse(target.mi_scene)
+    target.params.keep([k for k in list(target.params.keys()) if k == "light.data" or ".bsdf." in k])
+
+
+def _parts(scene) -> dict:
+    """The sensor, environment and shapes of a Mitsuba scene under names of their own."""
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    return {"sensor": scene.sensors()[0], "light": scene.environment(), **shapes}
+
+
+def _sphere(mi, lamp: Lamp) -> dict:
+    """A sphere whose radiant flux is the lamp's: its radiance L = power / (4 pi^2 r^2)."""
+    radiance = np.asarray(lamp.power, np.float64) / (4 * np.pi**2 * lamp.radius**2)
+    return {
+        "type": "sphere", "center": [float(v) for v in lamp.position], "radius": float(lamp.radius),
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [float(v) for v in radiance]}},
+    }  # fmt: skip
+
+
+def kelvin_colour(kelvin: float) -> Array:
+    """[3] linear Rec.709 of a black body of that temperature, with luminance 1 and no channel below 0.
+
+    Chromaticity by the cubic fits of Kim et al. (2002). Raises InputError outside 1667 to 25000 K.
+    """
+    from materialist.color import LUMINANCE
+
+    if not 1667 <= kelvin <= 25000:
+        raise InputError(f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000.")
+    t = 1000.0 / kelvin
+    if kelvin < 4000:
+        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
+    else:
+        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
+    if kelvin < 2222:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif kelvin < 4000:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    xyz = np.array([x / y, 1.0, (1 - x - y) / y])
+    to_rgb = np.array(
+        [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+    )
+    rgb = np.maximum(to_rgb @ xyz, 0)
+    return (rgb / (LUMINANCE @ rgb)).astype(np.float32)

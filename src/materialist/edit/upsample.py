@@ -1,0 +1,116 @@
+"""Layers of working size brought to the photo's native size along the photo's own edges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.types import Array
+
+STRIP = 256
+"""Native rows handled at a time: bounds the memory."""
+_RANGE = 0.06
+"""Standard deviation of the colour weight, sRGB-encoded values: about a just visible step in a picture."""
+_RADIUS = 0.8
+"""Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
+
+
+def strips(height: int) -> Iterator[slice]:
+    """Slices of at most STRIP rows that cover `height` rows."""
+    return (slice(top, min(top + STRIP, height)) for top in range(0, height, STRIP))
+
+
+class GuidedUpsample:
+    """Joint bilateral upsampling (Kopf et al. 2007), a strip of native rows at a time.
+
+    Each native pixel takes the mean of the 4 x 4 working pixels around it, weighted by distance and by how alike the
+    photo looks there at working size and here at native size.
+
+    Args:
+        small: [H, W, 3] linear photo at working size.
+        large: [H0, W0, 3] the same at native size.
+    """
+
+    def __init__(self, small: Array, large: Array):
+        self.guide, self.large = linear_to_srgb(small), large
+        self.same = small.shape == large.shape
+
+    def __call__(self, layer: Array, members: Array, rows: slice) -> Array:
+        """[h, W0, C] float32: `layer` [H, W, C] in the native rows, from the working pixels `members` [H, W] bool.
+
+        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value.
+        """
+        if self.same and members.all():
+            return layer[rows].astype(np.float32)
+        here = linear_to_srgb(self.large[rows])  # [h, W0, 3]
+        native, working = self.large.shape[:2], members.shape
+        y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0])
+        x0, xs = _taps(np.arange(native[1]), native[1], working[1])
+        total = np.zeros((*here.shape[:2], layer.shape[2]), np.float32)
+        if not members[y0.min() : y0.max() + 1].any():
+            return total
+        norm = np.zeros(here.shape[:2], np.float32)
+        for i in range(4):
+            for j in range(4):
+                y, x = y0[i][:, None], x0[j][None, :]
+                away = ((self.guide[y, x] - here) ** 2).sum(-1)
+                # The small constant keeps a mean of the neighbourhood where nothing there looks alike.
+                weight = (np.exp(-0.5 * away / _RANGE**2) + 1e-4) * ys[i][:, None] * xs[j][None, :] * members[y, x]
+                total += weight[..., None] * layer[y, x]
+                norm += weight
+        total /= np.maximum(norm, 1e-20)[..., None]
+        if self.same:
+            total = np.where(members[rows][..., None], layer[rows], total)
+        return total.astype(np.float32)
+
+
+def matte(mask: Array, large: Array) -> Array:
+    """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
+
+    Within about two working pixels of the mask's border a native pixel lies somewhere between the colour of what is
+    well inside and well outside nearby; its place on the line between them is its share. Where both look the same,
+    the enlarged mask decides. Exactly 0 and 1 further away.
+    """
+    import cv2
+
+    height, width = large.shape[:2]
+    scale = max(height / mask.shape[0], width / mask.shape[1])
+    soft = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    if mask.all() or not mask.any():
+        return soft
+    reach = 2 * int(np.ceil(1.5 * scale)) + 1
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    inner, outer = cv2.erode(soft, kernel), cv2.dilate(soft, kernel)
+    sure_in, sure_out = (inner >= 0.999), (outer <= 0.001)
+    encoded = linear_to_srgb(large)
+    front, known_front = _mean_of(encoded, sure_in, 2.5 * scale)
+    back, known_back = _mean_of(encoded, sure_out, 2.5 * scale)
+    line = front - back
+    length = (line**2).sum(-1)
+    share = np.clip(((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6), 0, 1)
+    # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
+    trust = np.clip(length / 0.1**2, 0, 1) * known_front * known_back
+    alpha = soft + trust * (share - soft)
+    return np.where(sure_in, 1, np.where(sure_out, 0, alpha)).astype(np.float32)
+
+
+def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array]:
+    """[H0, W0, 3] Gaussian mean of the members nearby, and [H0, W0] whether there are any."""
+    import cv2
+
+    weight = members.astype(np.float32)
+    size = 2 * int(np.ceil(3 * sigma)) + 1
+    blur = lambda v: cv2.GaussianBlur(v, (size, size), sigma)  # noqa: E731
+    total, norm = blur(picture * weight[..., None]), blur(weight)
+    return total / np.maximum(norm, 1e-12)[..., None], norm > 1e-5
+
+
+def _taps(index: Array, native: int, working: int) -> tuple[Array, Array]:
+    """The four working positions [4, n] around native positions [n] of one axis, and their spatial weights [4, n]."""
+    place = (index + 0.5) * working / native - 0.5
+    base = np.floor(place).astype(np.int64)
+    taps = base[None] + np.arange(-1, 3)[:, None]
+    weights = np.exp(-0.5 * ((taps - place[None]) / _RADIUS) ** 2).astype(np.float32)
+    return np.clip(taps, 0, working - 1), weights
