@@ -28,7 +28,7 @@ def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str =
     roughness = np.linspace(0.3, 0.9, width, dtype=np.float32)[None].repeat(height, 0)
     metallic = np.where(label == 2, 0.8, 0.1).astype(np.float32)
     materials = Materials(albedo, roughness, metallic)
-    photo = Photo(albedo * 0.8, camera, albedo * 0.8, path='<b>ro"om</b>.png')
+    photo = Photo(albedo * 0.8, camera, albedo * 0.8, path='dir/<b>ro"om.png')
     report = FitReport(
         ({"name": "light", "steps": 3, "seconds": 0.5},),
         {"rerender_psnr_path": 31.25, "poor_fraction": float("nan")},

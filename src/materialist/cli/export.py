@@ -32,7 +32,7 @@ def export(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="OUT", help="NAME.glb, .blend, .usdz, .html; for blend, usd, mitsuba or a folder."
+            "-o", "--output", metavar="OUT", help="NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba)."
         ),
     ],
     to: Annotated[Format, typer.Option("--to", help="Format.")],
@@ -44,6 +44,9 @@ def export(
     ] = None,
     shadow_catcher: Annotated[
         bool, typer.Option("--shadow-catcher", help="blend: show the photo, with the scene to catch shadows on it.")
+    ] = False,
+    fitted_material: Annotated[
+        bool, typer.Option("--fitted-material", help="blend: the material model of the fit, not Blender's Principled.")
     ] = False,
     as_json: Json = False,
     force: Force = False,
@@ -65,6 +68,7 @@ def export(
             max_triangles=max_triangles,
             blender=blender,
             shadow_catcher=shadow_catcher,
+            fitted_material=fitted_material,
         )
     files = [str(done.path), *map(str, done.beside)]
     report_success(

@@ -26,17 +26,19 @@ _MINUTES = 20
 
 
 def export_blend(
-    path: Path, scene: Scene, parts: list[Part], force: bool, blender: str | None, shadow_catcher: bool
+    path: Path, scene: Scene, parts: list[Part], force: bool, *, blender: str | None, options: list[str]
 ) -> Exported:
     """PATH.blend with everything packed where Blender is found; else, or for a folder PATH, the script and its files.
 
+    Args:
+        blender: the program to use, None: look for one. options: of `build.py`.
+
     Raises SetupError when a Blender that was named, or was found, does not build the file.
     """
-    catcher = ["--shadow-catcher"] if shadow_catcher else []
     if path.suffix.lower() != ".blend":
         with whole_folder(path, force, format="blend") as folder:
             write_blender_assets(folder, scene, parts)
-        command = _command(["blender"], path / "build.py", path / "scene.blend", catcher)
+        command = _command(["blender"], path / "build.py", path / "scene.blend", options)
         return Exported(path, (), (f"Make the .blend with: {shlex.join(command)}",))
     ensure_free(path, force, folder=False)
     program = _find_blender(blender)
@@ -44,12 +46,12 @@ def export_blend(
         folder_path = path.with_suffix("")
         with whole_folder(folder_path, force, format="blend") as folder:
             write_blender_assets(folder, scene, parts)
-        command = _command(["blender"], folder_path / "build.py", path, catcher)
+        command = _command(["blender"], folder_path / "build.py", path, options)
         note = f"No Blender was found, so {folder_path} has a script; make {path} with: {shlex.join(command)}"
         return Exported(folder_path, (), (note,))
     with tempfile.TemporaryDirectory() as scratch, whole_files([path], force) as (result,):
         write_blender_assets(Path(scratch), scene, parts)
-        _run(_command(program, Path(scratch) / "build.py", result, catcher), result)
+        _run(_command(program, Path(scratch) / "build.py", result, options), result)
     return Exported(path)
 
 

@@ -4,7 +4,8 @@
     python build.py -- -o scene.blend        (with the module bpy: pip install bpy)
 
 Options: --shadow-catcher shows the photo, with the reconstruction catching the shadows and reflections of what you
-add; --render FILE.png or .exr renders the scene too, with --samples N.
+add; --fitted-material takes the model of the fit instead of Principled (Blender 4.3 or later); --render FILE.png or
+.exr renders the scene too, with --samples N.
 """
 
 import argparse
@@ -24,13 +25,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="build.py")
     parser.add_argument("-o", "--output", default=str(HERE / "scene.blend"))
     parser.add_argument("--shadow-catcher", action="store_true")
+    parser.add_argument("--fitted-material", action="store_true")
     parser.add_argument("--render")
     parser.add_argument("--samples", type=int, default=128)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     facts = json.loads((HERE / "scene.json").read_text("utf-8"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    add_meshes(scene, facts)
+    add_meshes(scene, facts, options.fitted_material)
     add_camera(scene, facts)
     add_light(scene)
     set_rendering(scene, options.samples)
@@ -47,7 +49,7 @@ def main() -> None:
         bpy.ops.render.render(write_still=True)
 
 
-def add_meshes(scene, facts) -> None:
+def add_meshes(scene, facts, additive) -> None:
     """The parts in a collection of their own. Our frame is +Y up and looks along -Z; Blender's is +Z up, along +Y."""
     collection = bpy.data.collections.new("Reconstruction")
     scene.collection.children.link(collection)
@@ -63,35 +65,77 @@ def add_meshes(scene, facts) -> None:
             mesh.uv_layers.new(name="UVMap").data.foreach_set("uv", uv.ravel())
             x, y, z = arrays[f"{name}_normals"].T
             mesh.normals_split_custom_set_from_vertices(np.stack([x, -z, y], 1))
-            mesh.materials.append(material(name, facts["parts"][name]))
+            mesh.materials.append(material(name, facts["parts"][name], additive))
             mesh.update()
             collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-def material(name, constants):
-    """Principled material of a part: from its maps, or with `constants` (albedo, roughness, metallic) if it has any."""
+def material(name, constants, additive):
+    """Material of a part: from its maps, or with `constants` (albedo, roughness, metallic) if it has any."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
     nodes.clear()
+    output = nodes.new("ShaderNodeOutputMaterial")
+    output.location = (600, 0)
+    result, slots = (add_lobes if additive else add_principled)(nodes, links)
+    links.new(result, output.inputs["Surface"])
+    for row, (key, sockets) in enumerate(slots.items()):
+        source = None if constants else add_texture(nodes, key, (-700, 300 - 300 * row))
+        for socket in sockets:
+            if source is not None:
+                links.new(source, socket)
+            else:
+                socket.default_value = (*constants[key], 1) if key == "albedo" else constants[key]
+    return made
+
+
+def add_principled(nodes, links):
+    """Blender's Principled BSDF: the output, and the inputs for each map."""
     surface = nodes.new("ShaderNodeBsdfPrincipled")
     surface.distribution = "GGX"
     surface.inputs["IOR"].default_value = 1.5
-    links.new(surface.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
-    if constants:
-        surface.inputs["Base Color"].default_value = (*constants["albedo"], 1)
-        surface.inputs["Roughness"].default_value = constants["roughness"]
-        surface.inputs["Metallic"].default_value = constants["metallic"]
-        return made
-    for row, (slot, file) in enumerate(
-        (("Base Color", "albedo"), ("Metallic", "metallic"), ("Roughness", "roughness"))
-    ):
-        texture = nodes.new("ShaderNodeTexImage")
-        texture.location = (-400, 300 - 300 * row)
-        texture.image = image(f"{file}.exr", "Linear Rec.709" if file == "albedo" else "Non-Color")
-        texture.interpolation, texture.extension = "Closest", "EXTEND"
-        links.new(texture.outputs["Color"], surface.inputs[slot])
-    return made
+    slots = {"albedo": "Base Color", "metallic": "Metallic", "roughness": "Roughness"}
+    return surface.outputs["BSDF"], {key: [surface.inputs[slot]] for key, slot in slots.items()}
+
+
+def add_lobes(nodes, links):
+    """The fitted model but for Disney's diffuse lobe: (1 - M) A / pi plus GGX with Schlick's C0 = 0.04 (1 - M) + M A.
+
+    Principled takes from the diffuse lobe what the specular one reflects, so it is darker, most of all at grazing
+    angles; the fit does not. The metallic node with a white edge tint is Schlick's formula.
+    """
+    both, diffuse = nodes.new("ShaderNodeAddShader"), nodes.new("ShaderNodeBsdfDiffuse")
+    specular = nodes.new("ShaderNodeBsdfMetallic")
+    specular.distribution, specular.fresnel_type = "GGX", "F82"
+    specular.inputs["Edge Tint"].default_value = (1, 1, 1, 1)
+    colours, shares = [], []
+    for lobe, slot, dielectric, metal in ((diffuse, "Color", None, 0.0), (specular, "Base Color", 0.04, None)):
+        mix = nodes.new("ShaderNodeMix")
+        mix.data_type = "RGBA"
+        factor = next(socket for socket in mix.inputs if socket.name == "Factor" and socket.type == "VALUE")
+        ends = [socket for socket in mix.inputs if socket.type == "RGBA"]  # at metallic 0, at metallic 1
+        for end, value in zip(ends, (dielectric, metal)):
+            if value is None:
+                colours.append(end)
+            else:
+                end.default_value = (value, value, value, 1)
+        shares.append(factor)
+        links.new(next(socket for socket in mix.outputs if socket.type == "RGBA"), lobe.inputs[slot])
+        mix.location = (-300, 200 - 300 * len(shares))
+    links.new(diffuse.outputs["BSDF"], both.inputs[0])
+    links.new(specular.outputs["BSDF"], both.inputs[1])
+    both.location = (300, 0)
+    return both.outputs["Shader"], {"albedo": colours, "metallic": shares, "roughness": [specular.inputs["Roughness"]]}
+
+
+def add_texture(nodes, key, location):
+    """The output of a map looked up without filtering: neighbouring pixels may lie on different surfaces."""
+    texture = nodes.new("ShaderNodeTexImage")
+    texture.location = location
+    texture.image = image(f"{key}.exr", "Linear Rec.709" if key == "albedo" else "Non-Color")
+    texture.interpolation, texture.extension = "Closest", "EXTEND"
+    return texture.outputs["Color"]
 
 
 def image(file, space):

@@ -40,6 +40,7 @@ def export(
     max_triangles: int | None = None,
     blender: str | None = None,
     shadow_catcher: bool = False,
+    fitted_material: bool = False,
 ) -> Exported:
     """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
 
@@ -50,6 +51,7 @@ def export(
         max_triangles: rebuild the mesh from a coarser depth map where it has more than these.
         blender: for blend, the `blender` program or a Python that has `bpy`; None: look for one.
         shadow_catcher: for blend, start with the reconstruction as a shadow catcher over the photo.
+        fitted_material: for blend, the material model of the fit instead of Blender's Principled.
 
     Raises:
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
@@ -57,14 +59,18 @@ def export(
     """
     path = Path(path)
     to = check_format(path, to)
-    if to != "blend" and (blender is not None or shadow_catcher):
+    if to != "blend" and (blender is not None or shadow_catcher or fitted_material):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and max_triangles is None:
         max_triangles = PAGE_TRIANGLES
-    write = _writer(to)
-    if to == "blend":
-        return write(path, scene, scene_parts(scene, max_triangles), force, blender, shadow_catcher)
-    return write(path, scene, scene_parts(scene, max_triangles), force)
+    parts = scene_parts(scene, max_triangles)
+    if to != "blend":
+        return _writer(to)(path, scene, parts, force)
+    from materialist.export.blender import export_blend
+
+    chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
+    options = [option for option, wanted in chosen.items() if wanted]
+    return export_blend(path, scene, parts, force, blender=blender, options=options)
 
 
 def check_format(path: Path, to: str | None) -> str:
@@ -87,10 +93,6 @@ def check_format(path: Path, to: str | None) -> str:
 
 def _writer(to: str) -> Callable[..., Exported]:
     """The function that writes a format, loaded when it is needed."""
-    if to == "blend":
-        from materialist.export.blender import export_blend
-
-        return export_blend
     if to == "usd":
         from materialist.export.usd import export_usd
 
