@@ -22,8 +22,13 @@ _HOME = {
     "save_scene": "io.package",
     "load_scene": "io.package",
     "export": "export.run",
+    "select": "edit.select",
+    "edit": "edit",
+    "relight": "edit.relight",
+    "lamp": "edit.relight",
+    "composite": "edit.composite",
     **dict.fromkeys(
-        ("Camera", "FitReport", "Geometry", "Materials", "Mesh", "Photo", "Prediction", "Scene"),
+        ("Camera", "FitReport", "Geometry", "Lamp", "Materials", "Mesh", "Photo", "Prediction", "Scene"),
         "types",
     ),
     **dict.fromkeys(
@@ -35,6 +40,11 @@ _HOME = {
 __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
+    from materialist.edit.composite import composite as composite
+    from materialist.edit.material import edit as edit
+    from materialist.edit.relight import lamp as lamp
+    from materialist.edit.relight import relight as relight
+    from materialist.edit.select import select as select
     from materialist.errors import InputError as InputError
     from materialist.errors import MaterialistError as MaterialistError
     from materialist.errors import OutputError as OutputError
@@ -50,6 +60,7 @@ if TYPE_CHECKING:
     from materialist.types import Camera as Camera
     from materialist.types import FitReport as FitReport
     from materialist.types import Geometry as Geometry
+    from materialist.types import Lamp as Lamp
     from materialist.types import Materials as Materials
     from materialist.types import Mesh as Mesh
     from materialist.types import Photo as Photo

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 
 from materialist.edit.layers import Layers, denoised, render_layers
@@ -44,6 +46,22 @@ def composite(
         return plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
     layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
     return into_photo(scene.photo, layers)
+
+
+def pictures(
+    scene: Scene, edits: Sequence[Scene], *, spp: int = 64, seed: int = 0, full_render: bool = False,
+    denoise: bool = True, device: str = "auto", progress=None,
+) -> Iterator[Array]:  # fmt: skip
+    """The composites of many edits of one scene, as for `composite`; what they share is rendered once."""
+    studio = Studio(scene, device=device)
+    tick = progress or (lambda *_: None)
+    for k, edited in enumerate(edits):
+        tick("frames", k, len(edits))
+        if full_render:
+            yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+        else:
+            yield into_photo(scene.photo, render_layers(studio, edited, spp=spp, seed=seed, clean=denoise))
+    tick("frames", len(edits), len(edits))
 
 
 def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:

@@ -1,0 +1,107 @@
+"""`materialist relight SCENE (--envmap FILE | --rotate DEG | --sun AZ,EL | --lamp ...) [--frames N] -o OUT`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.outcome import report_success
+from materialist.cli.picture import Denoise, FullRender, Save, SceneArgument, Spp, check_before, numbers, write_result
+from materialist.cli.progress import StageProgress
+from materialist.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("relight")(relight)
+
+
+def relight(
+    scene: SceneArgument,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="OUT", help="A .png or .exr; with --frames .mp4 or a folder.")
+    ],
+    envmap: Annotated[Path | None, typer.Option(metavar="FILE", help="Another light: EXR or HDR, 2:1.")] = None,
+    gain: Annotated[str, typer.Option(help="Factor on it; auto keeps the photo's mean light.")] = "auto",
+    rotate: Annotated[float | None, typer.Option(metavar="DEG", help="Turn the light to the right.")] = None,
+    sun: Annotated[
+        list[str] | None, typer.Option(metavar="AZ,EL", help="A sun: degrees right of ahead, and above the horizon.")
+    ] = None,
+    sun_power: Annotated[float, typer.Option(help="Its light, relative to the mean light of the photo.")] = 1.0,
+    lamp: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,DEPTH,KELVIN,POWER", help="A lamp at a pixel and depth.")
+    ] = None,
+    ambient: Annotated[float, typer.Option(help="Factor on the light that was there.")] = 1.0,
+    frames: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
+    ] = None,
+    fps: Annotated[int, typer.Option(help="Frames per second.")] = 24,
+    spp: Spp = 256,
+    denoise: Denoise = True,
+    full_render: FullRender = False,
+    save: Save = None,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
+    force: Force = False,
+) -> None:
+    """Show the photo under other light."""
+    from materialist.edit.relight import lamp as make_lamp
+    from materialist.edit.relight import read_envmap
+    from materialist.edit.relight import relight as change
+    from materialist.io.package import load_scene
+
+    if envmap is None and rotate is None and not sun and not lamp and ambient == 1.0 and frames is None:
+        raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp or --ambient.")
+    suns = [numbers(text, 2, "--sun") for text in sun or ()]
+    wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
+    if frames is None:
+        check_before(output, save, spp, force)
+        if len(suns) > 1:
+            raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
+    else:
+        _check_video(output, save, fps, force)
+    options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient}
+    if envmap is not None:
+        options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}
+    loaded = load_scene(scene)
+    lamps = tuple(make_lamp(loaded, *values) for values in wanted)
+    shared = {"spp": spp, "seed": seed, "denoise": denoise, "device": device.value, "full_render": full_render}
+    if frames is not None:
+        moving = {**options, "turn": rotate or 0.0, "suns": tuple(suns), "lamps": lamps}
+        _video(loaded, output, frames, moving, shared, fps, as_json, force)
+        return
+    edited = change(loaded, rotate=rotate or 0.0, sun=suns[0] if suns else None, lamps=lamps, **options)
+    write_result("relight", loaded, edited, output, save=save, as_json=as_json, force=force, **shared)
+
+
+def _check_video(output: Path, save: Path | None, fps: int, force: bool) -> None:
+    from materialist.edit.frames import ensure_video_writable
+
+    if save is not None:
+        raise InputError("--save writes one scene; leave out --frames.")
+    if not 1 <= fps <= 120:
+        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
+    ensure_video_writable(output, force=force)
+
+
+def _video(
+    scene: Any, output: Path, count: int, moving: dict[str, Any], shared: dict[str, Any], fps: int, as_json: bool,
+    force: bool,
+) -> None:  # fmt: skip
+    from materialist.edit.composite import pictures
+    from materialist.edit.frames import moving_light, write_frames
+
+    start = time.monotonic()
+    scenes = list(moving_light(scene, count, **moving))
+    with StageProgress(quiet=as_json) as progress:
+        write_frames(output, pictures(scene, scenes, progress=progress, **shared), fps=fps, force=force)
+    report_success(
+        "relight", as_json, [f"Look at {output}"], video=str(output), frames=count, fps=fps,
+        seconds=time.monotonic() - start,
+    )  # fmt: skip

@@ -1,0 +1,48 @@
+"""Composites as files: as deep as the photo was."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.errors import OutputError
+from materialist.io.decode import RAW_SUFFIXES
+from materialist.io.image import ensure_image_writable, write_image
+from materialist.types import Array, Photo
+
+
+def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> None:
+    """Write linear [H, W, 3] to PATH.exr (float32, HDR kept) or PATH.png, with 16 bits if the photo had more than 8.
+
+    A pixel that is the photo's gets the photo's own 8 or 16 bits back. Whole or not at all. Raises OutputError or
+    InputError as `write_image`.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".exr" or not is_deep(photo):
+        write_image(path, picture, force=force)
+        return
+    import cv2
+
+    ensure_image_writable(path, force=force)
+    pixels = np.round(linear_to_srgb(picture).astype(np.float64) * 65535).astype(np.uint16)
+    temporary = path.with_name(f".partial-{os.getpid()}.png")
+    try:
+        temporary.write_bytes(cv2.imencode(".png", pixels[..., ::-1])[1].tobytes())
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def is_deep(photo: Photo) -> bool:
+    """Whether the photo came from a display file of more than 8 bits a channel: 16-bit PNG, TIFF, camera RAW."""
+    head = (photo.source or b"")[:32]
+    if head.startswith(b"\x89PNG"):
+        return len(head) > 24 and head[24] == 16
+    if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
+        return True
+    return head.startswith((b"II*\0", b"MM\0*")) and not photo.hdr

@@ -1,0 +1,145 @@
+"""A list of edits as a file, so that they can be replayed and batched: `materialist apply SCENE edits.yaml`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from materialist.edit.material import edit
+from materialist.edit.relight import lamp, read_envmap, relight
+from materialist.edit.select import select
+from materialist.errors import InputError
+from materialist.types import Scene
+
+REGION = ("mask", "click", "box", "with")
+MATERIAL = (
+    "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
+)  # fmt: skip
+LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "lamps")
+KINDS = {"edit": (*REGION, *MATERIAL), "relight": LIGHT}
+"""Kind of step -> what it may say."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One edit."""
+
+    kind: str
+    """`edit` or `relight`."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """As in the file: texts, lists of texts, lists of lists."""
+    folder: Path = Path(".")
+    """What file names in it are relative to."""
+
+
+def read_recipe(path: str | Path) -> list[Step]:
+    """The steps of a YAML file; see docs/editing.md. Raises InputError with the step and the key at fault."""
+    import yaml
+
+    path = Path(path)
+    try:
+        # Scalars stay texts: YAML would read the shift +0.5 as the value 0.5.
+        content = yaml.load(path.read_text("utf-8"), Loader=yaml.BaseLoader)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
+    entries = content.get("edits") if isinstance(content, dict) else content
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{path} holds no list of edits; begin each with '- edit:' or '- relight:'.")
+    return [_step(entry, number, path) for number, entry in enumerate(entries, 1)]
+
+
+def _step(entry: Any, number: int, path: Path) -> Step:
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
+        raise InputError(f"Step {number} of {path} must be one of {', '.join(KINDS)} with its options below it.")
+    kind, options = next(iter(entry.items()))
+    if not isinstance(options, dict):
+        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
+    unknown = sorted(set(options) - set(KINDS[kind]))
+    if unknown:
+        raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
+    return Step(kind, options, path.parent)
+
+
+def apply(scene: Scene, steps: list[Step]) -> Scene:
+    """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before."""
+    edited = scene
+    for number, step in enumerate(steps, 1):
+        try:
+            edited = (_edit if step.kind == "edit" else _relight)(scene, edited, step)
+        except InputError as error:
+            raise InputError(f"Step {number} ({step.kind}): {error}") from error
+    return edited
+
+
+def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    where = {
+        "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
+        "box": _numbers(given["box"], 4, "box") if "box" in given else None,
+        "mask": _file(step, "mask") if "mask" in given else None,
+    }
+    region = select(scene, method=given.get("with", "grabcut"), **where)
+    options: dict[str, Any] = {
+        k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
+    }
+    options |= {k: given[k] for k in ("roughness", "metallic") if k in given}
+    if "albedo" in given:
+        options["albedo"] = (
+            given["albedo"] if isinstance(given["albedo"], str) else _numbers(given["albedo"], 3, "albedo")
+        )
+    if "texture" in given:
+        options["texture"] = read_texture(_file(step, "texture"))
+    return edit(edited, region, **options)
+
+
+def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient") if k in given}
+    if "envmap" in given:
+        options["envmap"] = read_envmap(_file(step, "envmap"))
+        gain = given.get("gain", "auto")
+        options["gain"] = gain if gain == "auto" else _number(gain, "gain")
+    if "sun" in given:
+        options["sun"] = _numbers(given["sun"], 2, "sun")
+    if "lamps" in given:
+        options["lamps"] = [lamp(scene, *_numbers(one, 5, "lamp")) for one in _list_of(given["lamps"])]
+    return relight(edited, **options)
+
+
+def read_texture(path: str | Path):
+    """[h, w, 3] float32 linear picture for `edit(texture=...)`. Raises InputError."""
+    import numpy as np
+
+    from materialist.io.photo import decode_photo
+
+    return np.clip(decode_photo(Path(path)).linear, 0, 1)
+
+
+def _file(step: Step, name: str) -> Path:
+    value = step.options[name]
+    if not isinstance(value, str):
+        raise InputError(f"The {name} must be a file name, not {value!r}.")
+    return step.folder / value
+
+
+def _list_of(value: Any) -> list[Any]:
+    """A single entry, or a list of them."""
+    return value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+
+
+def _number(value: Any, name: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {name} must be a number, not {value!r}.") from error
+
+
+def _numbers(value: Any, count: int, name: str) -> tuple:
+    """`count` numbers from a list, or from a text such as 310,220."""
+    parts = value.split(",") if isinstance(value, str) else value
+    if not isinstance(parts, list) or len(parts) != count:
+        raise InputError(f"The {name} must be {count} numbers, not {value!r}.")
+    return tuple(_number(part, name) for part in parts)

@@ -1,0 +1,80 @@
+"""A rough region drawn to the photo's edges by GrabCut (Rother et al. 2004)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.types import Array, Scene
+
+_INNER, _OUTER = 0.02, 0.22
+"""How far the border may move inwards and outwards, as a share of the longer side; thin parts stick out."""
+
+
+def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool: the rough mask with its border moved, within a band, to where colour and depth change."""
+    import cv2
+
+    mask = rough.astype(np.uint8)
+    inner, outer = cv2.erode(mask, _disc(_INNER, rough), borderValue=1) > 0, cv2.dilate(mask, _disc(_OUTER, rough)) > 0
+    if not inner.any():
+        inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=1) > 0
+    label = np.where(inner, cv2.GC_FGD, np.where(rough, cv2.GC_PR_FGD, np.where(outer, cv2.GC_PR_BGD, cv2.GC_BGD)))
+    for x, y in points:
+        label[y, x] = cv2.GC_FGD
+    found = tidy(grabcut(scene, label.astype(np.uint8)), points)
+    # GrabCut can lose an object whose colours are those of its surroundings; the rough mask is then better.
+    overlap = (found & rough).sum() / max((found | rough).sum(), 1)
+    return found if overlap > 0.6 else tidy(rough, points)
+
+
+def _disc(share: float, mask: Array) -> Array:
+    """A disc whose radius is a share of the picture's longer side."""
+    import cv2
+
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(2, round(share * max(mask.shape))) + 1,) * 2)
+
+
+def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
+    """[H, W] bool from labels [H, W] uint8 (cv2.GC_*)."""
+    import cv2
+
+    if not ((label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)).any() or (label != cv2.GC_FGD).sum() < 16:
+        return label == cv2.GC_FGD
+    picture = np.round(linear_to_srgb(scene.photo.linear)[..., ::-1] * 255).astype(np.uint8)
+    labels = np.ascontiguousarray(label)
+    cv2.setRNGSeed(0)
+    try:
+        cv2.grabCut(
+            np.ascontiguousarray(picture),
+            labels,
+            None,
+            np.zeros((1, 65)),
+            np.zeros((1, 65)),
+            rounds,
+            cv2.GC_INIT_WITH_MASK,
+        )
+    except cv2.error:  # too few pixels on one side for its colour model
+        return (label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)
+    return (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
+
+
+def tidy(mask: Array, points: Sequence[tuple[int, int]] | None) -> Array:
+    """The parts of a mask that hold a point (without points, all that are not crumbs), holes below 2 % filled."""
+    import cv2
+    from scipy import ndimage
+
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+    parts, count = ndimage.label(opened)
+    if count == 0:
+        return mask
+    sizes = np.bincount(parts.ravel())[1:]
+    keep = {int(parts[y, x]) for x, y in points or () if parts[y, x]}
+    keep = keep or set((np.flatnonzero(sizes >= 0.1 * sizes.max()) + 1).tolist())
+    kept = np.isin(parts, list(keep))
+    holes, count = ndimage.label(~kept)
+    sizes = np.bincount(holes.ravel())[1:]
+    return kept | np.isin(holes, np.flatnonzero(sizes < 0.02 * kept.sum()) + 1)
