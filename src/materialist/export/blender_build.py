@@ -212,12 +212,18 @@ def catch_shadows(scene, facts) -> None:
         output = tree.nodes.new("CompositorNodeComposite")
     photo, layers = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
     photo.image = scene.camera.data.background_images[0].image
+    fit = tree.nodes.new("CompositorNodeScale")  # renders of another size take the photo along
+    if hasattr(fit, "space"):
+        fit.space = "RENDER_SIZE"
+    else:  # Blender 5
+        fit.inputs["Type"].default_value = "Render Size"
     over = tree.nodes.new("CompositorNodeAlphaOver")
     pictures = [socket for socket in over.inputs if socket.type == "RGBA"]  # background, foreground
-    tree.links.new(photo.outputs["Image"], pictures[0])
+    tree.links.new(photo.outputs["Image"], fit.inputs["Image"])
+    tree.links.new(fit.outputs["Image"], pictures[0])
     tree.links.new(layers.outputs["Image"], pictures[1])
     tree.links.new(over.outputs["Image"], output.inputs["Image"])
-    for column, node in enumerate((photo, layers, over, output)):
+    for column, node in enumerate((photo, fit, layers, over, output)):
         node.location = (300 * column, 0)
 
 

@@ -1,0 +1,59 @@
+"""The XML as Mitsuba loads it, against our own renderer."""
+
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from export_scenes import room
+
+from materialist.export.mitsuba_xml import write_mitsuba
+from materialist.export.parts import scene_parts
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mitsuba")
+    scene = room()
+    write_mitsuba(folder, scene, scene_parts(scene))
+    return scene, folder
+
+
+def test_it_renders_as_ours_does(written, capfd):
+    scene, folder = written
+    from materialist.render.scene import RenderScene
+
+    renderer = RenderScene(scene.geometry, scene.camera)
+    renderer.set_materials(scene.materials)
+    renderer.set_envmap(scene.envmap)
+    mi = renderer.mi
+    loaded = mi.load_file(str(folder / "scene.xml"), spp=64, bsdf="materialist_disney", max_depth=3)
+    ours = [renderer.render_path(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
+    theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
+    # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
+    noise = np.sqrt(np.mean((ours[0] - ours[1]) ** 2))
+    assert np.sqrt(np.mean((ours[0] - theirs[1]) ** 2)) < 1.15 * noise
+    assert np.mean(theirs) == pytest.approx(np.mean(ours), rel=0.01)
+    light = next(value for name, value in mi.traverse(loaded) if name.endswith(".data") and "bsdf" not in name)
+    np.testing.assert_array_equal(np.array(light), np.array(renderer.params["light.data"]))
+    assert "WARN" not in capfd.readouterr().out
+
+
+def test_the_portable_material_is_close(written):
+    _, folder = written
+    from materialist.render.variant import setup
+
+    mi = setup("auto")
+    images = [
+        np.array(mi.render(mi.load_file(str(folder / "scene.xml"), spp=64, **options), seed=1))
+        for options in ({}, {"bsdf": "materialist_disney"})
+    ]
+    assert np.mean(images[0]) == pytest.approx(np.mean(images[1]), rel=0.03)
+
+
+def test_it_refers_only_to_files_beside_it(written):
+    _, folder = written
+    root = ET.parse(folder / "scene.xml").getroot()
+    named = {node.get("value") for node in root.iter("string") if node.get("name") == "filename"}
+    assert named == {path.name for path in folder.iterdir()} - {"scene.xml"}
+    assert re.search(r'name="fov" value="50\.0"', (folder / "scene.xml").read_text())
