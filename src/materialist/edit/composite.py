@@ -14,7 +14,11 @@ from materialist.types import Array, Photo, Scene
 FLOOR = 0.02
 """Radiance added to both sides of edited / base: below it a ratio says nothing."""
 MOST = 1.0
-"""Largest factor on what the photo has and the fit has not."""
+"""Largest factor on what the photo has and the fit has not, under the same light."""
+MOST_DETAIL = 2.0
+"""Largest factor on the photo's detail beyond working size, under another light."""
+LIGHT_FADE = 12.0
+"""How fast the fit's error goes when the light changes."""
 
 
 def composite(
@@ -72,28 +76,56 @@ def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bo
 
 
 def into_photo(photo: Photo, layers: Layers) -> Array:
-    """[H0, W0, 3] the photo with the difference of two renderings added (see docs/editing.md for the formula).
+    """[H0, W0, 3] the photo with the difference of two renderings added (see docs/editing.md for the formulas).
 
-    out = edited + t (photo - base): what the photo has beyond the fit, its fine texture, its grain, the fit's error,
-    is kept with the factor t = edited / base (per channel, at most MOST), as a texture is under other light. At the
-    border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
+    out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
+    At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
     """
     out = photo.original.copy()
     if not layers.reached.any():
         return out
-    factor = np.clip((layers.edited + FLOOR) / (layers.base + FLOOR), 0, MOST)
-    stack = np.concatenate([layers.edited - layers.base, factor - 1, layers.base], -1)  # [H, W, 9]
+    stack = np.concatenate((_other_light if layers.relit else _same_light)(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample = GuidedUpsample(photo.linear, photo.original)
     alpha = matte(layers.changed, photo.original)
     for rows in strips(out.shape[0]):
         share = alpha[rows][..., None]
         large = share * upsample(stack, layers.changed, rows) + (1 - share) * upsample(stack, ~layers.changed, rows)
-        change, excess, base = large[..., :3], large[..., 3:6], large[..., 6:]
-        held = out[rows] if photo.hdr else _unclipped(out[rows], base)
-        moved = np.maximum(held + change + excess * (held - base), 0)
+        change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
+        held = out[rows] if photo.hdr or layers.relit else _unclipped(out[rows], reference)
+        moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows] = np.where((change != 0).any(-1, keepdims=True), moved, out[rows])
     return out
+
+
+def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
+    """(change, factor - 1, reference), [H, W, 3] each: out = edited + factor (photo - base).
+
+    What the photo has and the fit has not is mostly texture that the albedo lacks: it dims as the surface does,
+    factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
+    """
+    factor = np.minimum((layers.edited + FLOOR) / (layers.base + FLOOR), MOST)
+    return layers.edited - layers.base, factor - 1, layers.base
+
+
+def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
+    """The same for another light: out = edited + factor (photo - small) + kept (small - base), small the photo at
+    working size.
+
+    Beyond working size the photo has texture, which goes with the light: factor = edited / base. At working size the
+    fit's error is mostly shading, which belongs to the old light: it is kept as far as the new light is the old one
+    but for a constant g per channel, kept = g exp(-LIGHT_FADE |ln(edited / base) - ln g|), averaged nearby.
+    """
+    import cv2
+
+    ratio = np.log((layers.edited + FLOOR) / (layers.base + FLOOR))
+    overall = np.median(ratio.reshape(-1, 3), axis=0)
+    window = max(3, max(ratio.shape[:2]) // 8)
+    away = cv2.blur(np.abs(ratio - overall), (window, window), borderType=cv2.BORDER_REFLECT)
+    kept = np.exp(overall - LIGHT_FADE * away)
+    held = photo.linear if photo.hdr else _unclipped(photo.linear, layers.base)
+    change = layers.edited + kept * (held - layers.base) - photo.linear
+    return change, np.minimum(np.exp(ratio), MOST_DETAIL) - 1, photo.linear
 
 
 def developed(scene: Scene, edited: Scene, picture: Array) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class Layers:
     """[H, W] bool: pixels whose own surface, or what stands there, the edit replaced; part of `reached`."""
     raw: Array
     """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
+    relit: bool = False
+    """Whether the light is another one."""
 
 
 def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None) -> Layers:
@@ -40,12 +42,18 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
     base, other = studio.twins(edited)
     changed = changed_pixels(scene, edited)
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal)
-    return difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
+    layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
+    return replace(layers, relit=is_relit(scene, edited))
+
+
+def is_relit(scene: Scene, edited: Scene) -> bool:
+    """Whether the two scenes have different light."""
+    return scene.lamps != edited.lamps or not np.array_equal(scene.envmap, edited.envmap)
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the maps of the two scenes differ; everywhere under another light."""
-    if not np.array_equal(scene.envmap, edited.envmap) or scene.lamps != edited.lamps:
+    if is_relit(scene, edited):
         return np.ones(scene.depth.shape, bool)
     a, b = scene.materials, edited.materials
     changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)

@@ -1,0 +1,113 @@
+"""Edits at once: pictures from cached light transport instead of path tracing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.edit.layers import Layers, changed_pixels, is_relit
+from materialist.errors import InputError
+from materialist.types import Array, Materials, Scene
+
+
+class Preview:
+    """A fitted scene whose rays are traced once; then a change of materials is one shading call.
+
+    What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
+    that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once
+    (seconds), keep it.
+
+    Args:
+        scene: the fitted scene.
+        diffuse_samples, specular_samples: rays a pixel, as in the fit.
+    """
+
+    def __init__(
+        self, scene: Scene, *, seed: int = 0, device: str = "auto", diffuse_samples: int = 64,
+        specular_samples: int = 16, progress=None,
+    ):  # fmt: skip
+        from materialist.render.variant import setup
+
+        setup(device)
+        from materialist.fit.engine import TransportEngine
+        from materialist.transport.cache import TransportCache
+
+        self.scene = scene
+        self._engine = TransportEngine(
+            scene.geometry, scene.camera, scene.rerender, seed=seed, diffuse_samples=diffuse_samples,
+            specular_samples=specular_samples, progress=progress,
+        )  # fmt: skip
+        # A few rays a pixel are enough for what surfaces pass on: it is averaged again where it arrives.
+        self._quick = TransportCache(scene.geometry, scene.camera, seed=seed, diffuse_samples=16, specular_samples=1)
+        self._tables = self._engine.tables(scene.envmap)
+        self._light = scene.envmap
+        self._base = self._shaded(scene.materials, self._tables)
+        self._sky_base = self._sky(scene.envmap)
+
+    def render(self, edited: Scene) -> Array:
+        """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
+
+        Raises InputError when its geometry is not that of the scene this preview was built for.
+        """
+        self._check(edited)
+        if edited.envmap is not self._light and not np.array_equal(edited.envmap, self._light):
+            self._tables, self._light = self._relit(edited), edited.envmap
+        return self._image(self._shaded(edited.materials, self._tables), self._sky(edited.envmap))
+
+    def layers(self, edited: Scene) -> Layers:
+        """What `composite.into_photo` needs, from the cache."""
+        picture = self.render(edited)
+        base = self._image(self._base, self._sky_base)
+        relit = is_relit(self.scene, edited)
+        differs = (picture != base).any(-1)
+        return Layers(base, picture, differs, changed_pixels(self.scene, edited) & differs, picture, relit)
+
+    def picture(self, edited: Scene) -> Array:
+        """[H, W, 3] float32 linear: the edit in the photo at working size."""
+        from dataclasses import replace
+
+        from materialist.edit.composite import into_photo
+
+        photo = replace(self.scene.photo, original=self.scene.photo.linear)
+        return into_photo(photo, self.layers(edited))
+
+    def _check(self, edited: Scene) -> None:
+        if edited.geometry is not self.scene.geometry:
+            raise InputError("The preview was built for another geometry; build one for this scene.")
+
+    def _relit(self, edited: Scene):
+        """Tables under another light, which surfaces pass on once."""
+        engine, kept = self._engine, self._engine.radiance
+        first = self._quick.gather(edited.envmap, None)
+        try:
+            engine.set_radiance(self._image(self._shaded(edited.materials, first), self._sky(edited.envmap)))
+            return engine.tables(edited.envmap)
+        finally:
+            engine.set_radiance(kept)
+
+    def _shaded(self, materials: Materials, tables):
+        """[P, 3] torch radiance of the surface pixels."""
+        import torch
+
+        from materialist.transport.shading import shade
+
+        pixels = self._engine.cache.pixels
+        take = lambda m, n: torch.from_numpy(np.ascontiguousarray(m.reshape(-1, *([n] if n > 1 else [])))[pixels])  # noqa: E731
+        with torch.no_grad():
+            return shade(tables, take(materials.albedo, 3), take(materials.roughness, 1), take(materials.metallic, 1))
+
+    def _sky(self, envmap: Array) -> Array:
+        """[S, 3] radiance of the pixels without a surface."""
+        from materialist.camera import pixel_rays
+        from materialist.transport.light import bilinear
+
+        rays = pixel_rays(self.scene.camera).reshape(-1, 3)[self._engine.sky]
+        if not len(rays):
+            return np.zeros((0, 3), np.float32)
+        index, share = bilinear(rays / np.linalg.norm(rays, axis=-1, keepdims=True), envmap.shape[:2])
+        return (envmap.reshape(-1, 3)[index] * share[..., None]).sum(1).astype(np.float32)
+
+    def _image(self, shaded, sky: Array) -> Array:
+        picture = self._engine.cache.image(shaded.numpy())
+        flat = picture.reshape(-1, 3)
+        flat[self._engine.sky] = sky
+        return picture

@@ -1,0 +1,104 @@
+"""SAM 2 (Ravi et al. 2024), the paper's way to select, where its weights are there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.errors import SetupError
+from materialist.types import Array
+
+REPO = "facebook/sam2.1-hiera-tiny"
+_MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+_CORNERS = (2, 3)
+"""Labels of the two corners of a box among the points; 1 is a click on the object."""
+
+
+def segment(
+    linear: Array,
+    points: Sequence[tuple[int, int]],
+    box: tuple[int, int, int, int] | None = None,
+    *,
+    where: str = REPO,
+    device: str = "auto",
+) -> Array:
+    """[H, W] bool of the object at the clicks (column, row) or in the box, by SAM 2.
+
+    Args:
+        linear: [H, W, 3] photo.
+        where: a folder that holds the model, or a hub id that was downloaded.
+
+    Raises:
+        SetupError: transformers is missing. WeightsError: the weights are not there, or damaged.
+    """
+    import torch
+
+    model = load(where)
+    target = torch.device("cuda" if device != "cpu" and torch.cuda.is_available() else "cpu")
+    model = model.to(target).eval()
+    side = int(model.config.vision_config.backbone_config.image_size[0])
+    height, width = linear.shape[:2]
+    scale = np.array([side / width, side / height])
+    corners = [] if box is None else [box[:2], box[2:]]
+    spots = (np.array([*points, *corners], np.float32) + 0.5 * (box is None)) * scale
+    labels = [1] * len(points) + list(_CORNERS[: len(corners)])
+    with torch.inference_mode():
+        output = model(
+            pixel_values=_pixels(linear, side).to(target),
+            input_points=torch.tensor(spots, dtype=torch.float32, device=target)[None, None],
+            input_labels=torch.tensor(labels, dtype=torch.int32, device=target)[None, None],
+            multimask_output=len(spots) == 1,
+        )
+    return _best(output, height, width)
+
+
+def load(where: str) -> Any:
+    """The model, whole. Its own image processor needs a library that this project cannot have; see `_pixels`."""
+    from materialist.predict.hub import INSTALL
+    from materialist.predict.hub import load as whole
+
+    try:
+        from transformers import Sam2Model
+    except ImportError as error:
+        raise SetupError(
+            f"SAM 2 needs transformers ({error}); install it with: {INSTALL}, or select with --with grabcut."
+        ) from error
+    return whole(Sam2Model, folder_of(where))
+
+
+def folder_of(where: str) -> Any:
+    """The folder of a model or of a downloaded hub id. Raises WeightsError that says how to get it."""
+    from materialist.errors import WeightsError
+    from materialist.predict.hub import locate
+
+    try:
+        return locate(where, REPO)[0]
+    except WeightsError as error:
+        raise WeightsError(
+            f"The weights of SAM 2 are not here; fetch them with: materialist models download {where}, or select with "
+            "--with grabcut."
+        ) from error
+
+
+def _pixels(linear: Array, side: int):
+    """[1, 3, side, side] normalised picture; stretched to a square, as the model was trained."""
+    import torch
+
+    encoded = torch.from_numpy(linear_to_srgb(linear)).permute(2, 0, 1)[None]
+    square = torch.nn.functional.interpolate(
+        encoded, (side, side), mode="bilinear", align_corners=False, antialias=True
+    )
+    return (square - torch.tensor(_MEAN).view(1, 3, 1, 1)) / torch.tensor(_STD).view(1, 3, 1, 1)
+
+
+def _best(output: Any, height: int, width: int) -> Array:
+    """The mask with the best predicted overlap, at the size of the photo."""
+    import torch
+
+    masks, scores = output.pred_masks[0, 0].float(), output.iou_scores[0, 0]
+    logits = masks[int(scores.argmax())][None, None]
+    large = torch.nn.functional.interpolate(logits, (height, width), mode="bilinear", align_corners=False)
+    return (large[0, 0] > 0).cpu().numpy()
