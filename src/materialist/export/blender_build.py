@@ -198,7 +198,7 @@ def catch_shadows(scene, facts) -> None:
     """Shadow-catching proxy over the photo, at the photo's own resolution."""
     for thing in bpy.data.collections["Reconstruction"].objects:
         thing.is_shadow_catcher = True
-    scene.render.film_transparent = True
+    scene.render.film_transparent, scene.render.dither_intensity = True, 0  # the photo stays as it is
     scene.render.resolution_x, scene.render.resolution_y = facts["photo_width"], facts["photo_height"]
     if hasattr(scene, "compositing_node_group"):  # Blender 5
         tree = bpy.data.node_groups.new("Over the photo", "CompositorNodeTree")
