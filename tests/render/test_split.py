@@ -94,12 +94,18 @@ def test_a_sun_is_left_to_the_path_tracer(corner, monkeypatch):
 
 
 def test_peaked_counts_solid_angle():
-    """A bright row at the pole covers little of the sphere, and one texel of a coarse map is more than a hundredth."""
+    """A bright row at the pole covers little of the sphere; a bright tenth of it is 10 times as bright as the mean."""
     pole = np.ones((64, 128, 3), np.float32)
-    pole[0] = 100.0
+    pole[0] = 10.0
+    assert not is_peaked(pole)
+    pole[0], pole[32] = 1.0, 10.0
     assert not is_peaked(pole)
     assert not is_peaked(np.ones((4, 8, 3), np.float32))
     assert not is_peaked(np.zeros((4, 8, 3), np.float32))
+    for share, expected in ((0.5, False), (0.25, True)):
+        part = np.zeros((8, 16, 3), np.float32)
+        part[:, : int(16 * share)] = 1.0
+        assert is_peaked(part) is expected, "the measure is 1 / share"
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.types import Array
 
-PEAKED = 0.35
-"""Share of a map's light from the brightest hundredth of the sphere, from which it counts as peaked."""
+PEAKED = 3.0
+"""Mean squared over squared mean luminance of a map from which it counts as peaked."""
 
 
 def on_mitsuba_grid(envmap, xp):
@@ -42,11 +42,13 @@ def check_envmap(envmap: Array) -> None:
 
 
 def is_peaked(envmap: Array) -> bool:
-    """Whether much of the light of [h, 2h, 3] comes from a small part of it: scattered directions rarely find a sun."""
+    """Whether [h, 2h, 3] is so uneven that scattered directions find its light worse than chosen ones.
+
+    Measured by the mean of the squared luminance over the square of its mean, over the sphere: the variance of one
+    uniform direction, up to a constant.
+    """
     luma = envmap.mean(-1)
     h, w = luma.shape
-    area = np.repeat(np.sin(np.pi * (np.arange(h) + 0.5) / h), w)
-    order = np.argsort(-luma, axis=None)
-    light, area = (luma.ravel() * area)[order], area[order]
-    brightest = np.searchsorted(np.cumsum(area), 0.01 * area.sum()) + 1
-    return float(light[:brightest].sum()) > PEAKED * float(light.sum())
+    area = np.sin(np.pi * (np.arange(h) + 0.5) / h)[:, None]
+    share = np.broadcast_to(area / (area.sum() * w), (h, w))
+    return float((luma**2 * share).sum()) > PEAKED * float((luma * share).sum()) ** 2
