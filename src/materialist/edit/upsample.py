@@ -40,10 +40,14 @@ class GuidedUpsample:
     def __call__(self, layer: Array, members: Array, rows: slice) -> Array:
         """[h, W0, C] float32: `layer` [H, W, C] in the native rows, from the working pixels `members` [H, W] bool.
 
-        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value.
+        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value, and the next ones take the
+        mean of those around.
         """
         if self.same and members.all():
             return layer[rows].astype(np.float32)
+        if self.same:
+            near = _blurred(layer, members)[rows]
+            return np.where(members[rows][..., None], layer[rows], near).astype(np.float32)
         here = linear_to_srgb(self.large[rows])  # [h, W0, 3]
         native, working = self.large.shape[:2], members.shape
         y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0])
@@ -61,8 +65,6 @@ class GuidedUpsample:
                 total += weight[..., None] * layer[y, x]
                 norm += weight
         total /= np.maximum(norm, 1e-20)[..., None]
-        if self.same:
-            total = np.where(members[rows][..., None], layer[rows], total)
         return total.astype(np.float32)
 
 
@@ -93,7 +95,8 @@ def matte(mask: Array, large: Array) -> Array:
     # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
     trust = np.clip(length / 0.1**2, 0, 1) * known_front * known_back
     alpha = soft + trust * (share - soft)
-    return np.where(sure_in, 1, np.where(sure_out, 0, alpha)).astype(np.float32)
+    alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
+    return alpha.astype(np.float32)
 
 
 def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array]:
@@ -105,6 +108,17 @@ def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array
     blur = lambda v: cv2.GaussianBlur(v, (size, size), sigma)  # noqa: E731
     total, norm = blur(picture * weight[..., None]), blur(weight)
     return total / np.maximum(norm, 1e-12)[..., None], norm > 1e-5
+
+
+def _blurred(layer: Array, members: Array) -> Array:
+    """[H, W, C] mean of the members within two pixels; 0 where there is none."""
+    import cv2
+
+    weight = members.astype(np.float32)
+    parts = [
+        cv2.GaussianBlur(np.ascontiguousarray(c, np.float32) * weight, (5, 5), 1.0) for c in np.moveaxis(layer, -1, 0)
+    ]
+    return np.stack(parts, -1) / np.maximum(cv2.GaussianBlur(weight, (5, 5), 1.0), 1e-6)[..., None]
 
 
 def _taps(index: Array, native: int, working: int) -> tuple[Array, Array]:

@@ -1,0 +1,155 @@
+"""What the composite keeps, to the bit, and what it shows, against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edit.composite import FLOOR, composite, developed, into_photo, pictures
+from materialist.edit.layers import Layers, difference, significance
+from materialist.edit.lights import Studio
+from materialist.edit.material import edit
+from materialist.edit.relight import lamp, relight
+from materialist.errors import InputError
+
+MASK = block_mask(36, 48)
+
+
+def layers_of(base, edited, changed, relit=False):
+    reached = (base != edited).any(-1)
+    return Layers(base, edited, reached, changed & reached, edited, relit)
+
+
+@pytest.mark.parametrize("native", [1, 2])
+def test_an_edit_that_changes_nothing_gives_the_photo(native):
+    scene = rendered_scene(native)
+    same = edit(scene, MASK, roughness="+0")
+    np.testing.assert_array_equal(composite(scene, same, spp=6), scene.photo.original)
+    np.testing.assert_array_equal(composite(scene, relight(scene, rotate=0), spp=6), scene.photo.original)
+
+
+@pytest.mark.parametrize("native", [1, 2])
+def test_pixels_out_of_reach_keep_their_bits(native):
+    scene = rendered_scene(native, block=3.0)  # one flat wall, whose parts do not see each other
+    edited = edit(scene, MASK, albedo=(0.05, 0.3, 0.6))
+    out = composite(scene, edited, spp=12)
+    assert out.shape == scene.photo.original.shape
+    # At the border the photo's pixels are mixed.
+    far = np.ones((36, 48), bool)
+    rows, columns = np.nonzero(MASK)
+    far[rows.min() - 3 : rows.max() + 4, columns.min() - 3 : columns.max() + 4] = False
+    far = np.kron(far, np.ones((native, native), bool))
+    np.testing.assert_array_equal(out[far], scene.photo.original[far])
+    inner = np.kron(MASK, np.ones((native, native), bool))
+    assert (out[inner] != scene.photo.original[inner]).any(-1).all()
+
+
+def test_the_edit_is_the_rendering_where_the_fit_is_the_photo():
+    scene = rendered_scene()
+    edited = edit(scene, MASK, albedo=(0.1, 0.2, 0.05))
+    out = composite(scene, edited, spp=96, seed=4, denoise=False)
+    expected = Studio(edited).twins(edited)[0](384, 9)
+    inner = MASK.copy()
+    inner[:-1] &= MASK[1:]
+    inner[1:] &= MASK[:-1]
+    inner[:, :-1] &= MASK[:, 1:]
+    inner[:, 1:] &= MASK[:, :-1]
+    assert np.abs(out - expected)[inner].mean() < 0.01
+
+
+def test_texture_beyond_the_fit_dims_with_the_surface():
+    scene = flat_scene()
+    base = np.full((36, 48, 3), 0.5, np.float32)
+    grain = 1 + 0.2 * np.sin(np.arange(36 * 48).reshape(36, 48, 1)).astype(np.float32)
+    photo = replace(scene.photo, linear=base * grain, original=base * grain)
+    edited = np.where(MASK[..., None], 0.2, base).astype(np.float32)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    factor = (0.2 + FLOOR) / (0.5 + FLOOR)
+    np.testing.assert_allclose(out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02)
+    np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
+
+
+def test_clipped_photo_is_a_lower_bound():
+    scene = flat_scene()
+    base = np.full((36, 48, 3), 3.0, np.float32)
+    white = np.ones_like(base)
+    photo = replace(scene.photo, linear=white, original=white)
+    edited = np.where(MASK[..., None], 2.0, base).astype(np.float32)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    assert out[MASK].min() > 1.9
+
+
+def test_hdr_stays_hdr():
+    scene = rendered_scene()
+    bright = scene.photo.original * 20
+    photo = replace(scene.photo, original=bright, linear=bright, hdr=True)
+    base = bright.copy()
+    edited = np.where(MASK[..., None], base * 0.5, base)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    assert out[~MASK].max() > 5
+    np.testing.assert_allclose(out[14:20, 15:21], 0.5 * bright[14:20, 15:21], rtol=0.05)
+
+
+def test_noise_alone_is_no_edit():
+    rng = np.random.default_rng(0)
+    quiet = rng.normal(0, 0.05, (2, 40, 50, 3))
+    assert (significance(*quiet) > 0).mean() < 0.02
+    signal = quiet + 0.1
+    assert (significance(*signal) > 0.5).mean() > 0.99
+
+
+def test_difference_is_zero_where_no_path_differs():
+    shape = (20, 30, 3)
+    changed = np.zeros(shape[:2], bool)
+    changed[5:10, 5:10] = True
+    base = lambda spp, seed: np.random.default_rng(seed).random(shape, np.float32)  # noqa: E731
+    edited = lambda spp, seed: base(spp, seed) + changed[..., None]  # noqa: E731
+    guides = (np.zeros(shape, np.float32),) * 3
+    layers = difference(base, edited, changed, guides, spp=8, seed=1, clean=False)
+    np.testing.assert_array_equal(layers.reached, changed)
+    np.testing.assert_array_equal(layers.edited[~changed], layers.base[~changed])
+    np.testing.assert_allclose((layers.edited - layers.base)[changed], 1, atol=1e-6)
+
+
+def test_both_sides_use_the_same_tracer_under_a_lamp():
+    scene = rendered_scene()
+    lit = relight(scene, lamps=[lamp(scene, 30, 10, 2.5, 3000, 1e-6)])
+    base, edited = Studio(scene).twins(lit)
+    # A lamp of no power leaves the light alone; only its little sphere is new.
+    same = np.isclose(base(16, 2), edited(16, 2), rtol=0.2, atol=0.02).all(-1)
+    assert same.mean() > 0.6
+
+
+def test_full_render_is_the_plain_picture():
+    scene = rendered_scene()
+    edited = edit(scene, MASK, roughness=0.2)
+    plain = composite(scene, edited, spp=12, seed=3, full_render=True, denoise=False)
+    np.testing.assert_array_equal(plain, Studio(scene).twins(edited)[1](12, 3))
+
+
+def test_many_edits_render_the_base_once():
+    scene = rendered_scene()
+    edits = [edit(scene, MASK, roughness=r) for r in (0.2, 0.8)]
+    for edited, out in zip(edits, pictures(scene, edits, spp=6), strict=True):
+        np.testing.assert_array_equal(out, composite(scene, edited, spp=6))
+
+
+def test_developed_scenes_start_from_the_composite(tmp_path):
+    from materialist.io.package import load_scene, save_scene
+
+    scene = rendered_scene(2)
+    edited = relight(edit(scene, MASK, roughness=0.2), lamps=[lamp(scene, 30, 10, 2.5, 3000, 1.0)])
+    picture = scene.photo.original * 0.5
+    save_scene(developed(scene, edited, picture), tmp_path / "b.scene")
+    back = load_scene(tmp_path / "b.scene")
+    np.testing.assert_array_equal(back.photo.original, picture)
+    assert back.photo.linear.shape == scene.photo.linear.shape
+    assert back.lamps == edited.lamps and back.materials.roughness[MASK].max() < 0.21
+    assert [e["kind"] for e in back.provenance["edits"]] == ["material", "light"]
+
+
+def test_too_few_samples():
+    scene = rendered_scene()
+    with pytest.raises(InputError, match="spp is 1"):
+        composite(scene, edit(scene, MASK, roughness=0.2), spp=1)

@@ -1,0 +1,86 @@
+"""Lists of edits: what they mean, and what is wrong with them."""
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene
+from PIL import Image
+
+from materialist.edit.material import edit
+from materialist.edit.recipe import apply, read_recipe
+from materialist.edit.relight import lamp, relight
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+
+SCENE = flat_scene()
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    Image.fromarray((MASK * 255).astype(np.uint8)).save(tmp_path / "block.png")
+    write_exr(tmp_path / "sky.exr", np.full((16, 32, 3), 2.0, np.float32))
+    return tmp_path
+
+
+def replay(folder, text):
+    (folder / "edits.yaml").write_text(text)
+    return apply(SCENE, read_recipe(folder / "edits.yaml"))
+
+
+def test_steps_are_the_functions_in_order(folder):
+    got = replay(
+        folder,
+        "edits:\n- edit: {mask: block.png, hue: 120, roughness: +0.25}\n- edit: {mask: block.png, metallic: 0.5}\n"
+        "- relight: {envmap: sky.exr, gain: 0.5, rotate: 45, ambient: 0.5,\n"
+        "            lamps: [[5, 6, 2, 3000, 1], [9, 9, 2, 4000, 2]]}\n",
+    )
+    expected = edit(edit(SCENE, MASK, hue=120, roughness="+0.25"), MASK, metallic=0.5)
+    lamps = [lamp(SCENE, 5, 6, 2, 3000, 1), lamp(SCENE, 9, 9, 2, 4000, 2)]
+    expected = relight(expected, envmap=np.full((16, 32, 3), 2.0), gain=0.5, rotate=45, ambient=0.5, lamps=lamps)
+    for name in ("albedo", "roughness", "metallic"):
+        np.testing.assert_array_equal(getattr(got.materials, name), getattr(expected.materials, name))
+    np.testing.assert_array_equal(got.envmap, expected.envmap)
+    assert got.lamps == expected.lamps and len(got.provenance["edits"]) == 3
+
+
+def test_a_plus_sign_is_a_shift_in_yaml_too(folder):
+    shifted = replay(folder, "- edit: {mask: block.png, roughness: +0.25}")
+    level = replay(folder, "- edit: {mask: block.png, roughness: 0.25}")
+    assert (shifted.materials.roughness[MASK] == 0.75).all() and (level.materials.roughness[MASK] == 0.25).all()
+
+
+def test_click_box_and_sun(folder):
+    got = replay(folder, "- edit: {click: [17, 17], albedo: [0.1, 0.2, 0.3]}\n- relight: {sun: '30,40', sun_power: 2}")
+    assert (got.materials.albedo[17, 17] == np.float32([0.1, 0.2, 0.3])).all()
+    np.testing.assert_array_equal(got.envmap, relight(SCENE, sun=(30, 40), sun_power=2).envmap)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no list of edits"),
+        ("edits: []", "no list of edits"),
+        ("- [", "not valid YAML"),
+        ("- paint: {}", "Step 1"),
+        ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
+        ("- edit: {mask: block.png, shininess: 1}", "shininess"),
+        ("- edit: {mask: block.png, hue: blue}", "hue"),
+        ("- edit: {mask: block.png, roughness: 3}", "Step 1 (edit): The roughness is 3"),
+        ("- edit: {mask: none.png, roughness: 0.3}", "none.png"),
+        ("- edit: {click: [1], roughness: 0.3}", "click"),
+        ("- edit: {roughness: 0.3}", "exactly one"),
+        ("- relight: {envmap: none.exr}", "none.exr"),
+        ("- relight: {sun: [1, 2, 3]}", "sun"),
+        ("- relight: {lamps: [[1, 2, 3]]}", "lamp"),
+        ("- relight: now", "no options"),
+    ],
+)
+def test_what_is_wrong_is_named(folder, text, words):
+    with pytest.raises(InputError) as error:
+        replay(folder, text)
+    assert words in str(error.value)
+
+
+def test_missing_list(folder):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_recipe(folder / "none.yaml")

@@ -1,0 +1,132 @@
+"""Masks of known shapes, and what cannot be selected."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import flat_scene
+from PIL import Image
+
+from materialist.camera import unproject
+from materialist.edit.objects import borne_out, contrast
+from materialist.edit.select import select
+from materialist.errors import InputError, MaterialistError
+from materialist.types import Camera
+
+
+@pytest.fixture(scope="module")
+def table():
+    """A textured ball with a handle, and a second ball, on a shaded floor; and the masks of the two."""
+    h, w = 120, 160
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[:h, :w]
+    ball = (x - 60) ** 2 + (y - 60) ** 2 < 28**2
+    ring = np.abs(np.hypot(x - 94, y - 60) - 12) < 3.5
+    first, second = ball | (ring & (x > 85)), (x - 130) ** 2 + (y - 85) ** 2 < 14**2
+    colour = np.broadcast_to([0.45, 0.42, 0.38], (h, w, 3)) * (0.7 + 0.4 * y / h)[..., None]
+    colour = np.where(
+        first[..., None], np.array([0.7, 0.2, 0.05]) * (0.7 + 0.5 * (60 - x) / 60)[..., None].clip(0.4, 1.3), colour
+    )
+    colour = np.where(second[..., None], [0.1, 0.2, 0.5], colour)
+    photo = (colour * rng.uniform(0.85, 1.15, (h, w, 1))).astype(np.float32).clip(0.01, 1)
+    depth = np.where(first, 2.0, np.where(second, 2.3, 3.0)).astype(np.float32)
+    depth[:4] = 0
+    base = flat_scene()
+    camera = Camera(w, h, 40.0)
+    normal = np.zeros((h, w, 3), np.float32)
+    normal[..., 2] = 1
+    scene = replace(
+        base,
+        camera=camera,
+        photo=replace(base.photo, linear=photo, original=photo, camera=camera),
+        depth=depth,
+        normal=normal,
+    )
+    assert unproject(depth, camera).shape == (h, w, 3)
+    return scene, first, second
+
+
+def overlap(a, b):
+    return (a & b).sum() / (a | b).sum()
+
+
+@pytest.mark.parametrize("click", [(50, 50), (75, 70), (45, 75)])
+def test_one_click_finds_the_whole_object(table, click):
+    scene, first, _ = table
+    assert overlap(select(scene, click=click), first) > 0.9
+
+
+def test_several_clicks_and_the_other_object(table):
+    scene, first, second = table
+    assert overlap(select(scene, click=(130, 85)), second) > 0.85
+    assert overlap(select(scene, click=[(50, 50), (60, 80)]), first) > 0.9
+
+
+def test_box(table):
+    scene, _, second = table
+    found = select(scene, box=(110, 65, 150, 105))
+    assert overlap(found, second) > 0.85 and not found[:60].any()
+
+
+def test_equal_calls_give_equal_masks(table):
+    scene, *_ = table
+    np.testing.assert_array_equal(select(scene, click=(50, 50)), select(scene, click=(50, 50)))
+
+
+def test_given_masks_are_taken_as_they_are(table, tmp_path):
+    scene, first, _ = table
+    np.testing.assert_array_equal(select(scene, mask=first), first)
+    Image.fromarray((first * 255).astype(np.uint8)).save(tmp_path / "m.png")
+    np.testing.assert_array_equal(select(scene, mask=tmp_path / "m.png"), first)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({}, "exactly one"),
+        ({"click": (5, 50), "box": (0, 0, 9, 9)}, "exactly one"),
+        ({"click": (5, 1)}, "sky"),
+        ({"click": (500, 50)}, "160 x 120"),
+        ({"click": (-1, 50)}, "outside"),
+        ({"click": ("a", 2)}, "two numbers"),
+        ({"click": []}, "empty"),
+        ({"box": (10, 10, 11, 50)}, "3 x 3"),
+        ({"box": (0, 0, 160, 120)}, "whole photo"),
+        ({"box": (1, 2, 3)}, "x0, y0, x1, y1"),
+        ({"mask": np.zeros((120, 160), bool)}, "empty"),
+        ({"mask": np.ones((12, 16), bool)}, "(12, 16)"),
+        ({"mask": "nothing.png"}, "nothing.png"),
+        ({"click": (50, 50), "method": "magic"}, "magic"),
+    ],
+)
+def test_what_cannot_be_selected(table, options, words):
+    with pytest.raises(InputError) as error:
+        select(table[0], **options)
+    assert words in str(error.value)
+
+
+def test_sam2_without_weights_says_what_to_do(table, monkeypatch, tmp_path):
+    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path))
+    with pytest.raises(MaterialistError, match="grabcut"):
+        select(table[0], click=(50, 50), method="sam2")
+
+
+def test_a_guessed_relief_is_not_believed():
+    rng = np.random.default_rng(0)
+    colour = rng.random((60, 80)).astype(np.float32) * 0.1
+    colour[:, 40] = 3
+    shape = np.zeros((60, 80), np.float32)
+    shape[30] = 2  # a horizon that the photo does not show
+    assert borne_out(shape, colour) < 0.3
+    shape = np.zeros((60, 80), np.float32)
+    shape[:, 40] = 2
+    assert borne_out(shape, colour) > 0.8
+
+
+def test_contrast_sees_colour_through_texture():
+    y, x = np.mgrid[:40, :60]
+    checks = np.where((x + y) % 2 == 0, 20.0, -20.0)
+    lab = np.stack([50 + checks, np.where(x < 30, 40.0, 0.0), 0 * checks], -1).astype(np.float32)
+    right = contrast(x < 30, lab)
+    wrong = contrast(x < 15, lab)
+    assert right[20, 28:32].min() > 0.8 and wrong[20, 13:17].max() < 0.2

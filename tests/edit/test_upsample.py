@@ -1,0 +1,68 @@
+"""Enlarged layers follow the photo's edges; mixed pixels are told apart by their colour."""
+
+import numpy as np
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edit.upsample import GuidedUpsample, matte, strips
+
+
+def photo_of(mask, inside, outside):
+    return np.where(mask[..., None], inside, outside).astype(np.float32)
+
+
+def test_equal_sizes_change_nothing():
+    layer = np.random.default_rng(0).random((7, 9, 2), np.float32)
+    photo = np.random.default_rng(1).random((7, 9, 3), np.float32)
+    np.testing.assert_array_equal(GuidedUpsample(photo, photo)(layer, np.ones((7, 9), bool), slice(0, 7)), layer)
+
+
+def test_constant_layers_stay_constant():
+    small, large = (np.random.default_rng(k).random((h, 2 * h, 3), np.float32) for k, h in ((0, 10), (1, 33)))
+    out = GuidedUpsample(small, large)(np.full((10, 20, 1), 0.3, np.float32), np.ones((10, 20), bool), slice(5, 20))
+    np.testing.assert_allclose(out, 0.3, rtol=1e-5)
+    assert out.shape == (15, 66, 1)
+
+
+def test_values_stay_on_their_side_of_an_edge_that_only_the_large_photo_resolves():
+    # The true edge runs at native column 21, inside a working pixel (4 native ones each).
+    native = np.zeros((40, 40), bool)
+    native[:, :21] = True
+    large = photo_of(native, (0.8, 0.2, 0.1), (0.1, 0.3, 0.7))
+    small = large.reshape(10, 4, 10, 4, 3).mean((1, 3))
+    layer = (np.arange(10) < 5).astype(np.float32)[None, :, None].repeat(10, 0)
+    out = GuidedUpsample(small, large)(layer, np.ones((10, 10), bool), slice(0, 40))[..., 0]
+    assert out[:, :20].min() > 0.9 and out[:, 22:].max() < 0.1
+
+
+def test_only_members_count():
+    members = np.zeros((10, 10), bool)
+    members[:, :5] = True
+    layer = np.where(members, 1.0, 99.0)[..., None].astype(np.float32)
+    grey = np.full((40, 40, 3), 0.5, np.float32)
+    out = GuidedUpsample(grey[::4, ::4], grey)(layer, members, slice(0, 40))[..., 0]
+    np.testing.assert_allclose(out[:, :22], 1, atol=1e-6)
+    assert (out[:, 32:] == 0).all()
+
+
+def test_matte_finds_the_share_of_mixed_pixels():
+    front, back = np.array([0.9, 0.4, 0.1]), np.array([0.1, 0.3, 0.6])
+    share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)  # a border six native pixels wide
+    encoded = share[:, None] * linear_to_srgb(front) + (1 - share[:, None]) * linear_to_srgb(back)
+    large = np.repeat(srgb_to_linear(encoded)[None], 60, 0).astype(np.float32)
+    mask = np.zeros((15, 15), bool)
+    mask[:, :8] = True
+    alpha = matte(mask, large)
+    np.testing.assert_allclose(alpha[30], share, atol=0.06)
+    assert (alpha[:, :20] == 1).all() and (alpha[:, 44:] == 0).all()
+
+
+def test_without_a_colour_edge_the_mask_decides():
+    mask = np.zeros((15, 15), bool)
+    mask[:, :8] = True
+    alpha = matte(mask, np.full((60, 60, 3), 0.4, np.float32))
+    assert (alpha[:, :26] == 1).all() and (alpha[:, 36:] == 0).all()
+    assert np.all(np.diff(alpha[30]) <= 0)
+
+
+def test_strips_cover_every_row_once():
+    assert np.concatenate([np.arange(1000)[rows] for rows in strips(1000)]).tolist() == list(range(1000))
