@@ -15,10 +15,10 @@ def model_folder(tmp_path_factory):
     torch.manual_seed(0)
     size = 64
     backbone = transformers.Sam2HieraDetConfig(
-        hidden_size=8, num_attention_heads=1, image_size=[size, size], blocks_per_stage=[1, 1, 1, 1],
+        hidden_size=8, num_attention_heads=1, image_size=[size, size], blocks_per_stage=[1, 1, 2, 1],
         embed_dim_per_stage=[8, 16, 32, 64], num_attention_heads_per_stage=[1, 1, 2, 2],
-        window_size_per_stage=[4, 2, 2, 2],
-        global_attention_blocks=[2], window_positional_embedding_background_size=[4, 4],
+        window_size_per_stage=[4, 4, 4, 2],
+        global_attention_blocks=[3], window_positional_embedding_background_size=[4, 4],
     )  # fmt: skip
     vision = transformers.Sam2VisionConfig(
         backbone_config=backbone, backbone_channel_list=[64, 32, 16, 8], fpn_hidden_size=32,

@@ -1,0 +1,173 @@
+"""select, edit, relight and apply on a small scene: files, exit codes, and nothing written on bad input."""
+
+import json
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, rendered_scene
+from PIL import Image
+
+from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.package import load_scene, save_scene
+
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command line; returns (exit code, stdout, stderr)."""
+
+    def call(*arguments):
+        code = run_to_exit_code(app, [str(argument) for argument in arguments])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return call
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A scene, a mask of its block, masks that do not fit, and environment maps."""
+    save_scene(rendered_scene(block=3.0), tmp_path / "a.scene")
+    Image.fromarray((MASK * 255).astype(np.uint8)).save(tmp_path / "block.png")
+    Image.fromarray(np.zeros((36, 48), np.uint8)).save(tmp_path / "empty.png")
+    Image.fromarray(np.full((36, 36), 255, np.uint8)).save(tmp_path / "square.png")
+    write_exr(tmp_path / "square.exr", np.ones((32, 32, 3), np.float32))
+    write_exr(tmp_path / "sky.exr", np.full((16, 32, 3), 0.5, np.float32))
+    (tmp_path / "edits.yaml").write_text("- edit: {mask: block.png, value: -0.5}\n- relight: {rotate: 30}\n")
+    (tmp_path / "bad.yaml").write_text("- edit: {mask: block.png, shininess: 1}\n")
+    return tmp_path
+
+
+def test_edit_writes_the_photo_with_only_the_block_changed(run, folder):
+    scene, out = folder / "a.scene", folder / "out.exr"
+    options = "--value -0.5 --roughness +0.2 --spp 6 --seed 2 --json"
+    code, shown, err = run(
+        "edit", scene, "--mask", folder / "block.png", *options.split(), "-o", out, "--save", folder / "b.scene"
+    )
+    assert code == 0, err
+    facts = json.loads(shown.splitlines()[-1])
+    assert facts["image"] == str(out) and facts["edits"][0]["roughness"] == "+0.2"
+    picture, photo = read_exr(out), load_scene(scene).photo.original
+    np.testing.assert_array_equal(picture[:8], photo[:8])
+    assert (picture[MASK] < photo[MASK]).all()
+    saved = load_scene(folder / "b.scene")
+    np.testing.assert_array_equal(saved.photo.original, picture)
+    assert saved.provenance["edits"] == facts["edits"]
+
+
+def test_a_no_op_png_has_the_bytes_of_the_photo(run, folder):
+    code, _, err = run(
+        "edit",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--roughness",
+        "+0",
+        "--spp",
+        4,
+        "-o",
+        folder / "o.png",
+    )
+    assert code == 0, err
+    from materialist.color import linear_to_srgb
+
+    photo = np.round(linear_to_srgb(load_scene(folder / "a.scene").photo.original) * 255).astype(np.uint8)
+    np.testing.assert_array_equal(np.asarray(Image.open(folder / "o.png")), photo)
+
+
+def test_full_render_is_another_picture_of_the_same_size(run, folder):
+    common = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "0.1", "--spp", 4]
+    assert run(*common, "-o", folder / "a.exr")[0] == 0
+    assert run(*common, "--full-render", "--no-denoise", "-o", folder / "b.exr")[0] == 0
+    a, b = read_exr(folder / "a.exr"), read_exr(folder / "b.exr")
+    assert a.shape == b.shape and (a[:8] != b[:8]).any()
+
+
+def test_apply_replays_the_list(run, folder):
+    code, shown, err = run(
+        "apply", folder / "a.scene", folder / "edits.yaml", "--spp", 4, "-o", folder / "o.exr", "--json"
+    )
+    assert code == 0, err
+    assert [e["kind"] for e in json.loads(shown.splitlines()[-1])["edits"]] == ["material", "light"]
+
+
+def test_relight_by_map_lamp_and_frames(run, folder):
+    scene = folder / "a.scene"
+    assert (
+        run("relight", scene, "--envmap", folder / "sky.exr", "--gain", 1, "--spp", 4, "-o", folder / "o.exr")[0] == 0
+    )
+    darker = read_exr(folder / "o.exr")
+    assert darker.mean() < 0.6 * load_scene(scene).photo.original.mean()
+    code, _, err = run(
+        "relight", scene, "--lamp", "10,10,2.5,3000,1", "--ambient", 0.5, "--spp", 4, "-o", folder / "l.png"
+    )
+    assert code == 0, err
+    code, _, err = run("relight", scene, "--rotate", 90, "--frames", 2, "--spp", 2, "-o", folder / "turn")
+    assert code == 0, err
+    assert sorted(p.name for p in (folder / "turn").iterdir()) == ["0000.png", "0001.png"]
+
+
+def test_select_writes_a_mask_that_edit_reads(run, folder):
+    code, shown, err = run(
+        "select", folder / "a.scene", "--mask", folder / "block.png", "-o", folder / "m.png", "--json"
+    )
+    assert code == 0, err
+    assert json.loads(shown.splitlines()[-1])["pixels"] == MASK.sum()
+    np.testing.assert_array_equal(np.asarray(Image.open(folder / "m.png"))[..., 0] == 255, MASK)
+    assert run("select", folder / "a.scene", "--click", "17,17", "--native", "-o", folder / "n.png")[0] == 0
+
+
+EDIT = ["edit", "SCENE", "-o", "OUT.png"]
+RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([*EDIT, "--mask", "square.png", "--hue", "9"], "36 x 36"),
+        ([*EDIT, "--mask", "empty.png", "--hue", "9"], "empty"),
+        ([*EDIT, "--mask", "none.png", "--hue", "9"], "none.png"),
+        ([*EDIT, "--click", "500,5", "--hue", "9"], "outside"),
+        ([*EDIT, "--click", "five", "--hue", "9"], "--click"),
+        ([*EDIT, "--hue", "9"], "exactly one"),
+        ([*EDIT, "--mask", "block.png"], "Nothing to change"),
+        ([*EDIT, "--mask", "block.png", "--roughness", "3"], "roughness is 3"),
+        ([*EDIT, "--mask", "block.png", "--albedo", "1,2"], "R,G,B"),
+        ([*EDIT, "--mask", "block.png", "--texture", "none.png"], "none.png"),
+        ([*EDIT, "--mask", "block.png", "--hue", "9", "--spp", "1"], "--spp"),
+        (["edit", "SCENE", "--mask", "block.png", "--hue", "9", "-o", "OUT.gif"], ".png"),
+        (["edit", "nothing.scene", "--mask", "block.png", "--hue", "9", "-o", "OUT.png"], "nothing.scene"),
+        ([*EDIT, "--mask", "block.png", "--hue", "9", "--save", "SCENE"], "--force"),
+        (RELIGHT, "No light"),
+        ([*RELIGHT, "--envmap", "square.exr"], "twice as wide"),
+        ([*RELIGHT, "--envmap", "none.exr"], "none.exr"),
+        ([*RELIGHT, "--sun", "10,100"], "elevation is 100"),
+        ([*RELIGHT, "--lamp", "1,2,3"], "--lamp"),
+        ([*RELIGHT, "--lamp", "1,2,3,99999,1"], "99999"),
+        ([*RELIGHT, "--rotate", "9", "--frames", "4"], ".mp4"),
+        (["relight", "SCENE", "--rotate", "9", "--frames", "1", "-o", "OUT"], "frames is 1"),
+        (["apply", "SCENE", "bad.yaml", "-o", "OUT.png"], "shininess"),
+        (["apply", "SCENE", "none.yaml", "-o", "OUT.png"], "none.yaml"),
+        (["select", "SCENE", "--click", "1,1", "-o", "OUT.exr"], ".png"),
+        (["select", "SCENE", "-o", "OUT.png"], "exactly one"),
+    ],
+)
+def test_bad_input_is_exit_2_and_nothing_is_written(run, folder, arguments, words):
+    before = sorted(p.name for p in folder.iterdir())
+    names = {"SCENE": "a.scene", "OUT": "out", "OUT.png": "out.png", "OUT.gif": "out.gif", "OUT.exr": "out.exr"}
+    files = {p.name for p in folder.iterdir()} | {"none.png", "none.exr", "none.yaml", "nothing.scene"}
+    filled = [names.get(a, a) for a in arguments]
+    filled = [folder / a if a in files or a.startswith("out") else a for a in filled]
+    code, _, err = run(*filled)
+    assert code == 2 and words in err and "Traceback" not in err, err
+    assert err.count("\n") == 1
+    assert sorted(p.name for p in folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("command", ["select", "edit", "relight", "apply"])
+def test_help(run, command):
+    code, out, _ = run(command, "--help")
+    assert code == 0 and "--json" in out
