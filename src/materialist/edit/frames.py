@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edit.relight import relight
+from materialist.edit.relight import relight, triple
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.image import write_png_bytes
 from materialist.types import Array, Lamp, Scene
@@ -52,8 +52,7 @@ def _between(stations: Array, t: float) -> Array:
 
 def _lamp_between(lamps: tuple[Lamp, ...], t: float) -> Lamp:
     at = lambda name: _between(np.array([getattr(lamp, name) for lamp in lamps], np.float64), t)  # noqa: E731
-    position, power = (tuple(float(v) for v in at(name)) for name in ("position", "power"))
-    return replace(lamps[0], position=position, power=power, radius=float(at("radius")))
+    return replace(lamps[0], position=triple(at("position")), power=triple(at("power")), radius=float(at("radius")))
 
 
 def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:

@@ -46,8 +46,8 @@ def edge_map(features, kind: str = "plain") -> Array:
     """
     import cv2
 
-    lab = np.ascontiguousarray(features.lab, np.float32)
-    lab = cv2.GaussianBlur(lab, (0, 0), 2.5) * 2 if kind == "coarse" else cv2.bilateralFilter(lab, 5, 12, 2)
+    lab: Array = np.ascontiguousarray(features.lab, np.float32)
+    lab = np.asarray(cv2.GaussianBlur(lab, (0, 0), 2.5) * 2 if kind == "coarse" else cv2.bilateralFilter(lab, 5, 12, 2))
     if kind == "chroma":
         lab = lab * np.array([0.25, 1.5, 1.5], np.float32)
     colour = np.sqrt(sum(_gradient(lab[..., c]) ** 2 for c in range(3))) / _COLOUR

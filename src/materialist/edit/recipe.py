@@ -76,7 +76,7 @@ def apply(scene: Scene, steps: list[Step]) -> Scene:
 
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    where = {
+    where: dict[str, Any] = {
         "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
         "box": _numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": _file(step, "mask") if "mask" in given else None,

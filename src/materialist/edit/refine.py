@@ -47,15 +47,8 @@ def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
     labels = np.ascontiguousarray(label)
     cv2.setRNGSeed(0)
     try:
-        cv2.grabCut(
-            np.ascontiguousarray(picture),
-            labels,
-            None,
-            np.zeros((1, 65)),
-            np.zeros((1, 65)),
-            rounds,
-            cv2.GC_INIT_WITH_MASK,
-        )
+        model = np.zeros((1, 65)), np.zeros((1, 65))  # GrabCut's colour models, filled by it
+        cv2.grabCut(np.ascontiguousarray(picture), labels, (0, 0, 0, 0), *model, rounds, cv2.GC_INIT_WITH_MASK)
     except cv2.error:  # too few pixels on one side for its colour model
         return (label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)
     return (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)

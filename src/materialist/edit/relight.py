@@ -83,7 +83,13 @@ def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: f
     position = pixel_rays(scene.camera)[row, column].astype(np.float64) * depth
     # White wall: radiance = albedo / pi * I / d^2 = power at d = LAMP_UNIT * middle, with flux 4 pi I.
     flux = 4 * np.pi * np.pi * power * (LAMP_UNIT * middle) ** 2 * kelvin_colour(kelvin)
-    return Lamp(tuple(float(v) for v in position), tuple(float(v) for v in flux), LAMP_RADIUS * middle)
+    return Lamp(triple(position), triple(flux), LAMP_RADIUS * middle)
+
+
+def triple(values: Array) -> tuple[float, float, float]:
+    """Three numbers as a tuple of plain floats, as files and comparisons want them."""
+    a, b, c = (float(v) for v in values)
+    return a, b, c
 
 
 def checked_envmap(envmap: Array) -> Array:

@@ -19,8 +19,8 @@ _SIZE = 256
 def select(
     scene: Scene,
     *,
-    click: tuple[float, float] | Sequence[tuple[float, float]] | None = None,
-    box: tuple[float, float, float, float] | None = None,
+    click: Sequence[float] | Sequence[Sequence[float]] | None = None,
+    box: Sequence[float] | None = None,
     mask: Array | str | Path | None = None,
     method: str = "grabcut",
 ) -> Array:
@@ -98,9 +98,9 @@ def _smaller(scene: Scene) -> tuple[Features, float]:
     height, width = scene.depth.shape
     scale = min(1.0, _SIZE / max(height, width))
     size = (max(2, round(width * scale)), max(2, round(height * scale)))
-    shrink = lambda v, how: cv2.resize(np.ascontiguousarray(v, np.float32), size, interpolation=how)  # noqa: E731
+    shrink = lambda v, how: np.array(cv2.resize(np.ascontiguousarray(v, np.float32), size, interpolation=how))  # noqa: E731
     normal = shrink(scene.normal, cv2.INTER_AREA)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     depth = shrink(scene.depth, cv2.INTER_NEAREST)
     return Features(shrink(scene.photo.linear, cv2.INTER_AREA), depth, normal), scale
 
