@@ -147,6 +147,7 @@ def test_developed_scenes_start_from_the_composite(tmp_path):
     assert back.photo.linear.shape == scene.photo.linear.shape
     assert back.lamps == edited.lamps and back.materials.roughness[MASK].max() < 0.21
     assert [e["kind"] for e in back.provenance["edits"]] == ["material", "light"]
+    assert back.report.stages[-1]["edits"] == back.provenance["edits"]
 
 
 def test_too_few_samples():

@@ -139,7 +139,9 @@ def developed(scene: Scene, edited: Scene, picture: Array) -> Scene:
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
     photo = replace(scene.photo, linear=linear.astype(np.float32), original=picture, source=None)
-    return replace(edited, photo=photo)
+    stage = {"name": "edit", "edits": edited.provenance.get("edits", [])}
+    report = replace(edited.report, stages=(*edited.report.stages, stage))
+    return replace(edited, photo=photo, report=report)
 
 
 def _unclipped(photo: Array, base: Array) -> Array:
