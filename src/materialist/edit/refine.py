@@ -12,6 +12,9 @@ from materialist.types import Array, Scene
 _INNER, _OUTER = 0.02, 0.22
 """How far the border may move inwards and outwards, as a share of the longer side; thin parts stick out."""
 
+_GAP = 0.015
+"""Half of the gap across which two parts are one, as a share of the longer side."""
+
 
 def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] bool: the rough mask with its border moved, within a band, to where colour and depth change."""
@@ -61,7 +64,9 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]] | None) -> Array:
 
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
-    parts, count = ndimage.label(opened)
+    # A highlight or a thin shadow may cut an object in two: parts a little apart are one, and the gap is theirs.
+    joined = opened | (cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, _disc(_GAP, mask)) > 0)
+    parts, count = ndimage.label(joined)
     if count == 0:
         return mask
     sizes = np.bincount(parts.ravel())[1:]
