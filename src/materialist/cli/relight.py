@@ -58,7 +58,7 @@ def relight(
 
     if envmap is None and rotate is None and not sun and not lamp and ambient == 1.0 and frames is None:
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp or --ambient.")
-    suns = [numbers(text, 2, "--sun") for text in sun or ()]
+    suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
     if frames is None:
         check_before(output, save, spp, force)
@@ -71,7 +71,9 @@ def relight(
         options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}
     loaded = load_scene(scene)
     lamps = tuple(make_lamp(loaded, *values) for values in wanted)
-    shared = {"spp": spp, "seed": seed, "denoise": denoise, "device": device.value, "full_render": full_render}
+    shared: dict[str, Any] = {
+        "spp": spp, "seed": seed, "denoise": denoise, "device": device.value, "full_render": full_render,
+    }  # fmt: skip
     if frames is not None:
         moving = {**options, "turn": rotate or 0.0, "suns": tuple(suns), "lamps": lamps}
         _video(loaded, output, frames, moving, shared, fps, as_json, force)

@@ -52,8 +52,9 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
         gives = ", ".join(source.gives)
         options = " ".join(f"--{name} {spec}" for name in source.gives)
         raise InputError(f"'{spec}' gives only {gives}: use it for these beside another predictor, with {options}.")
-    if hasattr(source, "prepare"):
-        source.prepare(source.gives)
+    prepare = getattr(source, "prepare", None)
+    if prepare is not None:
+        prepare(getattr(source, "gives"))  # noqa: B009 - no part of the protocol of whole predictors
     return source
 
 

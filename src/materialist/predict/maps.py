@@ -62,7 +62,8 @@ class MapsPredictor:
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
         """Only the wanted maps, as `predict`; the folder need not hold any other. Raises InputError as `predict`."""
-        size, warnings, maps = photo.linear.shape[:2], [], {}
+        size, maps = photo.linear.shape[:2], {}
+        warnings: list[str] = []
         for name in wanted:
             if name in ("roughness", "metallic"):
                 neutral = NEUTRAL_ROUGHNESS if name == "roughness" else NEUTRAL_METALLIC

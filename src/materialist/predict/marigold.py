@@ -40,7 +40,9 @@ class Marigold:
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
         """The wanted maps; the normals come before the depth, which is scaled by them."""
-        maps, sources, warnings = {}, {}, []
+        maps: dict[str, Array] = {}
+        sources: dict[str, str] = {}
+        warnings: list[str] = []
         for part, names in self._shared(wanted):
             found = part.parts(photo, names, seed=seed, normal=maps.get("normal", normal))
             maps |= found.maps
@@ -115,7 +117,7 @@ def appearance(output: Array, properties: dict) -> dict[str, Array]:
         properties: the pipeline's `target_properties`: the order of the targets, what their channels are
             (`sub_target_names`), and whether the albedo is linear or sRGB (`prediction_space`; sRGB unless said).
     """
-    maps = {}
+    maps: dict[str, Array] = {}
     ours = {"metallicity": "metallic", "roughness": "roughness"}
     for name, picture in zip(properties.get("target_names", ("albedo",)), output):
         about = properties.get(name) or {}
@@ -130,7 +132,8 @@ def appearance(output: Array, properties: dict) -> dict[str, Array]:
 def unit_normals(output: Array) -> Array:
     """[H, W, 3] unit normals. Marigold's frame is ours: +X right, +Y up, +Z to the viewer; interpolation shortens."""
     length = np.linalg.norm(output, axis=-1, keepdims=True)
-    return np.where(length > 1e-3, output / np.maximum(length, 1e-3), np.float32([0, 0, 1])).astype(np.float32)
+    ahead = np.array([0, 0, 1], np.float32)
+    return np.where(length > 1e-3, output / np.maximum(length, 1e-3), ahead).astype(np.float32)
 
 
 def _pipeline_class(folder: Path) -> str:

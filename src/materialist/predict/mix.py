@@ -32,7 +32,10 @@ class Part:
 class PartPredictor(Protocol):
     """Gives some of the maps, and computes only those that are wanted."""
 
-    gives: tuple[str, ...]
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """Names of the maps it can give."""
+        ...
 
     @property
     def name(self) -> str:
@@ -93,7 +96,9 @@ class MixedPredictor:
         derived = self.normal_spec != self.depth_spec and _follows_depth(self.sources[self.normal_spec])
         # The source of the depth comes last: a measured normal map helps to scale a relative depth.
         order = sorted(self.sources, key=lambda spec: spec == self.depth_spec)
-        maps, sources, warnings = {}, {}, []
+        maps: dict[str, Array] = {}
+        sources: dict[str, str] = {}
+        warnings: list[str] = []
         for spec in order:
             guide = None if derived else maps.get("normal")
             part = _parts(self.sources[spec], photo, self.wanted[spec], seed, guide)

@@ -55,10 +55,11 @@ class _Scratch(nn.Module):
     def forward(self, layers: Sequence[Tensor], size: tuple[int, int]) -> Tensor:
         """[B, outputs, *size] from the four scales, finest first."""
         fine = [getattr(self, f"layer{k}_rn")(x) for k, x in enumerate(layers, 1)]
-        path = self.refinenet4(fine[3], None, fine[2].shape[-2:])
-        path = self.refinenet3(path, fine[2], fine[1].shape[-2:])
-        path = self.refinenet2(path, fine[1], fine[0].shape[-2:])
-        path = self.refinenet1(path, fine[0], tuple(2 * n for n in path.shape[-2:]))
+        fuse = [getattr(self, f"refinenet{k}") for k in range(1, 5)]
+        path = fuse[3](fine[3], None, fine[2].shape[-2:])
+        path = fuse[2](path, fine[2], fine[1].shape[-2:])
+        path = fuse[1](path, fine[1], fine[0].shape[-2:])
+        path = fuse[0](path, fine[0], tuple(2 * n for n in path.shape[-2:]))
         return self.output_conv2(_resized(self.output_conv1(path), size))
 
 

@@ -58,7 +58,7 @@ class MatNetPredictor:
         if not all(np.isfinite(values).all() for values in maps.values()):
             raise WeightsError(f"MatNet gave values that are not finite; check the weights ({self.source}).")
         length = np.linalg.norm(maps["normal"], axis=-1, keepdims=True)
-        normal = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), np.float32([0, 0, 1]))
+        normal = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), np.array([0, 0, 1], np.float32))
         clipped = {k: np.clip(maps[k], 0, 1) for k in ("albedo", "roughness", "metallic")}
         return Prediction(
             Materials(**clipped), normal.astype(np.float32), planar_depth(maps["depth"]), predictor=self.name
