@@ -28,7 +28,19 @@ _HOME = {
     "lamp": "edit.relight",
     "composite": "edit.composite",
     **dict.fromkeys(
-        ("Camera", "FitReport", "Geometry", "Lamp", "Materials", "Mesh", "Photo", "Prediction", "Scene"),
+        (
+            "Body",
+            "Camera",
+            "FitReport",
+            "Geometry",
+            "Lamp",
+            "Materials",
+            "Mesh",
+            "Photo",
+            "Prediction",
+            "Scene",
+            "Surface",
+        ),
         "types",
     ),
     **dict.fromkeys(
@@ -57,6 +69,7 @@ if TYPE_CHECKING:
     from materialist.io.photo import read_photo as read_photo
     from materialist.pipeline import invert as invert
     from materialist.pipeline import render_scene as render_scene
+    from materialist.types import Body as Body
     from materialist.types import Camera as Camera
     from materialist.types import FitReport as FitReport
     from materialist.types import Geometry as Geometry
@@ -66,6 +79,7 @@ if TYPE_CHECKING:
     from materialist.types import Photo as Photo
     from materialist.types import Prediction as Prediction
     from materialist.types import Scene as Scene
+    from materialist.types import Surface as Surface
 
 
 def __getattr__(name: str) -> Any:

@@ -114,6 +114,40 @@ class Lamp:
     """Scene units, > 0."""
 
 
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The material of a body: the scene's BRDF, and a share of light that enters instead."""
+
+    albedo: Array
+    """[h, w, 3] float32 linear, in [0, 1]; repeated over the texture coordinates."""
+    roughness: Array
+    """[h, w] float32 perceptual roughness r (alpha = r**2), in [0, 1]."""
+    metallic: Array
+    """[h, w] float32, in [0, 1]."""
+    transmission: float = 0.0
+    """Share T of a dielectric interface in place of the opaque surface, in [0, 1]."""
+    ior: float = 1.5
+    """Index of refraction of the inside, in [1, 3]."""
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Colour of white light after a way in and a way out, linear, in [0, 1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A thing with a material of its own beside the depth surface: inserted, dropped, or turned to glass."""
+
+    vertices: Array
+    """[V, 3] float32, camera frame, scene units."""
+    faces: Array
+    """[F, 3] int32, counter-clockwise seen from outside (a cavity's from within the cavity)."""
+    normals: Array
+    """[V, 3] float32 unit shading normals, to the outside."""
+    uv: Array
+    """[V, 2] float32: u to the right, v DOWN."""
+    surface: Surface
+    name: str = "body"
+
+
 @dataclass(frozen=True)
 class FitReport:
     """What happened, stage by stage, and how good the result is; the content of report.json."""
@@ -147,3 +181,5 @@ class Scene:
     """Tool version, predictor, weights hash, options, seed."""
     lamps: tuple[Lamp, ...] = ()
     """Lights beside the environment map; a photograph has none until somebody adds one."""
+    bodies: tuple[Body, ...] = ()
+    """Closed things beside the depth surface; a photograph has none until somebody adds one."""

@@ -12,6 +12,7 @@ from materialist.edit.lights import Studio
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, relight
 from materialist.errors import InputError
+from materialist.types import Body, Surface
 
 MASK = block_mask(36, 48)
 
@@ -154,3 +155,24 @@ def test_too_few_samples():
     scene = rendered_scene()
     with pytest.raises(InputError, match="spp is 1"):
         composite(scene, edit(scene, MASK, roughness=0.2), spp=1)
+
+
+def test_a_body_that_is_put_in_is_seen_and_nothing_far_from_it_changes():
+    scene = rendered_scene(1)
+    body = tetrahedron()
+    out = composite(scene, replace(scene, bodies=(body,)), spp=12)
+    seen = Studio(scene).covered(replace(scene, bodies=(body,)))
+    assert 10 < seen.sum() < 400
+    assert (out[seen] != scene.photo.original[seen]).any(-1).all()
+    np.testing.assert_array_equal(composite(scene, replace(scene, bodies=()), spp=6), scene.photo.original)
+
+
+def tetrahedron() -> Body:
+    """A red one, right of the block, half a unit before the wall."""
+    corners = np.float32([[0.2, -0.3, -2.4], [0.7, -0.3, -2.4], [0.45, -0.3, -2.0], [0.45, 0.3, -2.3]])
+    faces = np.int32([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+    middle = corners.mean(0)
+    normals = (corners - middle) / np.linalg.norm(corners - middle, axis=-1, keepdims=True)
+    grey = np.full((1, 1), 0.5, np.float32)
+    red = np.float32([[[0.7, 0.05, 0.05]]])
+    return Body(corners, faces, normals, np.zeros((4, 2), np.float32), Surface(red, grey, 0 * grey))

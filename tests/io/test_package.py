@@ -16,6 +16,7 @@ from materialist.io import package, target
 from materialist.io.package import load_scene, save_scene
 from materialist.io.ply import read_ply, write_ply
 from materialist.io.target import ensure_writable
+from materialist.types import Body, Surface
 
 
 def assert_same(a, b, where="scene"):
@@ -27,8 +28,25 @@ def assert_same(a, b, where="scene"):
     elif isinstance(a, np.ndarray):
         assert a.dtype == b.dtype and a.shape == b.shape, where
         assert a.tobytes() == b.tobytes(), where
+    elif isinstance(a, tuple) and a and is_dataclass(a[0]):
+        assert len(a) == len(b), where
+        for k, (one, other) in enumerate(zip(a, b)):
+            assert_same(one, other, f"{where}[{k}]")
     else:
         assert a == b, where
+
+
+def test_round_trip_with_bodies_is_exact(scene, tmp_path):
+    rng = np.random.default_rng(3)
+    numbers = lambda *shape: rng.random(shape, np.float32)  # noqa: E731
+    surface = Surface(numbers(2, 3, 3), numbers(2, 3), numbers(1, 1), 0.9, 1.4, (0.5, 0.6, 1.0))
+    body = Body(numbers(4, 3), np.int32([[0, 1, 2], [0, 2, 3]]), numbers(4, 3), numbers(4, 2), surface, "a jug")
+    full = replace(scene, bodies=(body, replace(body, name="another")))
+    save_scene(full, tmp_path / "a.scene")
+    assert_same(load_scene(tmp_path / "a.scene"), full)
+    (tmp_path / "a.scene/bodies/1.albedo.exr").unlink()
+    with pytest.raises(SceneError, match=r"1\.albedo\.exr"):
+        load_scene(tmp_path / "a.scene")
 
 
 def test_round_trip_is_exact(scene, tmp_path):

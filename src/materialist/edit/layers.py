@@ -41,6 +41,8 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
     scene = studio.scene
     base, other = studio.twins(edited)
     changed = changed_pixels(scene, edited)
+    if scene.bodies != edited.bodies:
+        changed |= studio.covered(edited)
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal)
     layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
     return replace(layers, relit=is_relit(scene, edited))
@@ -52,12 +54,13 @@ def is_relit(scene: Scene, edited: Scene) -> bool:
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
-    """[H, W] bool: where the maps of the two scenes differ; everywhere under another light."""
+    """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
     if is_relit(scene, edited):
         return np.ones(scene.depth.shape, bool)
     a, b = scene.materials, edited.materials
     changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
-    return changed & (scene.depth > 0)
+    # Where a surface was taken away, what stands behind it is seen.
+    return (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
 
 
 def difference(

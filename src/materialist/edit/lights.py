@@ -17,42 +17,54 @@ PATHS_PER_RAY = 3
 class Studio:
     """Renderings of one fitted scene and of its edits, always with the same random numbers on both sides.
 
-    What is alike is built once: scenes of one geometry and lamps share a Mitsuba scene, and a base picture that was
-    rendered before is not rendered again.
+    What is alike is built once: scenes of one geometry, bodies and lamps share a Mitsuba scene, and a base picture
+    that was rendered before is not rendered again.
     """
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
         self.scene, self.device = scene, device
         self._built: list[tuple[Scene, Any]] = []
-        self._base: dict[tuple[bool, int, int], Array] = {}
+        self._base: dict[tuple[int, int, int], Array] = {}
 
     def twins(self, edited: Scene) -> tuple[Render, Render]:
         """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
 
-        The splitting tracer serves smooth light; with lamps or a peaked light on either side both go to Mitsuba's
-        path tracer, which aims at the lights.
+        The splitting tracer serves smooth light; with lamps, a peaked light or glass on either side both go to
+        Mitsuba's path tracer, which aims at the lights and follows paths through glass.
         """
-        by_path = any(_needs_path(s) for s in (self.scene, edited))
+        depth = max(_path_depth(s) for s in (self.scene, edited))
 
         def base(spp: int, seed: int) -> Array:
-            key = (by_path, spp, seed)
+            key = (depth, spp, seed)
             if key not in self._base:
-                self._base[key] = self._render(self.scene, by_path, spp, seed)
+                self._base[key] = self._render(self.scene, depth, spp, seed)
             return self._base[key]
 
-        return base, lambda spp, seed: self._render(edited, by_path, spp, seed)
+        return base, lambda spp, seed: self._render(edited, depth, spp, seed)
 
-    def _render(self, scene: Scene, by_path: bool, spp: int, seed: int) -> Array:
+    def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
+        """By Mitsuba's path tracer to that depth, by the splitting one for 0."""
         target = self._target(scene)
         target.set_materials(scene.materials)
         target.set_envmap(scene.envmap)
-        if by_path:
-            return target.render_path(spp=spp, seed=seed)
+        if depth:
+            return target.render_path(spp=spp, seed=seed, max_depth=depth)
         return target.render(spp=-(-spp // PATHS_PER_RAY), seed=seed)
+
+    def covered(self, edited: Scene) -> Array:
+        """[H, W] bool: pixels in which a body is seen, at least in part, that the other of the two scenes lacks."""
+        from materialist.render.seen import bodies_seen
+
+        seen = np.zeros(self.scene.depth.shape, bool)
+        for scene, other in ((self.scene, edited), (edited, self.scene)):
+            own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
+            if own:
+                seen |= bodies_seen(self._target(scene).mi_scene, scene.camera, own) > 0
+        return seen
 
     def _target(self, scene: Scene):
         for other, target in self._built:
-            if other.geometry is scene.geometry and other.lamps == scene.lamps:
+            if other.geometry is scene.geometry and (other.lamps, other.bodies) == (scene.lamps, scene.bodies):
                 return target
         target = _built(scene, self.device)
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
@@ -60,16 +72,21 @@ class Studio:
         return target
 
 
-def _needs_path(scene: Scene) -> bool:
+def _path_depth(scene: Scene) -> int:
+    """Length of the paths that Mitsuba's tracer must follow; 0 where the splitting tracer does."""
+    from materialist.render.bodies import is_transparent
     from materialist.render.envmap import is_peaked
+    from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
 
-    return bool(scene.lamps) or is_peaked(scene.envmap)
+    if any(is_transparent(body.surface) for body in scene.bodies):
+        return GLASS_DEPTH
+    return MAX_DEPTH if scene.lamps or is_peaked(scene.envmap) else 0
 
 
 def _built(scene: Scene, device: str):
     from materialist.render.scene import RenderScene
 
-    target = RenderScene(scene.geometry, scene.camera, device=device)
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies, device=device)
     if scene.lamps:
         add_lamps(target, scene.lamps)
     return target

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import MaterialistError, OutputError, SceneError
+from materialist.io.bodies import read_bodies, write_bodies
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
 from materialist.io.overview import overview
@@ -66,6 +67,7 @@ def load_scene(path: str | Path) -> Scene:
             report=_report_from_json(_read_json(folder / "report.json")),
             provenance=meta["provenance"],
             lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
+            bodies=read_bodies(folder, meta.get("bodies", [])),
         )
     except (KeyError, TypeError) as error:
         raise SceneError(f"{folder / MARKER} is incomplete ({error}); save the scene again.") from error
@@ -93,7 +95,10 @@ def _write(scene: Scene, folder: Path) -> None:
     write_png(folder / "rerender.png", scene.rerender)
     write_png_bytes(folder / "overview.png", overview(scene))
     _write_json(folder / "report.json", _report_to_json(scene.report))
-    _write_json(folder / MARKER, _meta(scene, original))
+    meta = _meta(scene, original)
+    if scene.bodies:
+        meta["bodies"] = write_bodies(folder, scene.bodies)
+    _write_json(folder / MARKER, meta)
 
 
 def _meta(scene: Scene, original: str) -> dict[str, Any]:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.render.bodies import body_bsdf
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, on_mitsuba_grid
 from materialist.render.variant import setup
-from materialist.types import Array, Camera, Geometry, Materials, Mesh
+from materialist.types import Array, Body, Camera, Geometry, Materials, Mesh
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
+
+GLASS_DEPTH = 16
+"""Path length with transparent bodies: through two of them, with reflections inside, and on by three surfaces."""
 
 _WAVEFRONT = 2**24
 """Camera paths traced at a time: bounds the memory."""
@@ -20,19 +24,20 @@ class RenderScene:
     """Path tracing of one geometry from one camera.
 
     `mi_scene` is Mitsuba's scene. Its shapes are `surface`, with the faces that `geometry.mesh` gives the depth
-    surface in their order, and `plane0`, `plane1`, ...: the continued planes likewise (see `part`).
+    surface in their order, `plane0`, `plane1`, ...: the continued planes likewise (see `part`), and `body0`, ...
 
     Args:
         geometry: the depth surface carries the per-pixel maps; the continuation of a plane carries the mean of the
             maps over the plane's pixels.
         camera: pinhole at the origin.
+        bodies: things with materials of their own.
         device: `auto`, `cpu` or `cuda`.
 
     Raises:
         InputError: a picture below 2 x 2 pixels, or a mesh without a depth surface. SetupError: see `variant.setup`.
     """
 
-    def __init__(self, geometry: Geometry, camera: Camera, *, device: str = "auto"):
+    def __init__(self, geometry: Geometry, camera: Camera, *, bodies: tuple[Body, ...] = (), device: str = "auto"):
         if min(camera.width, camera.height) < 2:
             raise InputError(f"The picture is {camera.width} x {camera.height}; rendering needs 2 x 2 pixels or more.")
         if not (geometry.mesh.face_plane == -1).any():
@@ -58,6 +63,7 @@ class RenderScene:
         }
         for k in self.planes:
             description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
+        description |= {f"body{k}": _shape(mi, body, body_bsdf(mi, body.surface)) for k, body in enumerate(bodies)}
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
@@ -221,7 +227,7 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     }  # fmt: skip
 
 
-def _shape(mi, mesh: Mesh, bsdf: dict):
+def _shape(mi, mesh: Mesh | Body, bsdf: dict):
     props = mi.Properties()
     props["mesh_bsdf"] = mi.load_dict(bsdf)
     shape = mi.Mesh(

@@ -146,7 +146,7 @@ _VARIANTS = {"cpu": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 
 
 def setup(device: str = "auto"):
-    """Choose the variant (`llvm_ad_rgb` or `cuda_ad_rgb`) and return the `mitsuba` module, with our BSDF registered.
+    """Choose the variant (`llvm_ad_rgb` or `cuda_ad_rgb`) and return the `mitsuba` module, with our plugins registered.
 
     The first call decides for the whole process; later calls with the same device, or `auto`, return at once. The CPU
     variant runs on the processors this process may use, or on OMP_NUM_THREADS of them, as torch does.
@@ -171,7 +171,7 @@ def setup(device: str = "auto"):
         if current in _VARIANTS.values():
             raise SetupError(f"This process already renders with {current}; start a new one for --device {device}.")
         _start(mi, device)
-    _register_bsdf(wanted)
+    _register_plugins(wanted)
     return mi
 
 
@@ -215,8 +215,9 @@ def _limit_threads() -> None:
 
 
 @lru_cache(maxsize=2)
-def _register_bsdf(variant: str) -> None:
+def _register_plugins(variant: str) -> None:
     """Once for each variant: Mitsuba keeps plugins by variant."""
-    from materialist.render import bsdf
+    from materialist.render import bodies, bsdf
 
     bsdf.register()
+    bodies.register()

@@ -1,0 +1,83 @@
+"""Materials of bodies as Mitsuba BSDFs: the scene's own BRDF, and (rough) dielectric interfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.types import Array, Surface
+
+OUTSIDE = "materialist_outside"
+"""Plugin name of a texture with one value outside of a body, and 1 seen from within."""
+SMOOTH = 0.03
+"""Perceptual roughness below which a dielectric is taken as perfectly smooth."""
+
+
+def is_transparent(surface: Surface) -> bool:
+    """Whether light enters the body; paths then need `scene.GLASS_DEPTH`, and Mitsuba's path tracer."""
+    return surface.transmission > 0
+
+
+def body_bsdf(mi, surface: Surface) -> dict:
+    """A Mitsuba description: T times a dielectric and (1 - T) times the opaque BRDF, T the transmission.
+
+    The opaque share is a coat on the outside: light that has entered meets the dielectric alone. The tint is shared
+    by the way in and the way out: each interface has its square root.
+    """
+    if not is_transparent(surface):
+        return _opaque(mi, surface)
+    glass = _dielectric(surface)
+    if surface.transmission >= 1:
+        return glass
+    weight = {"type": OUTSIDE, "value": float(surface.transmission)}
+    return {"type": "blendbsdf", "weight": weight, "opaque": _opaque(mi, surface), "glass": glass}
+
+
+def _dielectric(surface: Surface) -> dict:
+    roughness = float(np.mean(surface.roughness))
+    tint = [float(np.sqrt(c)) for c in surface.tint]
+    ior = max(float(surface.ior), 1.0001)  # Mitsuba takes no interface between equal media
+    glass = {
+        "int_ior": ior, "ext_ior": 1.0, "specular_transmittance": {"type": "rgb", "value": tint},
+    }  # fmt: skip
+    if roughness < SMOOTH:
+        return {"type": "dielectric", **glass}
+    return {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2, **glass}
+
+
+def _opaque(mi, surface: Surface) -> dict:
+    texture = {
+        "base_color": surface.albedo, "roughness": surface.roughness[..., None],
+        "metallic": surface.metallic[..., None],
+    }  # fmt: skip
+    return {"type": "materialist_disney", **{name: _texture(mi, values) for name, values in texture.items()}}
+
+
+def _texture(mi, values: Array) -> dict:
+    """[h, w, C] as a bitmap texture; Mitsuba takes none below 2 x 2."""
+    grown = np.tile(values, (2 if values.shape[0] == 1 else 1, 2 if values.shape[1] == 1 else 1, 1))
+    data = mi.TensorXf(np.ascontiguousarray(grown, np.float32))
+    return {"type": "bitmap", "data": data, "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+
+
+def register() -> None:
+    """Make the texture known to the active variant."""
+    import drjit as dr
+    import mitsuba as mi
+
+    class Outside(mi.Texture):
+        """`value` where the surface is seen from outside, 1 from within."""
+
+        def __init__(self, props: mi.Properties):
+            mi.Texture.__init__(self, props)
+            self.value = float(props["value"])
+
+        def eval_1(self, si, active=True):
+            return dr.select(si.wi.z > 0, mi.Float(self.value), mi.Float(1))
+
+        def mean(self):
+            return mi.Float(self.value)
+
+        def to_string(self):
+            return f"Outside[{self.value}]"
+
+    mi.register_texture(OUTSIDE, Outside)

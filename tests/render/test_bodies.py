@@ -1,0 +1,107 @@
+"""Bodies beside the depth surface, against closed forms."""
+
+import numpy as np
+import pytest
+from render_scenes import empty
+
+from materialist.render.bodies import is_transparent
+from materialist.render.scene import GLASS_DEPTH, RenderScene
+from materialist.render.seen import bodies_seen
+from materialist.types import Body, Camera, Surface
+
+CAMERA = Camera(48, 32, 40.0)
+DISTANCE, RADIUS = 5.0, 1.0
+
+
+def sphere(surface: Surface, rows: int = 96) -> Body:
+    """A sphere on the camera's axis, with exact normals."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, 2 * rows), indexing="ij")
+    unit = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), -np.sin(theta) * np.sin(phi)], -1).reshape(-1, 3)
+    index = np.arange(rows * 2 * rows).reshape(rows, 2 * rows)
+    a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    vertices = unit * RADIUS + [0, 0, -DISTANCE]
+    corner = vertices[faces]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=-1)
+    uv = np.stack([phi / (2 * np.pi), theta / np.pi], -1).reshape(-1, 2)
+    return Body(
+        vertices.astype(np.float32), faces[area > 1e-9].astype(np.int32), unit.astype(np.float32),
+        uv.astype(np.float32), surface,
+    )  # fmt: skip
+
+
+def surface(albedo=0.5, roughness=0.0, metallic=0.0, **glass) -> Surface:
+    one = np.ones((1, 1), np.float32)
+    return Surface(np.full((1, 1, 3), albedo, np.float32), roughness * one, metallic * one, **glass)
+
+
+def picture(body: Body, envmap, spp: int = 16) -> np.ndarray:
+    target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
+    target.set_envmap(envmap)
+    depth = GLASS_DEPTH if is_transparent(body.surface) else 4
+    return target.render_path(spp=spp, seed=1, max_depth=depth)
+
+
+def disc() -> np.ndarray:
+    """[H, W] bool: pixels well inside the outline of the sphere, which subtends asin(R / d)."""
+    rows, columns = np.mgrid[: CAMERA.height, : CAMERA.width]
+    radius = np.hypot(columns + 0.5 - CAMERA.width / 2, rows + 0.5 - CAMERA.height / 2)
+    return radius < outline() - 1.5
+
+
+def outline() -> float:
+    """Radius of the sphere's outline, pixels."""
+    return CAMERA.focal * RADIUS / np.sqrt(DISTANCE**2 - RADIUS**2)
+
+
+def uniform() -> np.ndarray:
+    return np.ones((8, 16, 3), np.float32)
+
+
+def test_clear_glass_in_uniform_light_is_invisible():
+    seen = picture(sphere(surface(transmission=1.0)), uniform(), spp=64)
+    assert seen.mean() == pytest.approx(1, abs=2e-4)  # a few paths are caught in the facets
+    assert np.abs(seen - 1).max() < 0.1
+
+
+def test_tint_colours_what_passes_through_once():
+    glass = surface(transmission=1.0, ior=1.0, tint=(0.25, 0.5, 1.0))
+    inside = picture(sphere(glass), uniform())[disc()]
+    np.testing.assert_allclose(inside.mean(0), [0.25, 0.5, 1.0], rtol=0.01)
+
+
+def test_a_ball_lens_turns_the_picture_round():
+    light = np.full((64, 128, 3), 0.05, np.float32)
+    light[:, :64] = 1.0  # the left half of the world, seen ahead of the camera at the left
+    plain = picture(sphere(surface(transmission=1.0, ior=1.0)), light)
+    lens = picture(sphere(surface(transmission=1.0, ior=1.5)), light)
+    inner = disc()
+    left = inner & (np.arange(CAMERA.width) < CAMERA.width // 2)[None]
+    right = inner & ~left
+    assert plain[left].mean() > 0.9 > 0.1 > plain[right].mean()
+    assert lens[right].mean() > 3 * lens[left].mean()
+
+
+def test_transmission_mixes_the_opaque_body_and_the_glass():
+    mixed = surface(albedo=0.6, transmission=0.3, ior=1.0)
+    opaque, half = (picture(sphere(s), uniform(), spp=256)[disc()].mean() for s in (surface(0.6), mixed))
+    assert half == pytest.approx(0.7 * opaque + 0.3, rel=0.01)
+
+
+def test_a_mirror_shows_the_light_behind_the_camera():
+    light = uniform() * 0.1
+    light[:, :2] = light[:, -2:] = 1.0
+    mirror = picture(sphere(surface(1.0, 0.0, 1.0)), light)
+    assert mirror[16, 24].mean() > 0.95
+    np.testing.assert_allclose(mirror[0, 0], 0.1, atol=0.01)
+
+
+@pytest.mark.parametrize("size", [None, (128, 192)])
+def test_the_share_of_a_pixel_covered_by_a_body(size):
+    target = RenderScene(empty(CAMERA), CAMERA, bodies=(sphere(surface()),))
+    share = bodies_seen(target.mi_scene, CAMERA, ["body0"], size=size)
+    scale = 1 if size is None else size[0] / CAMERA.height
+    assert share.shape == (size or (CAMERA.height, CAMERA.width))
+    assert share.sum() == pytest.approx(np.pi * (outline() * scale) ** 2, rel=0.02)
+    assert ((share > 0) & (share < 1)).any()
+    assert not bodies_seen(target.mi_scene, CAMERA, ["body1"], size=size).any()
