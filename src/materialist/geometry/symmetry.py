@@ -1,0 +1,141 @@
+"""Thickness by symmetry: the back of an object is its front, mirrored at the plane through the silhouette.
+
+The paper: "We assumed the edited object was symmetrical along its front-to-back axis" (Material Transparency Editing).
+Seen from a camera, the silhouette of an ellipsoid is plane, and on every ray the front and the back are harmonic
+conjugates about that plane and the camera: 1/front + 1/back = 2/plane. So the mirror is exact for ellipsoids in any
+position and perspective, and needs no guess of how deep the object is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError
+from materialist.types import Array, Camera
+
+RING = (3.0, 0.06)
+"""Distance from the silhouette within which the surface tells where the silhouette's plane is: at least so many
+pixels, and at least this part of the object's size."""
+STEEPEST = 0.06
+"""Smallest n.v that is believed: maps are not exact at a silhouette."""
+GRAZING = 4
+"""How quickly pixels lose weight where the surface does not turn away at its border: the power of 1 - n.v."""
+FLOOR = 0.25
+"""A body is nowhere thinner than this part of what it would be if it were as deep as wide: seen face on, a box shows
+no silhouette that turns away, and the mirror would make it flat."""
+DEEPEST = 3.0
+"""Largest thickness, as a multiple of the object's size (see `object_size`)."""
+
+
+def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera) -> Array:
+    """Length of each camera ray between the visible front and the mirrored back of an object.
+
+    Args:
+        depth: [H, W] planar depth, scene units, 0 where there is no surface.
+        normal: [H, W, 3] unit, camera frame.
+        mask: [H, W] bool or weights: the object. Pixels without a surface do not count.
+        camera: its size must be that of the maps.
+
+    Returns:
+        [H, W] float32, scene units along the ray, >= 0; 0 outside the mask.
+
+    Raises:
+        InputError: maps of different sizes, or a mask without any surface.
+    """
+    inside = surface_in(mask, depth, camera)
+    if normal.shape != (*inside.shape, 3):
+        raise InputError(f"The normals are {normal.shape}, the camera needs {(*inside.shape, 3)}.")
+    return mirrored(depth, normal, inside, pixel_rays(camera))
+
+
+def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
+    """`symmetric_thickness` on any window of a picture.
+
+    Args:
+        depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
+        rays: [H, W, 3] camera rays through the pixels at z = -1, evenly spaced.
+
+    Returns:
+        [H, W] float32, scene units along the ray; 0 outside.
+    """
+    length = np.linalg.norm(rays, axis=-1)  # [H, W] of the ray per unit of planar depth
+    border = border_distance(inside)
+    front = np.where(inside, depth, 1.0).astype(np.float64)
+    plane = _silhouette_plane(front, normal, rays, border, inside)
+    # 1/front + 1/back = 2/plane, kept away from where the back runs to infinity.
+    back = 1 / np.maximum(2 * plane - 1 / front, 0.2 / front)
+    width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
+    widest = width[inside].max()
+    inflated = 2 * np.sqrt(np.maximum(width * (2 * widest - width), 0))  # a body with a round section
+    limit = DEEPEST * object_size(inside, depth, rays)
+    thickness = np.clip((back - front) * length, np.minimum(FLOOR * inflated, limit), limit)
+    return np.where(inside, thickness, 0).astype(np.float32)
+
+
+def object_size(inside: Array, depth: Array, rays: Array) -> float:
+    """The square root of the area of the mask [H, W] bool at its median depth, scene units."""
+    return float(np.sqrt(inside.sum()) * np.median(depth[inside]) * spacing(rays))
+
+
+def spacing(rays: Array) -> float:
+    """Distance of neighbouring rays [H, W, 3] at z = -1: one over the focal length in pixels."""
+    last = rays.shape[1] - 1
+    return float(rays[0, last, 0] - rays[0, 0, 0]) / last if last else 1.0
+
+
+def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
+    """[H, W] bool: pixels of the mask that have a surface. Raises InputError for other sizes or when none is left."""
+    size = (camera.height, camera.width)
+    if np.shape(mask) != size or np.shape(depth) != size:
+        raise InputError(f"The mask is {np.shape(mask)} and the depth {np.shape(depth)}; the camera needs {size}.")
+    inside = (np.asarray(mask) > 0.5) & (np.asarray(depth) > 0)
+    if not inside.any():
+        raise InputError("The mask covers no surface; mark an object.")
+    return inside
+
+
+def border_distance(inside: Array) -> Array:
+    """[H, W] pixels from each pixel's centre to the silhouette, 0 outside; the picture's border is no silhouette."""
+    from scipy.ndimage import distance_transform_edt
+
+    # An object that the border cuts goes on beyond it.
+    padded = np.pad(inside, 1, mode="edge")
+    if padded.all():
+        padded = np.pad(inside, 1)
+    return np.where(inside, np.maximum(distance_transform_edt(padded)[1:-1, 1:-1] - 0.5, 0.5), 0)
+
+
+def _silhouette_plane(front: Array, normal: Array, rays: Array, border: Array, inside: Array) -> Array:
+    """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
+    widest = max(RING[0], RING[1] * np.sqrt(inside.sum()))
+    # The outermost pixels are known too badly: where in them the silhouette runs is open.
+    ring = inside & (border <= widest) & (border > 0.6)
+    if not ring.any():
+        ring = inside
+    length = np.linalg.norm(rays, axis=-1)[ring]
+    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, STEEPEST, 1)
+    # The surface just inside lies before the silhouette. With a round section of radius r, a point at distance e from
+    # the border has e = r (1 - sin) and lies r cos before it. The picture's plane is not across a slanting ray.
+    gap = border[ring] * front[ring] * spacing(rays) / length
+    before = gap * cosine / (1 - np.sqrt(1 - cosine**2))
+    weight = (1 - cosine) ** GRAZING + 1e-4
+    a, b, c = _robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
+    return a + b * rays[..., 0] + c * rays[..., 1]
+
+
+def _robust_plane(x: Array, y: Array, values: Array, weight: Array, rounds: int = 12) -> tuple[float, float, float]:
+    """Coefficients (a, b, c) of values [n] ~ a + b x + c y by weighted least absolute deviations."""
+    centre = np.array([np.average(x, weights=weight), np.average(y, weights=weight)])
+    basis = np.stack([np.ones_like(x), x - centre[0], y - centre[1]], -1)
+    spread = max(float(np.std(x) + np.std(y)), 1e-9)
+    typical = float(np.average(values, weights=weight))
+    w = weight / weight.sum()
+    found = np.zeros(3)
+    for _ in range(rounds):
+        # A faint pull to a plane that faces the camera, for a silhouette that shows on one side only.
+        pull = np.diag([0, 1, 1]) * (1e-3 * spread**2)
+        found = np.linalg.solve(basis.T @ (basis * w[:, None]) + pull * w.sum(), basis.T @ (values * w))
+        w = weight / np.maximum(np.abs(values - basis @ found), 1e-3 * typical)
+        w /= w.sum()
+    return float(found[0] - found[1:] @ centre), float(found[1]), float(found[2])
