@@ -1,0 +1,5 @@
+"""RefractionNet: how thick an object is behind what a photo shows of it (paper, Thickness Prior Prediction)."""
+
+from materialist.predict.refraction.thickness import WEIGHTS, Thickness, thickness
+
+__all__ = ["WEIGHTS", "Thickness", "thickness"]

@@ -1,0 +1,147 @@
+"""What RefractionNet sees of an object: a square window around it, its maps made independent of place and scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.geometry.symmetry import border_distance, mirrored, object_size, spacing
+from materialist.types import Array
+
+SIDE = 96
+"""Pixels on a side of what the network sees."""
+MARGIN = 0.06
+"""Room around the object, as a part of its longer side."""
+CHANNELS = 11
+"""photo 3, mask, normal 3, n.v, depth, mirrored thickness, distance to the silhouette."""
+
+
+@dataclass(frozen=True)
+class View:
+    """An object in a square window of S x S pixels."""
+
+    photo: Array
+    """[S, S, 3] float32 linear."""
+    inside: Array
+    """[S, S] bool."""
+    normal: Array
+    """[S, S, 3] float32 unit, camera frame."""
+    depth: Array
+    """[S, S] float32 planar, scene units."""
+    rays: Array
+    """[S, S, 3] float32 camera rays at z = -1."""
+
+    @property
+    def size(self) -> float:
+        """Size of the object, scene units: the unit of the network's thickness."""
+        return object_size(self.inside, self.depth, self.rays)
+
+
+@dataclass(frozen=True)
+class Window:
+    """A square of a picture, in pixels; it may reach over the border."""
+
+    left: int
+    top: int
+    side: int
+
+    @classmethod
+    def around(cls, inside: Array) -> Window:
+        """The window around a mask [H, W] bool."""
+        rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
+        tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
+        side = int(np.ceil(max(tall, wide) * (1 + 2 * MARGIN))) + 2
+        left, top = (columns[0] + columns[-1] + 1 - side) // 2, (rows[0] + rows[-1] + 1 - side) // 2
+        return cls(int(left), int(top), side)
+
+    def cut(self, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array) -> View:
+        """The window of maps [H, W, ...] at SIDE x SIDE pixels; means over the object alone."""
+        weight = self._cut(inside.astype(np.float32))
+        share = _resized(weight, SIDE)
+        mean = lambda x: _resized(self._cut(x * _like(inside, x)), SIDE) / _like(np.maximum(share, 1e-6), x)  # noqa: E731
+        seen = share > 0.5
+        if not seen.any():
+            seen = share >= share.max()
+        small = mean(normal.astype(np.float32))
+        small = small / np.maximum(np.linalg.norm(small, axis=-1, keepdims=True), 1e-6)
+        return View(mean(photo.astype(np.float32)), seen, small, mean(depth.astype(np.float32)), self._rays(rays))
+
+    def put_back(self, values: Array, seen: Array, inside: Array) -> Array:
+        """[H, W] float32: values [S, S] known where `seen`, brought back to the mask `inside` [H, W], 0 outside."""
+        known = _resized(seen.astype(np.float32), self.side)
+        spread = _resized(np.where(seen, values, 0).astype(np.float32), self.side) / np.maximum(known, 1e-6)
+        filled = np.where(known > 1e-3, spread, float(np.median(values[seen])))
+        whole = np.zeros(inside.shape, np.float32)
+        height, width = inside.shape
+        top, left = max(self.top, 0), max(self.left, 0)
+        part = filled[top - self.top : height - self.top, left - self.left : width - self.left]
+        whole[top : top + part.shape[0], left : left + part.shape[1]] = part
+        return np.where(inside, whole, 0).astype(np.float32)
+
+    def _cut(self, values: Array) -> Array:
+        """[side, side, ...] of values [H, W, ...], 0 beyond the border."""
+        result = np.zeros((self.side, self.side, *values.shape[2:]), np.float32)
+        top, left = max(self.top, 0), max(self.left, 0)
+        part = values[top : self.top + self.side, left : self.left + self.side]
+        result[top - self.top : top - self.top + part.shape[0], left - self.left : left - self.left + part.shape[1]] = (
+            part
+        )
+        return result
+
+    def _rays(self, rays: Array) -> Array:
+        """[SIDE, SIDE, 3] rays of the window, which go on evenly beyond the border."""
+        step = spacing(rays)
+        across = (np.arange(SIDE) + 0.5) / SIDE * self.side - 0.5
+        result = np.empty((SIDE, SIDE, 3), np.float32)
+        result[..., 0] = rays[0, 0, 0] + step * (self.left + across)[None, :]
+        result[..., 1] = rays[0, 0, 1] - step * (self.top + across)[:, None]
+        result[..., 2] = -1
+        return result
+
+
+def features(view: View) -> Array:
+    """[CHANNELS, S, S] float32, 0 outside the object: what the network is given of it.
+
+    Lengths are in units of the object's size, directions in the frame of the ray through the window's centre, so that
+    neither the place in the picture nor the scene's scale matters.
+    """
+    centre = view.rays[len(view.rays) // 2, view.rays.shape[1] // 2].astype(np.float64)
+    length = np.linalg.norm(view.rays, axis=-1)
+    normal = view.normal @ _frame(centre / np.linalg.norm(centre)).T
+    facing = -np.sum(view.normal * view.rays, -1) / length
+    size = view.size
+    distance = view.depth * length
+    relief = (distance - np.median(distance[view.inside])) / size
+    border = border_distance(view.inside) / np.sqrt(view.inside.sum())
+    mirror = mirrored(view.depth, view.normal, view.inside, view.rays) / size
+    flat = [view.inside.astype(np.float32), facing, np.clip(relief, -3, 3), mirror, border]
+    stacked = np.concatenate([linear_to_srgb(view.photo) - 0.5, normal, np.stack(flat, -1)], -1)  # [S, S, CHANNELS]
+    return np.ascontiguousarray(np.moveaxis(np.where(view.inside[..., None], stacked, 0), -1, 0), np.float32)
+
+
+MIRROR = 9
+"""The channel of `features` that holds the mirrored thickness."""
+MASK = 6
+"""The channel of `features` that holds the mask."""
+
+
+def _frame(forward: Array) -> Array:
+    """[3, 3] rows: right, up and back of a camera that looks along the unit vector `forward` [3], level."""
+    right = np.cross(forward, [0.0, 1, 0])
+    right /= max(np.linalg.norm(right), 1e-9)
+    return np.stack([right, np.cross(right, forward), -forward])
+
+
+def _resized(values: Array, side: int) -> Array:
+    """Values [s, s, ...] at side x side pixels: means down, bilinear up."""
+    import cv2
+
+    way = cv2.INTER_AREA if side < len(values) else cv2.INTER_LINEAR
+    return cv2.resize(np.ascontiguousarray(values, np.float32), (side, side), interpolation=way)
+
+
+def _like(weight: Array, values: Array) -> Array:
+    """Weights [..] with a last axis where values have one."""
+    return weight[..., None] if values.ndim > weight.ndim else weight

@@ -1,0 +1,86 @@
+"""From a photo and its maps to the thickness of one object in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError, WeightsError
+from materialist.geometry.symmetry import surface_in
+from materialist.predict.refraction.crop import Window, features
+from materialist.types import Array, Camera
+
+if TYPE_CHECKING:
+    from materialist.predict.refraction.network import RefractionNet
+
+WEIGHTS = Path(__file__).parent / "weights.safetensors"
+"""The weights that ship with the package; docs/training.md says how they were made."""
+
+
+@dataclass(frozen=True)
+class Thickness:
+    """How long the camera rays run through an object (paper, Refraction Network Details, d_GT)."""
+
+    solid: Array
+    """[H, W] float32 scene units: from the first to the last point of its outer surface; 0 outside the mask."""
+    hollow: Array
+    """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`."""
+
+
+def thickness(
+    photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, weights: str | Path = ""
+) -> Thickness:
+    """The thickness of the object under a mask, as RefractionNet predicts it.
+
+    Args:
+        photo_linear: [H, W, 3] linear Rec.709.
+        mask: [H, W] bool or weights: one object. Pixels without a surface do not count.
+        normal: [H, W, 3] unit, camera frame.
+        depth: [H, W] planar depth, scene units, 0 where there is no surface.
+        camera: its size must be that of the maps.
+        weights: a .safetensors file from `materialist train refraction`, or "" for those in the package.
+
+    Returns:
+        Both thicknesses along the straight camera rays, in the units of `depth`; the same input gives the same result.
+
+    Raises:
+        InputError: maps of different sizes, or a mask without any surface.
+        WeightsError: the weights are missing, damaged, or for another network.
+    """
+    inside = surface_in(mask, depth, camera)
+    for name, value in (("photo", photo_linear), ("normals", normal)):
+        if value.shape != (*inside.shape, 3):
+            raise InputError(f"The {name} has shape {value.shape}, the camera needs {(*inside.shape, 3)}.")
+    network, _ = _loaded(Path(weights) if str(weights) else WEIGHTS)
+    window = Window.around(inside)
+    view = window.cut(photo_linear, inside, normal, depth, pixel_rays(camera))
+    found = run(network, features(view))  # [2, S, S] in units of the object's size
+    if not np.isfinite(found).all():
+        raise WeightsError(f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS}).")
+    solid, hollow = (window.put_back(channel * view.size, view.inside, inside) for channel in found)
+    return Thickness(solid, np.minimum(hollow, solid))
+
+
+def run(network: RefractionNet, maps: Array) -> Array:
+    """[2, S, S] float32 solid and hollow thickness in units of the object's size, of features [C, S, S]."""
+    import torch
+
+    with torch.inference_mode():
+        return network(torch.from_numpy(maps)[None])[0].numpy()
+
+
+@lru_cache(maxsize=2)
+def _loaded(path: Path) -> tuple[RefractionNet, dict[str, Any]]:
+    if not path.is_file():
+        raise WeightsError(
+            f"There are no weights of RefractionNet at {path}; train some (materialist train refraction -o RUN), or "
+            "take the thickness by symmetry."
+        )
+    from materialist.predict.refraction.weights import load
+
+    return load(path)
