@@ -64,7 +64,8 @@ def invert(
         seed: equal seeds give equal scenes on one machine.
         progress: called as progress(stage, done, total).
         overrides: `settings=FitSettings(...)` replaces the preset; `prior=Prediction(...)` replaces the predictor;
-            `spp=N` sets the samples of the final re-rendering.
+            `spp=N` sets the samples of the final re-rendering; `found(name, value)` is called with "prior" (a
+            Prediction), "light" ([h, 2h, 3]) and "materials" as soon as each is there.
 
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
@@ -72,6 +73,7 @@ def invert(
     start = time.perf_counter()
     preset = "paper" if engine == "path" else preset
     tick = progress or (lambda *_: None)
+    found = overrides.get("found") or (lambda *_: None)
     _check(engine, strategy, envmap_size, seed)
     tick("read", 0, 1)
     picture = _read(photo, size=size, fov=fov)
@@ -84,6 +86,7 @@ def invert(
         picture = _seen_by(source, picture)
         prior = _timed(stages, "predict", lambda: _predict(picture, source, seed))
     _check_mask(mask, picture)
+    found("prior", prior)
 
     from materialist.render.variant import setup
 
@@ -111,6 +114,8 @@ def invert(
     )  # fmt: skip
     state = fit.run()
     materials = fit.materials(state)
+    found("light", state.envmap)
+    found("materials", materials)
     tick("rerender", 0, 1)
     spp = overrides.get("spp", FINAL_SPP)
     rerender = _timed(stages, "rerender", lambda: judge(materials, state.envmap, spp, seed + 1))
