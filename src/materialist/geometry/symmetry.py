@@ -24,7 +24,7 @@ GRAZING = 4
 FLOOR = 0.25
 """A body is nowhere thinner than this part of what it would be if it were as deep as wide: seen face on, a box shows
 no silhouette that turns away, and the mirror would make it flat."""
-DEEPEST = 3.0
+DEEPEST = 2.0
 """Largest thickness, as a multiple of the object's size (see `object_size`)."""
 
 

@@ -1,0 +1,1 @@
+"""Training of RefractionNet: shapes, their thickness along camera rays, and the trainer."""

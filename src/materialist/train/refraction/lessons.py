@@ -1,0 +1,105 @@
+"""The data set of RefractionNet on disk: one folder with the views of each shape, made once and gone on with."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import InputError, OutputError
+from materialist.train.refraction.glassware import SPLITS, shape
+from materialist.train.refraction.paths import Tracer
+from materialist.train.refraction.view import lesson
+from materialist.types import Array
+
+Progress = Callable[[str, int, int], None]
+DESCRIPTION = "lessons.json"
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a set holds."""
+
+    shapes: int = 640
+    views: int = 24
+    """Views of each shape."""
+    split: str = "train"
+    """'train', or 'heldout': shapes that no training set has."""
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.shapes < 1 or self.views < 1 or self.seed < 0:
+            raise InputError(
+                f"shapes is {self.shapes}, views {self.views}, seed {self.seed}; give at least 1, 1 and 0."
+            )
+        if self.split not in SPLITS:
+            raise InputError(f"The split is {self.split!r}; choose one of {', '.join(SPLITS)}.")
+
+
+def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> float:
+    """Make the views that FOLDER lacks; shape i depends on the plan's split and seed and on i alone. Returns seconds.
+
+    Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
+    """
+    _open(folder, plan)
+    start = time.monotonic()
+    for index in range(plan.shapes):
+        path = folder / f"{index:05d}.npz"
+        if not path.exists():
+            _write(path, views(index, plan))
+        progress("shapes", index + 1, plan.shapes)
+    return time.monotonic() - start
+
+
+def views(index: int, plan: Plan) -> dict[str, Array]:
+    """Views of shape `index`: maps [V, CHANNELS, S, S] and target [V, 2, S, S] float16, hollow [V] bool."""
+    chosen = shape(index, plan.split, plan.seed)
+    tracer = Tracer(chosen.solid)
+    rng = np.random.default_rng([plan.seed, SPLITS[plan.split], index, 1])
+    found = [lesson(chosen, tracer, rng) for _ in range(plan.views)]
+    return {
+        "maps": np.stack([f.maps for f in found]),
+        "target": np.stack([f.target for f in found]),
+        "hollow": np.array([f.hollow for f in found]),
+    }
+
+
+def load(folder: Path) -> dict[str, Array]:
+    """All views of a set, as `views` has them. Raises InputError when FOLDER holds no set."""
+    files = sorted(folder.glob("[0-9]*.npz"))
+    if not files or not (folder / DESCRIPTION).is_file():
+        raise InputError(f"{folder} holds no views to learn from; make some: materialist train refraction --data-only.")
+    parts = []
+    for file in files:
+        with np.load(file) as arrays:
+            parts.append({name: arrays[name] for name in ("maps", "target", "hollow")})
+    return {name: np.concatenate([p[name] for p in parts]) for name in ("maps", "target", "hollow")}
+
+
+def _open(folder: Path, plan: Plan) -> None:
+    file, described = folder / DESCRIPTION, {"format": FORMAT, **asdict(plan)}
+    try:
+        if folder.is_dir() and any(folder.iterdir()):
+            old = json.loads(file.read_text("utf-8")) if file.is_file() else None
+            if old is None or any(old.get(k) != described[k] for k in ("format", "views", "split", "seed")):
+                raise InputError(f"{folder} holds other things than this set of views; name another folder.")
+        folder.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+
+
+def _write(path: Path, arrays: dict[str, Array]) -> None:
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        with open(temporary, "wb") as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -1,0 +1,90 @@
+"""Where straight rays enter and leave a mesh (paper, Refraction Network Details: the optical path length d_GT)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.bench.shapes import Solid
+from materialist.types import Array
+
+MOST = 24
+"""Surfaces that a ray is followed through."""
+AHEAD = 2e-4
+"""How far behind a surface the search for the next one begins; shapes are about 1 large."""
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Rays through one mesh; lengths are in units of each ray's direction."""
+
+    first: Array
+    """[N] float64 distance of the first surface, inf where there is none."""
+    normal: Array
+    """[N, 3] float64 shading normal there, outwards, not normalised."""
+    last: Array
+    """[N] distance of the last surface; as `first` where there is one alone."""
+    material: Array
+    """[N] length inside the material, told by which way the surfaces face: the walls of a hollow object."""
+
+    @property
+    def solid(self) -> Array:
+        """[N] the paper's length through a solid object: from its first to its last surface."""
+        return np.where(np.isfinite(self.first), self.last - self.first, 0)
+
+
+class Tracer:
+    """One mesh to be shot at."""
+
+    def __init__(self, solid: Solid):
+        from materialist.render.variant import setup
+
+        self._mi = mi = setup()
+        mesh = mi.Mesh("shape", len(solid.vertices), len(solid.faces))
+        params = mi.traverse(mesh)
+        params["vertex_positions"] = solid.vertices.ravel().astype(np.float32)
+        params["faces"] = solid.faces.ravel().astype(np.uint32)
+        params.update()
+        self._scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "shape": mesh})
+        self._faces, self._normals = solid.faces, solid.normals
+        corners = solid.vertices[solid.faces]
+        self._flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def trace(self, origin: Array, direction: Array) -> Paths:
+        """Follow straight rays (origin and direction [N, 3]) through everything they meet."""
+        count = len(direction)
+        first, last, material = np.full(count, np.inf), np.zeros(count), np.zeros(count)
+        normal, depth = np.zeros((count, 3)), np.zeros(count, int)  # depth: how many surfaces the ray is inside of
+        alive, at = np.arange(count), np.zeros(count)
+        step = AHEAD / np.linalg.norm(direction, axis=-1)
+        for k in range(MOST):
+            t, face, uv = self._nearest(origin[alive] + at[alive, None] * direction[alive], direction[alive])
+            hit = np.isfinite(t)
+            alive, t, face, uv = alive[hit], t[hit], face[hit], uv[hit]
+            if not len(alive):
+                break
+            reached = at[alive] + t
+            if k == 0:
+                first[alive] = reached
+                normal[alive] = self._shading(face, uv)
+            # The way that the previous surface opened; nothing before the first.
+            material[alive] += np.where((depth[alive] > 0) & (k > 0), reached - last[alive], 0)
+            entering = np.sum(self._flat[face] * direction[alive], -1) < 0
+            depth[alive] = np.maximum(depth[alive] + np.where(entering, 1, -1), 0)
+            last[alive] = reached
+            at[alive] = reached + step[alive]
+        return Paths(first, normal, last, material)
+
+    def _shading(self, face: Array, uv: Array) -> Array:
+        """[n, 3] normals between the corners of faces [n]."""
+        a, b, c = (self._normals[self._faces[face, k]] for k in range(3))
+        return a * (1 - uv[:, :1] - uv[:, 1:]) + b * uv[:, :1] + c * uv[:, 1:]
+
+    def _nearest(self, origin: Array, direction: Array) -> tuple[Array, Array, Array]:
+        """Distance [n] (inf for none), face [n] and place in it [n, 2] of the nearest surface of every ray."""
+        mi = self._mi
+        ray = mi.Ray3f(mi.Point3f(origin.T.astype(np.float32)), mi.Vector3f(direction.T.astype(np.float32)))
+        found = self._scene.ray_intersect_preliminary(ray, coherent=False)
+        t = np.array(found.t, np.float64)
+        return t, np.array(found.prim_index), np.array(found.prim_uv, np.float64).T

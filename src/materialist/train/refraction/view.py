@@ -1,0 +1,164 @@
+"""Views of a shape as RefractionNet gets them: a window around the object, its maps as imperfect as predicted ones.
+
+The photo is shaded simply: Lambert's law under an ambient gradient and one or two distant lights, a highlight at
+times, no shadows. What is behind the object is not drawn, since the network is not shown it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.predict.refraction.crop import MARGIN, SIDE, View, features
+from materialist.train.refraction.glassware import Shape
+from materialist.train.refraction.paths import Paths, Tracer
+from materialist.types import Array
+
+LEAST_PIXELS = 0.02
+"""Part of the window that an object must cover; thinner views are drawn anew."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One view."""
+
+    maps: Array
+    """[CHANNELS, S, S] float16, see `crop.features`."""
+    target: Array
+    """[2, S, S] float16 solid and hollow thickness in units of the object's size, 0 outside the true mask."""
+    hollow: bool
+
+
+@dataclass(frozen=True)
+class Pose:
+    """The camera, in the frame of a stretched and sheared shape."""
+
+    stretch: Array
+    """[3, 3] applied to the shape."""
+    to_camera: Array
+    """[3, 3] rotation."""
+    centre: Array
+    """[3] the shape's middle in the camera frame."""
+
+
+def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: bool = False) -> Lesson:
+    """A random view of the shape. `exact` leaves its maps without noise and the shape as it is."""
+    while True:
+        pose = draw_pose(rng, upright=shape.upright, plain=exact)
+        rays = window_rays(shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre)
+        paths, normal = look(tracer, pose, rays)
+        inside = np.isfinite(paths.first).reshape(SIDE, SIDE)
+        if inside.mean() >= LEAST_PIXELS:
+            break
+    length = np.linalg.norm(rays, axis=-1)
+    picture = lambda x: np.where(inside, x.reshape(SIDE, SIDE), 0).astype(np.float32)  # noqa: E731
+    depth = picture(paths.first)
+    point = (rays * depth[..., None] - pose.centre) @ pose.to_camera
+    view = View(_photo(rng, normal, rays, point) * inside[..., None], inside, normal, depth, rays)
+    target = np.stack([picture(paths.solid), picture(paths.material)]) * length / view.size
+    if not exact:
+        view = _imperfect(rng, view)
+    return Lesson(features(view).astype(np.float16), np.minimum(target, 8).astype(np.float16), shape.hollow)
+
+
+def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> Pose:
+    """A camera that looks at the shape, from above if it stands; `plain` leaves the shape in its own form."""
+    stretch = np.eye(3)
+    if not plain:
+        stretch = np.diag(np.exp(rng.normal(0, 0.25, 3))) + rng.normal(0, 0.08, (3, 3))
+    turn = rng.uniform(0, 2 * np.pi)
+    tilt = np.radians(rng.uniform(-5, 55)) if upright else np.arcsin(rng.uniform(-0.5, 0.95))
+    roll = rng.normal(0, 0.06)
+    to_camera = _about(2, roll) @ _about(0, tilt) @ _about(1, turn)
+    distance = np.exp(rng.uniform(np.log(1.4), np.log(6)))
+    aside = rng.uniform(-0.35, 0.35, 2) * distance * rng.uniform(0, 1)
+    return Pose(stretch, to_camera, np.array([*aside, -distance]))
+
+
+def window_rays(vertices: Array) -> Array:
+    """[SIDE, SIDE, 3] float32 rays through a square window around the shape [V, 3] in the camera frame."""
+    place = vertices[:, :2] / -vertices[:, 2:]
+    low, high = place.min(0), place.max(0)
+    half = (high - low).max() / 2 * (1 + 2 * MARGIN) + 1e-6
+    x = (np.arange(SIDE) + 0.5) / SIDE * 2 - 1
+    centre = (low + high) / 2
+    rays = np.empty((SIDE, SIDE, 3), np.float32)
+    rays[..., 0], rays[..., 1], rays[..., 2] = centre[0] + half * x[None, :], centre[1] - half * x[:, None], -1
+    return rays
+
+
+def look(tracer: Tracer, pose: Pose, rays: Array) -> tuple[Paths, Array]:
+    """Paths of the rays through the shape, and the normals [S, S, 3] seen, unit, camera frame.
+
+    The rays are brought into the shape's own frame; lengths along them are the same there.
+    """
+    back = np.linalg.inv(pose.to_camera @ pose.stretch)
+    direction = rays.reshape(-1, 3).astype(np.float64) @ back.T
+    paths = tracer.trace(np.broadcast_to(-back @ pose.centre, direction.shape), direction)
+    normal = paths.normal @ back  # the inverse transpose, as for every normal
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    # What is seen faces the viewer, also where the shading normals of coarse triangles do not.
+    away = np.sum(normal * rays.reshape(-1, 3), -1, keepdims=True)
+    return paths, np.where(away > 0, -normal, normal).reshape(*rays.shape).astype(np.float32)
+
+
+def _about(axis: int, angle: float) -> Array:
+    """[3, 3] rotation about an axis."""
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    rotation = np.eye(3)
+    rotation[a, a] = rotation[b, b] = np.cos(angle)
+    rotation[a, b], rotation[b, a] = -np.sin(angle), np.sin(angle)
+    return rotation
+
+
+def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -> Array:
+    """[S, S, 3] float32 linear in [0, 1]: the shape in some colour, plain or with waves through it."""
+    albedo = rng.uniform(0.1, 0.9, 3) * rng.uniform(0.4, 1)
+    if rng.random() < 0.3:
+        wave = np.sin(point @ rng.normal(size=3) * rng.uniform(5, 40) + rng.uniform(0, 6))[..., None]
+        albedo = albedo * np.clip(1 + wave * rng.uniform(0.1, 1.5), 0.3, 1.6)
+    up = rng.normal(size=3) * [0.4, 0.2, 0.4] + [0, 1, 0.3]
+    light = rng.uniform(0.15, 0.6) * (1 + 0.6 * (normal @ (up / np.linalg.norm(up))))[..., None]
+    view = -rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    gloss = rng.uniform(0.1, 1.5) if rng.random() < 0.4 else 0.0
+    for _ in range(int(rng.integers(1, 3))):
+        towards = rng.normal(size=3) + np.array([0, 0.7, 0.7])
+        towards /= np.linalg.norm(towards)
+        colour = rng.uniform(0.7, 1.0, 3) * rng.uniform(0.2, 0.9)
+        half = towards + view
+        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-9)
+        highlight = gloss * np.clip(np.sum(normal * half, -1), 0, 1) ** rng.uniform(20, 200)
+        light = light + colour * (np.clip(normal @ towards, 0, None) + highlight)[..., None]
+    noise = rng.normal(0, rng.uniform(0, 0.02), normal.shape)
+    return np.clip(albedo * light + noise, 0, 1).astype(np.float32)
+
+
+def _imperfect(rng: np.random.Generator, view: View) -> View:
+    """The view with maps as a predictor gives them: bent, flattened or exaggerated, smoothed, a mask that is off."""
+    import cv2
+
+    normal, depth, inside = view.normal, view.depth.copy(), view.inside
+    size, middle = view.size, float(np.median(view.depth[inside]))
+    if rng.random() < 0.6:
+        depth = middle + (depth - middle) * rng.uniform(0.85, 1.15)
+        depth = depth + size * rng.uniform(0, 0.05) * _smooth_noise(rng, 1)[..., 0]
+    if rng.random() < 0.6:
+        normal = normal + rng.uniform(0, 0.3) * _smooth_noise(rng, 3)
+    if rng.random() < 0.4:
+        blurred = cv2.GaussianBlur(normal * inside[..., None], (0, 0), rng.uniform(0.5, 2.0))
+        normal = np.where(inside[..., None], blurred, normal)
+    if rng.random() < 0.35:
+        kernel = np.ones((3, 3), np.uint8)
+        smaller = cv2.erode(inside.astype(np.uint8), kernel, borderValue=0) > 0
+        inside = smaller if smaller.sum() > 0.5 * inside.sum() else inside
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    return View(view.photo, inside, normal.astype(np.float32), depth.astype(np.float32), view.rays)
+
+
+def _smooth_noise(rng: np.random.Generator, channels: int) -> Array:
+    """[SIDE, SIDE, channels] float32 with waves about a third of the window long, of amplitude about 1."""
+    import cv2
+
+    coarse = rng.normal(size=(5, 5, channels)).astype(np.float32)
+    return cv2.resize(coarse, (SIDE, SIDE), interpolation=cv2.INTER_CUBIC).reshape(SIDE, SIDE, channels)
