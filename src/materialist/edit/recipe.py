@@ -9,7 +9,7 @@ from typing import Any
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, read_envmap, relight
 from materialist.edit.select import select
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.types import Scene
 
 REGION = ("mask", "click", "box", "with")
@@ -31,6 +31,11 @@ class Step:
     """As in the file: texts, lists of texts, lists of lists."""
     folder: Path = Path(".")
     """What file names in it are relative to."""
+
+    @property
+    def skipped(self) -> bool:
+        """Whether the step is kept in the list without being applied (`skip: true`)."""
+        return str(self.options.get("skip", "")).lower() in ("true", "yes", "on", "1")
 
 
 def read_recipe(path: str | Path) -> list[Step]:
@@ -57,16 +62,50 @@ def _step(entry: Any, number: int, path: Path) -> Step:
     kind, options = next(iter(entry.items()))
     if not isinstance(options, dict):
         raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
-    unknown = sorted(set(options) - set(KINDS[kind]))
+    unknown = sorted(set(options) - {*KINDS[kind], "skip"})
     if unknown:
         raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
     return Step(kind, options, path.parent)
+
+
+def write_recipe(path: str | Path, steps: list[Step]) -> None:
+    """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
+    import yaml
+
+    path = Path(path)
+    entries = [{step.kind: _plain(step.options)} for step in steps]
+    text = yaml.safe_dump(entries, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        temporary.write_text(text, "utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _plain(value: Any) -> Any:
+    """Texts that spell a number as that number, so that the file reads well; a shift such as +0.5 stays a text."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if not isinstance(value, str) or value.startswith("+"):
+        return value
+    if value in ("true", "false"):
+        return value == "true"
+    try:
+        number = float(value)
+    except ValueError:
+        return value
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def apply(scene: Scene, steps: list[Step]) -> Scene:
     """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before."""
     edited = scene
     for number, step in enumerate(steps, 1):
+        if step.skipped:
+            continue
         try:
             edited = (_edit if step.kind == "edit" else _relight)(scene, edited, step)
         except InputError as error:
