@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench import lights, scenes
+from materialist.render.buffers import floats, integers, tensor
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
@@ -107,7 +108,7 @@ class TrueScene:
 
         from materialist.render.envmap import on_mitsuba_grid
 
-        self._params["light.data"] = mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+        self._params["light.data"] = tensor(mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self._params.update()
         integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH})
         # Whole squares suit the stratified sampler; batches bound the memory.
@@ -157,8 +158,8 @@ class TrueScene:
 
         height, width = self.camera.height, self.camera.width
         columns, rows = np.meshgrid(np.arange(width) + offset[0], np.arange(height) + offset[1])
-        x = mi.Float(((columns - width / 2) / self.camera.focal).ravel().astype(np.float32))
-        y = mi.Float(((height / 2 - rows) / self.camera.focal).ravel().astype(np.float32))
+        x = floats(mi, (columns - width / 2) / self.camera.focal)
+        y = floats(mi, (height / 2 - rows) / self.camera.focal)
         si = self._scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1))))
         normal = dr.select(si.is_valid(), si.sh_frame.n, mi.Normal3f(0, 0, 1))
         depth = dr.select(si.is_valid(), -si.p.z, 0)
@@ -218,10 +219,10 @@ def _mesh(item: scenes.Item, number: int) -> Any:
         has_vertex_texcoords=True,
     )
     params = mi.traverse(mesh)
-    params["vertex_positions"] = np.ravel(solid.vertices).astype(np.float32)
-    params["vertex_normals"] = np.ravel(solid.normals).astype(np.float32)
-    params["vertex_texcoords"] = np.ravel(solid.uv).astype(np.float32)
-    params["faces"] = np.ravel(solid.faces).astype(np.uint32)
+    params["vertex_positions"] = floats(mi, solid.vertices)
+    params["vertex_normals"] = floats(mi, solid.normals)
+    params["vertex_texcoords"] = floats(mi, solid.uv)
+    params["faces"] = integers(mi, solid.faces)
     params.update()
     return mesh
 

@@ -16,6 +16,7 @@ import torch
 from materialist.fit.losses import CLIPPED, Encoding, encode
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
+from materialist.render.buffers import floats, integers
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 from materialist.transport.light import DIELECTRIC_R0
 
@@ -180,11 +181,12 @@ def _links(neighbours: Neighbours):
     other[0, :-1], other[2, 1:] = lane[1:], lane[:-1]
     other[1, :, :-1], other[3, :, 1:] = lane[:, 1:], lane[:, :-1]
     rows = zip(other.reshape(4, -1)[:, pixels], weight.reshape(4, -1)[:, pixels], strict=True)
-    return [(mi.UInt32(np.ascontiguousarray(o)), mi.Float(np.ascontiguousarray(w))) for o, w in rows]
+    return [(integers(mi, o), floats(mi, w)) for o, w in rows]
 
 
 def _flat(values: torch.Tensor):
-    return mi.Float(values.detach().float().contiguous().view(-1))
+    values = values.detach().float().contiguous().view(-1)
+    return mi.Float(values) if values.is_cuda else floats(mi, values.numpy())
 
 
 def _sign(x):

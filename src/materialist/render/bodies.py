@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.render.buffers import tensor
 from materialist.types import Array, Surface
 
 OUTSIDE = "materialist_outside"
@@ -55,8 +56,7 @@ def _opaque(mi, surface: Surface) -> dict:
 def _texture(mi, values: Array) -> dict:
     """[h, w, C] as a bitmap texture; Mitsuba takes none below 2 x 2."""
     grown = np.tile(values, (2 if values.shape[0] == 1 else 1, 2 if values.shape[1] == 1 else 1, 1))
-    data = mi.TensorXf(np.ascontiguousarray(grown, np.float32))
-    return {"type": "bitmap", "data": data, "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+    return {"type": "bitmap", "data": tensor(mi, grown), "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
 
 
 def register() -> None:

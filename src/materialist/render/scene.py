@@ -6,6 +6,7 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf
+from materialist.render.buffers import floats, integers, tensor
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Materials, Mesh
@@ -74,19 +75,15 @@ class RenderScene:
         for name, shape in (("albedo", (*size, 3)), ("roughness", size), ("metallic", size)):
             if getattr(materials, name).shape != shape:
                 raise InputError(f"The {name} map is {getattr(materials, name).shape}, the camera needs {shape}.")
-        tensor = self.mi.TensorXf
-        self._assign(
-            tensor(np.ascontiguousarray(materials.albedo, np.float32)),
-            tensor(np.ascontiguousarray(materials.roughness[..., None], np.float32)),
-            tensor(np.ascontiguousarray(materials.metallic[..., None], np.float32)),
-        )
+        maps = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
+        self._assign(*(tensor(self.mi, values) for values in maps))
         self.params.update()
 
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
         self._peaked = is_peaked(envmap)
-        self.params["light.data"] = self.mi.TensorXf(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+        self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
     def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
@@ -169,7 +166,7 @@ class RenderScene:
         import drjit as dr
 
         channels = maps.shape[2]
-        index = self.mi.UInt32(members.astype(np.uint32)) * channels
+        index = integers(self.mi, members) * channels
         means = [dr.mean(dr.gather(self.mi.Float, maps.array, index + c)) for c in range(channels)]
         # Mitsuba takes no texture below 2 x 2.
         return self.mi.TensorXf(dr.concat(means * 4), (2, 2, channels))
@@ -218,7 +215,7 @@ def _sensor(mi, camera: Camera) -> dict:
 
 def _maps_bsdf(mi, height: int, width: int) -> dict:
     def texture(channels: int, value: float) -> dict:
-        data = mi.TensorXf(np.full((height, width, channels), value, np.float32))
+        data = tensor(mi, np.full((height, width, channels), value, np.float32))
         return {"type": "bitmap", "data": data, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
 
     return {
@@ -234,9 +231,9 @@ def _shape(mi, mesh: Mesh | Body, bsdf: dict):
         "part", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, has_vertex_texcoords=True, props=props
     )
     params = mi.traverse(shape)
-    params["vertex_positions"] = mi.Float(np.ascontiguousarray(mesh.vertices, np.float32).ravel())
-    params["vertex_normals"] = mi.Float(np.ascontiguousarray(mesh.normals, np.float32).ravel())
-    params["vertex_texcoords"] = mi.Float(np.ascontiguousarray(mesh.uv, np.float32).ravel())
-    params["faces"] = mi.UInt32(mesh.faces.ravel().astype(np.uint32))
+    params["vertex_positions"] = floats(mi, mesh.vertices)
+    params["vertex_normals"] = floats(mi, mesh.normals)
+    params["vertex_texcoords"] = floats(mi, mesh.uv)
+    params["faces"] = integers(mi, mesh.faces)
     params.update()
     return shape

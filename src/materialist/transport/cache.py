@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 import torch
 
+from materialist.render.buffers import floats, integers
 from materialist.transport.environment import EnvmapPyramid
 from materialist.transport.sampling import (
     MIN_ALPHA,
@@ -53,9 +54,9 @@ def build_scene(mesh: Mesh) -> mi.Scene:
     """A Mitsuba scene of the whole mesh as one shape: prim_index is the face index."""
     shape = mi.Mesh("surface", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True)
     params = mi.traverse(shape)
-    params["vertex_positions"] = mi.Float(mesh.vertices.ravel())
-    params["vertex_normals"] = mi.Float(mesh.normals.ravel())
-    params["faces"] = mi.UInt32(mesh.faces.ravel().astype(np.uint32))
+    params["vertex_positions"] = floats(mi, mesh.vertices)
+    params["vertex_normals"] = floats(mi, mesh.normals)
+    params["faces"] = integers(mi, mesh.faces)
     params.update()
     return mi.load_dict({"type": "scene", "surface": shape})
 
@@ -85,7 +86,7 @@ class TransportCache:
         self.diffuse_samples, self.specular_samples = diffuse_samples, specular_samples
         self.scene = build_scene(geometry.mesh)
         self.slots = _radiance_slots(geometry.mesh, camera)
-        self._slots = mi.UInt32(self.slots)
+        self._slots = integers(mi, self.slots)
         self._primary()
         self._hits: list[mi.UInt32] = []
         for k in range(len(ROUGHNESS_LEVELS) + 1):
@@ -108,14 +109,14 @@ class TransportCache:
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
-        take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
+        take: Any = lambda v: dr.gather(type(v), v, integers(mi, pixels))  # noqa: E731
         self.position, self.geometric_normal = take(si.p), take(si.n)
         normal, view = take(si.sh_frame.n), -take(d)
         self.normal = _towards(normal, view)
         self.frame = mi.Frame3f(self.normal)
         self.wo = self.frame.to_local(view)
         shift = pixel_shift(cam.height, cam.width, self.seed).reshape(-1, 2)[self.pixels]
-        self.shift = mi.Point2f(np.ascontiguousarray(shift.T))
+        self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
         dr.eval(self.position, self.geometric_normal, self.normal, self.frame, self.wo, self.shift)
 
     # -- directions ----------------------------------------------------------------------------------------------------
@@ -150,7 +151,7 @@ class TransportCache:
                 or None for direct light alone.
         """
         pyramid = EnvmapPyramid(envmap)
-        slots = mi.Float(self.slot_radiance(radiance).ravel())
+        slots = floats(mi, self.slot_radiance(radiance))
         width = len(self.pixels)
         out = []
         for k in range(len(ROUGHNESS_LEVELS) + 1):

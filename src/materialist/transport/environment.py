@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.render.buffers import floats
 from materialist.types import Array
 
 
@@ -15,7 +16,7 @@ class EnvmapLevel:
     def __init__(self, envmap: Array):
         h, w = envmap.shape[:2]
         self.height, self.width = dr.opaque(mi.UInt32, h), dr.opaque(mi.UInt32, w)
-        self.data = mi.Float(np.ascontiguousarray(envmap, np.float32).ravel())
+        self.data = floats(mi, envmap)
 
     def lookup(self, d, active):
         """Radiance (Color3f) from unit direction `d` (camera frame)."""

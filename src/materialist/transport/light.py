@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 import torch
 
+from materialist.render.buffers import floats, integers
 from materialist.transport.cache import MISS, TransportCache, spawn
 from materialist.transport.sampling import (
     MIN_ALPHA,
@@ -104,15 +105,15 @@ def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffu
     """Directions [N, 3], slots [N] and lobe weights (each [N]) of `count` samples of each row, sample-major."""
     q = len(rows)
     lane = dr.arange(mi.UInt32, q * count)
-    source = dr.gather(mi.UInt32, mi.UInt32(rows.astype(np.uint32)), lane % q)
+    source = dr.gather(mi.UInt32, integers(mi, rows), lane % q)
     take = lambda v: dr.gather(type(v), v, source)  # noqa: E731
     wo, frame, shift = take(cache.wo), mi.Frame3f(take(cache.normal)), take(cache.shift)
     sample = point(lane // q, dr.opaque(mi.UInt32, count), shift)
-    alpha = dr.gather(mi.Float, mi.Float(np.maximum(rough**2, MIN_ALPHA).astype(np.float32)), lane % q)
+    alpha = dr.gather(mi.Float, floats(mi, np.maximum(rough**2, MIN_ALPHA)), lane % q)
     if diffuse:
         wi = cosine_direction(sample)
         c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(dr.normalize(wi + wo), wi))
-        r = dr.gather(mi.Float, mi.Float(rough.astype(np.float32)), lane % q)
+        r = dr.gather(mi.Float, floats(mi, rough), lane % q)
         weights = [c0 + r * (c1 + r * c2)]
     else:
         h = visible_normal(wo, alpha, sample)

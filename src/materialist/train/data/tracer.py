@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.render.buffers import floats, integers
 from materialist.render.variant import setup
 from materialist.train.data import scatter, tiles
 from materialist.train.data.packing import Packed
@@ -35,7 +36,7 @@ def _bank(mi):
     """The tiles on the device, once a process: [N * SIZE * SIZE] UInt32, four channels of 8 bits."""
     if "tiles" not in _BANK:
         packed = np.ascontiguousarray(tiles.bank()[0]).view(np.uint32).ravel()
-        _BANK["tiles"] = mi.UInt32(packed)
+        _BANK["tiles"] = integers(mi, packed)
     return _BANK["tiles"]
 
 
@@ -53,7 +54,7 @@ class Tracer:
 
         def flat(array: Array):
             """The array in Dr.Jit's own memory: numpy's may be aligned otherwise, and then other code is compiled."""
-            copy = mi.Float(np.ascontiguousarray(array, np.float32).ravel()) + zero
+            copy = floats(mi, array) + zero
             dr.eval(copy)
             return copy
 
@@ -64,8 +65,8 @@ class Tracer:
         shares = [dr.opaque(mi.Float, float(s)) for s in packed.shares]
         turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
         self.lights = Lights(
-            flat(packed.env), sizes, mi.UInt32(packed.env_table), flat(packed.env_density), flat(packed.portals),
-            mi.UInt32(packed.lights), shares, turn,
+            flat(packed.env), sizes, integers(mi, packed.env_table), flat(packed.env_density), flat(packed.portals),
+            integers(mi, packed.lights), shares, turn,
         )  # fmt: skip
         self.offset = dr.opaque(mi.Float, 2e-5 * (1 + packed.reach))
         self.focal = dr.opaque(mi.Float, float(camera.focal))
@@ -204,8 +205,8 @@ class Tracer:
 def _mesh(mi, packed: Packed):
     mesh = mi.Mesh("all", len(packed.vertices), len(packed.faces))
     params = mi.traverse(mesh)
-    params["vertex_positions"] = mi.Float(packed.vertices.ravel())
-    params["faces"] = mi.UInt32(packed.faces.ravel())
+    params["vertex_positions"] = floats(mi, packed.vertices)
+    params["faces"] = integers(mi, packed.faces)
     params.update()
     return mesh
 
