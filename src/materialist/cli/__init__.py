@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from materialist.cli import apply, bench, doctor, edit, export, invert, models, relight, render, select, train
+from materialist.cli import apply, batch, bench, doctor, edit, export, invert, models, relight, render, select, train
 from materialist.cli.outcome import run_to_exit_code
 
 app = typer.Typer(
@@ -17,7 +17,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (invert, render, doctor, models, bench, train, export, select, edit, relight, apply):
+for module in (invert, render, doctor, models, bench, train, export, select, edit, relight, apply, batch):
     module.register(app)
 
 

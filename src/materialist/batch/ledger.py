@@ -1,0 +1,159 @@
+"""RUNS/batch.jsonl: what a batch has done, one line an event, only ever added to.
+
+A line is written in one piece and flushed to the disk before the next photo begins, so that a batch that is killed at
+any moment can be gone on with: a last line that was cut off is passed over. A lock that vanishes with its process
+keeps a second batch out of the folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import InputError, OutputError
+
+LEDGER = "batch.jsonl"
+LOCK = ".batch.lock"
+FORMAT = 1
+
+
+class Ledger:
+    """The events of a batch. Open it with `open_ledger`."""
+
+    def __init__(self, path: Path, events: list[dict[str, Any]], lock: int) -> None:
+        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+        self._lock = lock
+        self._cut = _ends_within_a_line(path)
+        self.last: dict[str, dict[str, Any]] = {}
+        """Photo id -> its last event: begin, done or failed."""
+        self.key = ""
+        """Stands for the options of this batch; the results of others do not count as done."""
+        self.names: dict[str, str] = {}
+        """Photo id -> name, of all photos that were ever begun here."""
+        for event in events:
+            self._note(event)
+
+    def append(self, event: str, **facts: Any) -> dict[str, Any]:
+        """Write one event. Raises OutputError when the disk is full or read-only."""
+        entry = {"event": event, "key": self.key, **facts}
+        line = ("\n" if self._cut else "") + json.dumps(entry, ensure_ascii=True) + "\n"
+        try:
+            written = os.write(self._file, line.encode())
+            self._cut = written < len(line)
+            if self._cut:
+                raise OSError("the disk is full")
+            os.fsync(self._file)
+        except OSError as error:
+            raise OutputError(f"{LEDGER} cannot be written: {error.strerror or error}.") from error
+        self._note(entry)
+        return entry
+
+    def close(self) -> None:
+        """Let another batch into the folder."""
+        os.close(self._file)
+        os.close(self._lock)
+
+    def _note(self, entry: dict[str, Any]) -> None:
+        if entry.get("anew"):  # what was done before is to be done again; whose results lie there stays known
+            self.last = {id: {"event": "begin", "id": id, "name": e["name"]} for id, e in self.last.items()}
+        if "id" in entry:
+            self.last[entry["id"]] = entry
+            self.names[entry["id"]] = entry["name"]
+
+
+def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = False, force: bool = False) -> Ledger:
+    """The ledger of RUNS, which is made where it is missing.
+
+    Without `resume`, RUNS must be empty or, with `force`, hold an earlier batch, which is begun anew. With `resume` it
+    must be empty or hold a batch with the same `options`; `force` goes on with others. Nothing but a batch is touched.
+
+    Raises InputError in the other cases, OutputError where RUNS cannot be written or another batch is at work in it.
+    """
+    folder = Path(runs)
+    path = folder / LEDGER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        held = [name for name in os.listdir(folder) if name != LOCK]
+        if held and not path.is_file():
+            raise InputError(f"{folder} is not empty and holds no batch; name another folder.")
+        if held and not (resume or force):
+            raise InputError(
+                f"{folder} holds a batch; add --resume to go on with it, --force to begin anew, or name another folder."
+            )
+        lock = _locked(folder)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+    try:
+        events = read_events(path) if held else []
+        if resume and not force:
+            _same_options(events, options, folder)
+        ledger = Ledger(path, events, lock)
+        ledger.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
+        ledger.append("start", format=FORMAT, options=options, anew=not resume)
+    except BaseException:
+        os.close(lock)
+        raise
+    return ledger
+
+
+def read_events(path: str | Path) -> list[dict[str, Any]]:
+    """The events of a ledger, oldest first; lines that were cut off are passed over. Raises InputError."""
+    events = []
+    for line in Path(path).read_bytes().splitlines():
+        try:
+            entry = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(entry, dict) and "event" in entry:
+            events.append(entry)
+    starts = [entry for entry in events if entry["event"] == "start"]
+    if any(entry.get("format") != FORMAT for entry in starts):
+        raise InputError(f"{path} is a ledger of another version; name another folder.")
+    return events
+
+
+def _same_options(events: list[dict[str, Any]], options: dict[str, Any], folder: Path) -> None:
+    name = _difference(events, options)
+    if name is not None:
+        before = _last_options(events)
+        raise InputError(
+            f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
+            "name another folder, or add --force to redo what differs."
+        )
+
+
+def _difference(events: list[dict[str, Any]], options: dict[str, Any]) -> str | None:
+    """An option that is not what it was at the last start; None where all are, or where there was none."""
+    before = _last_options(events)
+    differing = [name for name in sorted({*before, *options}) if before.get(name) != options.get(name)]
+    return differing[0] if before and differing else None
+
+
+def _last_options(events: list[dict[str, Any]]) -> dict[str, Any]:
+    starts = [entry for entry in events if entry["event"] == "start"]
+    return starts[-1].get("options", {}) if starts else {}
+
+
+def _locked(folder: Path) -> int:
+    lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        import fcntl
+
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except ImportError:  # Windows: two batches in one folder are the user's to avoid
+        pass
+    except BlockingIOError as error:
+        os.close(lock)
+        raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error
+    return lock
+
+
+def _ends_within_a_line(path: Path) -> bool:
+    """Whether a write was cut off."""
+    with path.open("rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - 1, 0))
+        return file.read(1) not in (b"", b"\n")

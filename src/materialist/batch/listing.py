@@ -1,0 +1,93 @@
+"""Which photos a batch is about: a folder, a list file, one photo, or a URL."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from materialist.batch.ledger import LEDGER
+from materialist.batch.remote import is_url, list_url, shown
+from materialist.errors import InputError
+from materialist.io.decode import FORMATS, RAW_SUFFIXES
+from materialist.io.examples import PREFIX
+from materialist.io.target import MARKER
+
+SUFFIXES = RAW_SUFFIXES | frozenset(
+    (".png", ".jpg", ".jpeg", ".heic", ".heif", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".bmp", ".avif", ".mpo")
+)
+"""File names that a folder's photos are told by; a list may name others."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A photo of a batch."""
+
+    id: str
+    """Path below the folder, line of the list, or URL without secrets: the same wherever the folder lies."""
+    location: str
+    """Where it is read from."""
+
+
+def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
+    """The photos of SOURCE, sorted by name, each once.
+
+    SOURCE is a folder (searched with its subfolders; hidden files, scene packages and the results of batches are
+    passed over), a text file with a photo or URL on each line (relative to the file; # begins a comment), a single
+    photo, or a URL of a folder, a pattern or a photo that fsspec can read. RUNS is passed over in any case.
+
+    Raises InputError where there is nothing to do, SetupError where a URL needs a library that is not installed.
+    """
+    text = str(source)
+    if is_url(text):
+        found = [Listed(shown(url), url) for url in list_url(text, SUFFIXES)]
+    elif text.startswith(PREFIX) or (Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()):
+        found = [_named(text, Path())]
+    elif Path(text).is_dir():
+        found = _of_folder(Path(text), Path(runs))
+    elif Path(text).is_file():
+        found = _of_list(Path(text))
+    else:
+        raise InputError(f"There is no folder or list of photos at {text}.")
+    if not found:
+        raise InputError(f"{shown(text)} holds no photo; it may hold {FORMATS}.")
+    return sorted({photo.id: photo for photo in found}.values(), key=lambda photo: photo.id)
+
+
+def _of_folder(folder: Path, runs: Path) -> list[Listed]:
+    found = []
+    own = os.path.realpath(runs)
+    try:
+        for place, below, files in os.walk(folder, onerror=_raise):
+            if MARKER in files or LEDGER in files or os.path.realpath(place) == own:
+                below.clear()
+                continue
+            below[:] = sorted(name for name in below if not name.startswith("."))
+            for name in files:
+                if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:
+                    path = Path(place) / name
+                    found.append(Listed(path.relative_to(folder).as_posix(), os.path.abspath(path)))
+    except OSError as error:
+        raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
+    return found
+
+
+def _raise(error: OSError) -> None:
+    raise error
+
+
+def _of_list(file: Path) -> list[Listed]:
+    try:
+        lines = file.read_text("utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
+    entries = [line.strip() for line in lines]
+    return [_named(entry, file.parent) for entry in entries if entry and not entry.startswith("#")]
+
+
+def _named(entry: str, folder: Path) -> Listed:
+    if is_url(entry):
+        return Listed(shown(entry), entry)
+    if entry.startswith(PREFIX):
+        return Listed(entry, entry)
+    return Listed(entry, os.path.abspath(folder / entry))

@@ -1,0 +1,62 @@
+"""Scene packages as results: are they whole, and are two the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from materialist.errors import SceneError
+from materialist.io.target import MARKER
+
+RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
+"""What the hash covers beside the camera. Times, memory, paths and pictures with figures in them are left out."""
+MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
+NEEDED = (
+    *("photo.exr", "photo.png", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "rerender.png"),
+    *(f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in MAPS),
+    *("overview.png", "report.json", MARKER),
+)
+"""What a package must hold to be whole."""
+
+
+def package_hash(path: str | Path) -> str:
+    """SHA-256 (hex) of what an inversion found: camera, photo at working size, prior, maps, light, mesh, re-rendering.
+
+    Two packages with equal hashes hold equal arrays, bit for bit; how long they took and where the photo lay differs.
+    Raises SceneError where a file is missing.
+    """
+    folder = Path(path)
+    files = sorted({file for pattern in RESULTS for file in folder.glob(pattern)})
+    digest = hashlib.sha256()
+    try:
+        meta = json.loads((folder / MARKER).read_text("utf-8"))
+        digest.update(json.dumps([meta["camera"], meta.get("lamps", [])], sort_keys=True).encode())
+        for file in files:
+            digest.update(f"\n{file.relative_to(folder).as_posix()} {file_hash(file)}".encode())
+    except (OSError, ValueError, KeyError) as error:
+        raise SceneError(f"{folder} is no whole scene package: {error}.") from error
+    return digest.hexdigest()
+
+
+def file_hash(path: str | Path) -> str:
+    """SHA-256 (hex) of a file's bytes. Raises OSError."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def whole_size(path: str | Path) -> int | None:
+    """Bytes of a scene package, or None where a file that it needs is missing or empty."""
+    folder = Path(path)
+    try:
+        if not all((folder / name).stat().st_size for name in NEEDED):
+            return None
+        return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    except OSError:
+        return None
+
+
+def together(hashes: Iterable[tuple[str, str]]) -> str:
+    """SHA-256 (hex) of a whole batch from (name, hash) of each result, whatever their order."""
+    return hashlib.sha256("\n".join(f"{name} {value}" for name, value in sorted(hashes)).encode()).hexdigest()
