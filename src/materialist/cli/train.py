@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from materialist.cli import train_data, train_matnet
+from materialist.cli import train_data, train_matnet, train_refraction
 
 train = typer.Typer(
     name="train",
@@ -13,7 +13,7 @@ train = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (train_data, train_matnet):
+for module in (train_data, train_matnet, train_refraction):
     module.register(train)
 
 

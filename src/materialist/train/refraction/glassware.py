@@ -38,7 +38,7 @@ def shape(index: int, split: str = "train", seed: int = 0) -> Shape:
     kinds = list(_KINDS)
     kind = kinds[index % len(kinds)]
     solid, hollow = _KINDS[kind](rng)
-    return Shape(_centred(solid), hollow, kind, kind not in _ANY_WAY)
+    return Shape(centred(solid), hollow, kind, kind not in _ANY_WAY)
 
 
 def _profile(rng: np.random.Generator, points: int, low: float = 0.25) -> Array:
@@ -209,7 +209,7 @@ _KINDS: dict[str, Callable[[np.random.Generator], tuple[Solid, bool]]] = {
 _ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2")
 
 
-def _centred(solid: Solid) -> Solid:
+def centred(solid: Solid) -> Solid:
     """The solid about the origin, its longest side 1."""
     low, high = solid.vertices.min(0), solid.vertices.max(0)
     return replace(solid, vertices=(solid.vertices - (low + high) / 2) / (high - low).max())

@@ -1,0 +1,60 @@
+"""`materialist train refraction`: make the views, and train the network that predicts how thick objects are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from materialist.cli.options import Json, Seed
+from materialist.cli.outcome import report_success
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("refraction")(refraction)
+
+
+def refraction(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="Folder of the run and its views.")],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder for the views, used again by later runs; default: RUN/views.")
+    ] = None,
+    data_only: Annotated[bool, typer.Option("--data-only", help="Make the views, do not train.")] = False,
+    shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640,
+    views: Annotated[int, typer.Option(help="Views of each.")] = 24,
+    heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64,
+    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None,
+    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None,
+    batch: Annotated[int, typer.Option(help="Views a step.")] = 32,
+    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 2e-3,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False,
+    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 180,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
+    from materialist.cli.progress import StageProgress
+    from materialist.train.refraction.lessons import Plan, produce
+
+    folder = data or output / "views"
+    train, aside = folder / "train", folder / "heldout"
+    plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
+    with StageProgress(quiet=as_json) as progress:
+        seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
+        if data_only:
+            lines = [f"{shapes} x {views} views in {train} ({seconds:.0f} s)"]
+            report_success("train refraction", as_json, lines, data=str(folder), seconds=seconds)
+            return
+        from materialist.train.budget import Budget
+        from materialist.train.refraction.trainer import Recipe, Trainer
+
+        budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
+        trainer = Trainer(
+            output, train, aside, budget=budget, recipe=Recipe(batch=batch, rate=rate), seed=seed, every=every,
+            resume=resume, note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
+        )  # fmt: skip
+        figures = trainer.run(progress)
+    lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
+    report_success("train refraction", as_json, lines, run=str(output), step=trainer.clock.step, **figures)
