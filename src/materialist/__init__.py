@@ -26,6 +26,7 @@ _HOME = {
     "edit": "edit",
     "relight": "edit.relight",
     "lamp": "edit.relight",
+    "insert": "edit.insert",
     "composite": "edit.composite",
     **dict.fromkeys(
         (
@@ -53,6 +54,7 @@ __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
     from materialist.edit.composite import composite as composite
+    from materialist.edit.insert import insert as insert
     from materialist.edit.material import edit as edit
     from materialist.edit.relight import lamp as lamp
     from materialist.edit.relight import relight as relight

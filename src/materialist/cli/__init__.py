@@ -6,7 +6,21 @@ import sys
 
 import typer
 
-from materialist.cli import apply, batch, bench, doctor, edit, export, invert, models, relight, render, select, train
+from materialist.cli import (
+    apply,
+    batch,
+    bench,
+    doctor,
+    edit,
+    export,
+    insert,
+    invert,
+    models,
+    relight,
+    render,
+    select,
+    train,
+)
 from materialist.cli.outcome import run_to_exit_code
 
 app = typer.Typer(
@@ -17,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (invert, render, doctor, models, bench, train, export, select, edit, relight, apply, batch):
+for module in (invert, render, doctor, models, bench, train, export, select, edit, relight, insert, apply, batch):
     module.register(app)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from materialist.edit.insert import insert
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, read_envmap, relight
 from materialist.edit.select import select
@@ -17,7 +18,8 @@ MATERIAL = (
     "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
 )  # fmt: skip
 LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "lamps")
-KINDS = {"edit": (*REGION, *MATERIAL), "relight": LIGHT}
+INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
+KINDS = {"edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT}
 """Kind of step -> what it may say."""
 
 
@@ -26,7 +28,7 @@ class Step:
     """One edit."""
 
     kind: str
-    """`edit` or `relight`."""
+    """One of KINDS."""
     options: dict[str, Any] = field(default_factory=dict)
     """As in the file: texts, lists of texts, lists of lists."""
     folder: Path = Path(".")
@@ -107,7 +109,7 @@ def apply(scene: Scene, steps: list[Step]) -> Scene:
         if step.skipped:
             continue
         try:
-            edited = (_edit if step.kind == "edit" else _relight)(scene, edited, step)
+            edited = {"edit": _edit, "relight": _relight, "insert": _insert}[step.kind](scene, edited, step)
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
@@ -146,6 +148,20 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     if "lamps" in given:
         options["lamps"] = [lamp(scene, *_numbers(one, 5, "lamp")) for one in _list_of(given["lamps"])]
     return relight(edited, **options)
+
+
+def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    missing = [name for name in ("mesh", "at") if name not in given]
+    if missing:
+        raise InputError(f"An insert needs its {missing[0]}, as in insert: {{mesh: mug.glb, at: [310, 220]}}.")
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("scale", "turn", "size") if k in given}
+    if "material" in given:
+        colour = given["material"]
+        options["material"] = ",".join(colour) if isinstance(colour, list) else str(colour)
+    if "up" in given:
+        options["up"] = str(given["up"])
+    return insert(edited, _file(step, "mesh"), _numbers(given["at"], 2, "at"), **options)
 
 
 def read_texture(path: str | Path):

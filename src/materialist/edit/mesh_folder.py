@@ -1,0 +1,108 @@
+"""What a mesh file may refer to: files in its own folder and below, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from urllib.parse import unquote
+
+from materialist.errors import InputError
+
+MAX_FACES = 2_000_000
+"""Triangles of a file that is still read."""
+FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+
+
+class MeshFolder:
+    """The files beside a mesh, as trimesh asks for them (its `Resolver` interface).
+
+    `refused` are references that lead outside, by a path, a link or an address: they are never opened. `missing` are
+    those inside that are not there. trimesh swallows what a resolver raises, so both are kept for the caller.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder.resolve()
+        self.refused: list[str] = []
+        self.missing: list[str] = []
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing one."""
+        name = str(name).strip()
+        path = self._inside(name)
+        if path is None:
+            self.refused.append(name)
+            raise InputError(f"The reference {name} leads outside of {self.folder}.")
+        try:
+            return path.read_bytes()
+        except OSError:
+            self.missing.append(name)
+            raise
+
+    def _inside(self, name: str) -> Path | None:
+        """The path of a reference, None when it leads outside. Percent-encoding, as of glTF, is taken back."""
+        for spelled in dict.fromkeys((name, unquote(name))):
+            plain = spelled.replace("\\", "/")
+            head = plain.split("/", 1)[0]
+            if ":" in head or plain.startswith("/") or "\0" in plain:
+                return None
+            path = (self.folder / plain).resolve()
+            if not path.is_relative_to(self.folder):
+                return None
+            if path.is_file():
+                return path
+        return path
+
+    __getitem__ = get
+
+    def keys(self) -> list[str]:
+        """Names of the files, as trimesh asks for them."""
+        return [path.name for path in self.folder.iterdir() if path.is_file()]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.keys()
+
+    def namespaced(self, namespace: str) -> MeshFolder:
+        """The same folder: no other is ever opened."""
+        return self
+
+    def write(self, name: str, data: bytes) -> None:
+        """Nothing is written beside a mesh."""
+        raise InputError("A mesh's folder is only read.")
+
+
+def claimed_faces(path: Path, data: bytes) -> int:
+    """How many faces the file says it has, before it is parsed; 0 where that cannot be told. Polygons count as one."""
+    suffix = path.suffix.lower()
+    try:
+        if suffix == ".ply":
+            head = data[: data.find(b"end_header")]
+            words = [line.split() for line in head.splitlines()]
+            return sum(int(w[2]) for w in words if len(w) == 3 and w[:2] == [b"element", b"face"])
+        if suffix == ".stl":
+            (count,) = struct.unpack_from("<I", data, 80)
+            return count if len(data) == 84 + 50 * count else data.count(b"endfacet")
+        if suffix == ".obj":
+            return data.count(b"\nf ") + data.startswith(b"f ")
+        return _gltf_faces(data)
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error):
+        return 0
+
+
+def gltf_header(data: bytes) -> dict:
+    """The JSON of a .gltf or .glb. Raises ValueError or struct.error where there is none."""
+    if data[:4] == b"glTF":
+        (length,) = struct.unpack_from("<I", data, 12)
+        data = data[20 : 20 + length]
+    return json.loads(data)
+
+
+def _gltf_faces(data: bytes) -> int:
+    header = gltf_header(data)
+    accessors = header.get("accessors", [])
+    total = 0
+    for mesh in header.get("meshes", []):
+        for primitive in mesh["primitives"]:
+            index = primitive.get("indices", primitive["attributes"]["POSITION"])
+            total += int(accessors[index]["count"]) // 3
+    return total

@@ -1,0 +1,126 @@
+"""Materials of mesh files as surfaces: glTF's metallic-roughness, OBJ's .mtl, colours of vertices or faces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from materialist.color import srgb_to_linear
+from materialist.types import Array, Surface
+
+GREY = 0.5
+"""Albedo and roughness where a file says nothing."""
+MAX_TEXTURE = 4096
+"""Pixels along the longer side of a texture; larger ones are shrunk."""
+
+
+def constant(albedo: Array | float, roughness: float, metallic: float, **glass: Any) -> Surface:
+    """A surface of one value: albedo [3] linear or a grey. `glass` are further fields of `Surface`."""
+    colour = np.broadcast_to(np.asarray(albedo, np.float32), (3,)).reshape(1, 1, 3).copy()
+    flat = lambda v: np.full((1, 1), v, np.float32)  # noqa: E731
+    return Surface(colour, flat(roughness), flat(metallic), **glass)
+
+
+def surface_of(material: Any, folder: Any) -> Surface:
+    """The Surface of a trimesh material, None for none; further maps of an .mtl are read through `folder`."""
+    if material is None:
+        return constant(GREY, GREY, 0.0)
+    if hasattr(material, "metallicFactor"):
+        return _from_gltf(material)
+    return _from_mtl(material, folder)
+
+
+def from_colours(colours: Array) -> tuple[Surface, Array]:
+    """One texel a face: (surface, uv [F, 2] of its centre), from sRGB colours [F, 3] uint8. Neutral otherwise."""
+    side = max(1, int(np.ceil(np.sqrt(len(colours)))))
+    texels = np.zeros((side * side, 3), np.float32)
+    texels[: len(colours)] = srgb_to_linear(colours.astype(np.float32) / 255)
+    number = np.arange(len(colours))
+    uv = (np.stack([number % side, number // side], -1) + 0.5) / side
+    plain = constant(GREY, GREY, 0.0)
+    return Surface(texels.reshape(side, side, 3), plain.roughness, plain.metallic), uv.astype(np.float32)
+
+
+def _from_gltf(material: Any) -> Surface:
+    """glTF 2.0, section 3.9: factors times textures; green is roughness, blue metallic; factors default to 1."""
+    factor = _rgb(material.baseColorFactor, 1.0)
+    albedo = factor.reshape(1, 1, 3)
+    if material.baseColorTexture is not None:
+        albedo = srgb_to_linear(_pixels(material.baseColorTexture)) * factor
+    rough = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
+    metal = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
+    roughness, metallic = np.full((1, 1), rough, np.float32), np.full((1, 1), metal, np.float32)
+    if material.metallicRoughnessTexture is not None:
+        packed = _pixels(material.metallicRoughnessTexture)
+        roughness, metallic = packed[..., 1] * np.float32(rough), packed[..., 2] * np.float32(metal)
+    return _clipped(albedo, roughness, metallic)
+
+
+def _from_mtl(material: Any, folder: Any) -> Surface:
+    """Kd (linear) times map_Kd; Pr, Pm and their maps where the file has them, else the width of the highlight Ns.
+
+    A Phong exponent n is about as wide as GGX with alpha^2 = 2 / (n + 2), and roughness = sqrt(alpha).
+    """
+    said = {str(k).lower(): v for k, v in (getattr(material, "kwargs", None) or {}).items()}
+    image = getattr(material, "image", None)
+    kd = said.get("kd")
+    if image is not None:
+        albedo = srgb_to_linear(_pixels(image))  # writers leave Kd black, or half, beside a texture
+    elif kd is not None:
+        albedo = np.asarray(kd, np.float32).reshape(1, 1, -1)[..., :3]
+    else:
+        albedo = np.full((1, 1, 3), GREY, np.float32)
+    exponent = _number(said.get("ns"), None)
+    shiny = GREY if not exponent else (2 / (max(exponent, 0.0) + 2)) ** 0.25
+    roughness = _map(said.get("map_pr"), folder, _number(said.get("pr"), shiny))
+    metallic = _map(said.get("map_pm"), folder, _number(said.get("pm"), 0.0))
+    return _clipped(albedo, roughness, metallic)
+
+
+def _map(reference: Any, folder: Any, otherwise: Any) -> Array:
+    """[h, w] grey values of a texture that an .mtl names (the last word: options come before), or one value."""
+    if reference:
+        from PIL import Image
+
+        try:
+            with Image.open(_stream(folder.get(str(reference[-1])))) as image:
+                return _pixels(image)[..., 0]
+        except Exception:  # refused, missing, or no picture: `folder` has noted it, the constant serves
+            pass
+    return np.full((1, 1), otherwise, np.float32)
+
+
+def _stream(data: bytes):
+    import io
+
+    return io.BytesIO(data)
+
+
+def _pixels(image: Any) -> Array:
+    """[h, w, 3] float32 in [0, 1] as stored, of a PIL picture; without its alpha."""
+    if max(image.size) > MAX_TEXTURE:
+        image = image.copy()
+        image.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
+    return np.asarray(image.convert("RGB"), np.float32) / 255
+
+
+def _clipped(albedo: Array, roughness: Array, metallic: Array) -> Surface:
+    clip = lambda v: np.ascontiguousarray(np.clip(np.nan_to_num(v), 0, 1), np.float32)  # noqa: E731
+    return Surface(clip(albedo), clip(roughness), clip(metallic))
+
+
+def _rgb(value: Any, otherwise: float) -> Array:
+    """[3] float32 from a factor in [0, 1], or in bytes."""
+    if value is None:
+        return np.full(3, otherwise, np.float32)
+    array = np.asarray(value)
+    return (array.astype(np.float32) / (255 if array.dtype == np.uint8 else 1))[:3]
+
+
+def _number(value: Any, otherwise: Any) -> Any:
+    """A float from 0.3, "0.3" or ["0.3"]."""
+    try:
+        return float(np.ravel(value)[0])
+    except (TypeError, ValueError, IndexError):
+        return otherwise

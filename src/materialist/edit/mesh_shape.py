@@ -1,0 +1,71 @@
+"""Shapes read from files: normals where there are none, and what is wrong with them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.types import Array
+
+CREASE = np.cos(np.radians(40.0))
+"""Faces that meet at a sharper angle than 40 degrees keep an edge between them."""
+SMOOTH_FROM = 200_000
+"""Faces from which normals are smooth throughout: such meshes are scans, and pairs of faces grow many."""
+
+
+def creased_normals(vertices: Array, faces: Array) -> Array:
+    """[F, 3, 3] unit normals of the corners of faces [F, 3] on vertices [V, 3].
+
+    A corner has the area-weighted mean of the faces around its place whose normals are within the crease angle of its
+    own face's; vertices at one place count as one.
+    """
+    corners = vertices[faces].astype(np.float64)  # [F, 3, 3]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = _unit(cross)
+    place = places(vertices)[faces]  # [F, 3]
+    if len(faces) >= SMOOTH_FROM:
+        total = np.zeros((int(place.max()) + 1, 3))
+        for k in range(3):
+            np.add.at(total, place[:, k], cross)
+        return _unit(total)[place]
+    order = np.argsort(place.ravel(), kind="stable")
+    sizes = np.bincount(place.ravel())
+    starts = np.cumsum(sizes) - sizes
+    face_of = order // 3  # faces sorted by place
+    around = sizes[place.ravel()]  # how many faces meet at each corner
+    corner = np.repeat(np.arange(faces.size), around)
+    offset = np.arange(len(corner)) - np.repeat(np.cumsum(around) - around, around)
+    other = face_of[starts[place.ravel()][corner] + offset]
+    alike = (flat[corner // 3] * flat[other]).sum(-1) > CREASE
+    total = np.zeros((faces.size, 3))
+    np.add.at(total, corner[alike], cross[other[alike]])
+    normals = _unit(total)
+    empty = np.linalg.norm(total, axis=-1) == 0
+    normals[empty] = np.repeat(flat, 3, 0)[empty]
+    return normals.reshape(-1, 3, 3)
+
+
+def places(vertices: Array) -> Array:
+    """[V] a number for each place: vertices within a millionth of the shape's size of each other share it."""
+    extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
+    grid = np.round((vertices - vertices.min(0)) / extent * 1e6).astype(np.int64)
+    return np.unique(grid, axis=0, return_inverse=True)[1].reshape(-1)
+
+
+def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
+    """(edges with one face, edges with three or more) of a mesh whose vertices at one place count as one."""
+    place = places(vertices)[faces]
+    place = place[(place[:, 0] != place[:, 1]) & (place[:, 1] != place[:, 2]) & (place[:, 2] != place[:, 0])]
+    edges = np.sort(place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, count = np.unique(edges[:, 0] * (int(place.max(initial=0)) + 1) + edges[:, 1], return_counts=True)
+    return int((count == 1).sum()), int((count > 2).sum())
+
+
+def volume(vertices: Array, faces: Array) -> float:
+    """Signed volume of a closed mesh: > 0 where faces run counter-clockwise seen from outside."""
+    a, b, c = (vertices[faces[:, k]].astype(np.float64) - vertices.mean(0) for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > 1e-30, vectors / np.maximum(length, 1e-30), [0.0, 1.0, 0.0])
