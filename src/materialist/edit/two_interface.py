@@ -1,0 +1,251 @@
+"""The paper's glass: every camera ray is refracted twice and then looks up the background.
+
+Paper, Material Transparency Editing. The ray enters at the visible surface (direction omega_t1), goes the distance
+d1, leaves through a back whose normal is the front's at the exit's place in the picture, and reaches
+
+    x2 = x + d1 omega_t1 + d2 omega_t2,
+
+whose screen position S(x2) says what of the background is seen. Light inside the object is followed no further.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from materialist.camera import pixel_rays, project
+from materialist.edit.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
+from materialist.errors import InputError
+from materialist.geometry.symmetry import surface_in
+from materialist.types import Array, Camera
+
+BACKS = ("mirrored", "same")
+"""What the back's normal is: the front's mirrored at the picture plane (lenses, vases), or its opposite (panes)."""
+STEPS = 96
+"""Places along a ray where it is compared with the background's depth."""
+SAMPLES = 24
+"""Facets of a rough surface that a pixel looks through."""
+_GOLDEN = (0.7548776662466927, 0.5698402909980532)
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What is behind the object."""
+
+    picture: Array
+    """[H, W, 3] linear radiance of the picture without the object."""
+    depth: Array
+    """[H, W] planar depth, scene units; 0 for sky."""
+    envmap: Array
+    """[h, 2h, 3] linear radiance: what is not in the picture."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Rays through the object."""
+
+    exit: Array
+    """[N, 3] where they leave, camera frame: x + d1 omega_t1."""
+    direction: Array
+    """[N, 3] unit, beyond the object: omega_t2, or the reflection where that is total."""
+    share: Array
+    """[N] part of the light that crosses both surfaces."""
+    reflected: Array
+    """[N, 3] unit direction of the reflection at the front."""
+    reflectance: Array
+    """[N] of the front."""
+
+
+def two_interface(
+    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, background_depth: Array,
+    background: Array, envmap: Array, *, ior: float = 1.5, transmission: float = 1.0,
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, back: str = "mirrored",
+) -> Array:  # fmt: skip
+    """The object under the mask as glass.
+
+    Args:
+        camera: its size is that of all maps.
+        normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
+        mask: [H, W] bool or weights.
+        thickness: [H, W] scene units, d1: how far rays go inside; >= 0.
+        background_depth: [H, W] planar depth without the object, 0 for sky.
+        background: [H, W, 3] linear radiance without the object.
+        envmap: [h, 2h, 3] linear radiance: reflections, and what rays meet that leave the picture.
+        ior: index of refraction, 1 to 3. transmission: T in [0, 1]. tint: linear RGB in [0, 1].
+        roughness: perceptual r in [0, 1]; alpha = r^2.
+        back: see BACKS.
+
+    Returns:
+        [H, W, 3] float32 linear radiance inside the mask, 0 outside.
+
+    Raises:
+        InputError: options out of range, or maps of another size than the camera's.
+    """
+    _check(ior, transmission, tint, roughness, back)
+    inside = surface_in(mask, depth, camera)
+    for name, value in (("thickness", thickness), ("background depth", background_depth), ("normals", normal),
+                        ("background", background)):  # fmt: skip
+        if value.shape[:2] != inside.shape:
+            raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
+    behind = Behind(background, background_depth, envmap)
+    front = Front(camera, normal, depth, inside)
+    count = SAMPLES if roughness > 0 else 1
+    total = np.zeros((int(inside.sum()), 3))
+    for k in range(count):
+        crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=back)
+        seen = crossing.share[:, None] * look(crossing.exit, crossing.direction, behind, camera)
+        mirror = crossing.reflectance[:, None] * environment(crossing.reflected, envmap)
+        total += seen * transmission * np.asarray(tint, float) + mirror
+    result = np.zeros((*inside.shape, 3), np.float32)
+    result[inside] = total / count
+    return result
+
+
+class Front:
+    """The visible surface of the object: its points, and its normals also just outside the mask."""
+
+    def __init__(self, camera: Camera, normal: Array, depth: Array, inside: Array):
+        from scipy.ndimage import distance_transform_edt
+
+        self.camera = camera
+        rays = pixel_rays(camera).astype(np.float64)[inside]
+        self.point = rays * depth[inside][:, None]  # [N, 3] x
+        self.direction = rays / np.linalg.norm(rays, axis=-1, keepdims=True)  # [N, 3]
+        self.normal = _facing(normal[inside].astype(np.float64), self.direction)  # [N, 3]
+        rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
+        self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
+
+    def normal_at(self, point: Array) -> Array:
+        """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
+        place, _ = project(point, self.camera)
+        found = bilinear(self._normals, place)
+        return _facing(found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9), _unit(point))
+
+
+def cross(
+    front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1), back: str = "mirrored"
+) -> Crossing:
+    """Rays through both surfaces; d1 [N] scene units.
+
+    `sample` (k, n) is the k-th of n facets of rough surfaces.
+    """
+    k, n = sample
+    points = [((k + 0.5) * g) % 1 for g in (*_GOLDEN, 0.6180339887, 0.4142135623)]
+    points[1] = (k + 0.5) / n
+    facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
+    inner, _ = refract(front.direction, facet, 1 / ior)
+    reflectance = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
+    share = (1 - reflectance) * _unmasked(inner, front.normal, alpha, below=True)
+    exit_point = front.point + d1[:, None] * inner
+    outward = _back_normal(front.normal_at(exit_point), _unit(exit_point), back)
+    # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
+    against = -_facing(outward, -inner)
+    facet = visible_facet(inner, against, alpha, points[2], points[3])
+    direction, total = refract(inner, facet, ior)
+    passed = 1 - fresnel_dielectric(-np.sum(inner * facet, -1), 1 / ior)
+    passed = np.where(total, 1.0, passed) * _unmasked(direction, against, alpha, below=~total)
+    mirrored = reflect(front.direction, front.normal if alpha <= 0 else visible_facet(
+        front.direction, front.normal, alpha, points[0], points[1]))  # fmt: skip
+    return Crossing(exit_point, direction, share * passed, mirrored, reflectance)
+
+
+def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool) -> Array:
+    """[N] the part of light that a rough surface lets go in `direction`; 0 on the wrong side of the surface."""
+    if alpha <= 0:
+        return np.ones(len(direction))
+    side = np.where(below, -1.0, 1.0) * np.sum(direction * normal, -1)
+    return np.where(side > 0, masking(direction, normal, alpha), 0)
+
+
+def _back_normal(front: Array, view: Array, back: str) -> Array:
+    """[N, 3] outward normal of the back below a front normal, seen along view [N, 3]."""
+    if back == "same":
+        return -front
+    return reflect(front, view)
+
+
+def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
+    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
+    distance = background_distance(origin, direction, behind.depth, camera)
+    place, _ = project(origin + np.where(np.isfinite(distance), distance, 0)[:, None] * direction, camera)
+    found = bilinear(behind.picture, place)
+    return np.where(np.isfinite(distance)[:, None], found, environment(direction, behind.envmap))
+
+
+def background_distance(origin: Array, direction: Array, depth: Array, camera: Camera) -> Array:
+    """[N] the distance d2 to the surface that a depth map [H, W] describes; inf for rays that meet none.
+
+    Beyond the picture the surface goes on as at its nearest edge. A ray that starts behind the surface meets it at
+    once. Rays are followed to twice the largest depth, in steps that are even in the picture's inverse depth.
+    """
+    if not (depth > 0).any():
+        return np.full(len(origin), np.inf)
+    far = 2 * float(depth.max())
+    surface = np.where(depth > 0, depth, 1e6).astype(np.float64)
+    length = far * (np.arange(STEPS + 1) / STEPS) ** 2  # [STEPS + 1]
+    low, high = np.zeros(len(origin)), np.full(len(origin), np.inf)
+    open_ = np.ones(len(origin), bool)
+    for a, b in pairwise(length):
+        hit = open_.copy()
+        hit[open_] = _behind(origin[open_], direction[open_], np.full(int(open_.sum()), b), surface, camera)
+        low[hit], high[hit] = a, b
+        open_ &= ~hit
+        if not open_.any():
+            break
+    met = np.isfinite(high)
+    for _ in range(12):
+        middle = (low[met] + high[met]) / 2
+        beyond = _behind(origin[met], direction[met], middle, surface, camera)
+        high[met], low[met] = np.where(beyond, middle, high[met]), np.where(beyond, low[met], middle)
+    return high
+
+
+def _behind(origin: Array, direction: Array, distance: Array, surface: Array, camera: Camera) -> Array:
+    """[n] bool: whether the points on the rays at `distance` [n] are behind the surface [H, W], and in view."""
+    place, depth = project(origin + distance[:, None] * direction, camera)
+    return (depth > 0) & (depth >= bilinear(surface[..., None], place)[:, 0])
+
+
+def environment(direction: Array, envmap: Array) -> Array:
+    """[N, 3] bilinear lookup of an envmap [h, 2h, 3] in unit directions [N, 3]."""
+    height, width = envmap.shape[:2]
+    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * width
+    y = np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * height
+    wrapped = np.concatenate([envmap[:, -1:], envmap, envmap[:, :1]], 1)
+    return bilinear(wrapped, np.stack([x + 1, y], -1))
+
+
+def bilinear(picture: Array, place: Array) -> Array:
+    """[N, C] values of a picture [H, W, C] at pixel positions [N, 2] (x right, y down); the edge goes on outside."""
+    height, width = picture.shape[:2]
+    x = np.clip(np.nan_to_num(place[:, 0]) - 0.5, 0, width - 1)
+    y = np.clip(np.nan_to_num(place[:, 1]) - 0.5, 0, height - 1)
+    x0, y0 = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
+    x1, y1 = np.minimum(x0 + 1, width - 1), np.minimum(y0 + 1, height - 1)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
+    return top * (1 - fy) + (picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx) * fy
+
+
+def _facing(normal: Array, direction: Array) -> Array:
+    """Unit normals [N, 3] made to point against the directions, at least grazingly."""
+    cosine = np.sum(normal * direction, -1, keepdims=True)
+    turned = np.where(cosine > -1e-3, normal - (cosine + 1e-3) * direction, normal)
+    return _unit(turned)
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+
+
+def _check(ior: float, transmission: float, tint: tuple[float, float, float], roughness: float, back: str) -> None:
+    if not 1 <= ior <= 3:
+        raise InputError(f"The index of refraction is {ior:g}; give 1 to 3 (water 1.33, glass 1.5, diamond 2.4).")
+    if not (0 <= transmission <= 1 and 0 <= roughness <= 1):
+        raise InputError(f"Transmission is {transmission:g}, roughness {roughness:g}; both are 0 to 1.")
+    if not (len(tint) == 3 and all(0 <= c <= 1 for c in tint)):
+        raise InputError(f"The tint is {tint}; give three numbers from 0 to 1: R, G, B.")
+    if back not in BACKS:
+        raise InputError(f"The back is {back!r}; choose one of {', '.join(BACKS)}.")

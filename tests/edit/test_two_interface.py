@@ -1,0 +1,192 @@
+"""The two-interface model, against slabs, balls and energy in closed form."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays, project
+from materialist.edit import two_interface as ti
+from materialist.errors import InputError
+from materialist.types import Camera
+
+CAMERA = Camera(48, 40, 40)
+SHAPE = (40, 48)
+
+
+def ball(camera, radius=0.6, distance=3.0):
+    """Depth, normal, mask, and cosine of incidence of a ball straight ahead."""
+    rays = pixel_rays(camera).astype(float)
+    d = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    centre = np.array([0.0, 0, -distance])
+    b = d @ centre
+    inside = b**2 - distance**2 + radius**2
+    mask = inside > 1e-4
+    point = d * (b - np.sqrt(np.maximum(inside, 0)))[..., None]
+    normal = np.where(mask[..., None], (point - centre) / radius, [0, 0, 1])
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    cosine = np.where(mask, -np.sum(normal * d, -1), 1)
+    return np.where(mask, -point[..., 2], 0), normal, mask, cosine
+
+
+def gradient(camera):
+    """A background that tells where it was looked up: x and y in the picture, in [0, 1]."""
+    h, w = camera.height, camera.width
+    x, y = np.meshgrid((np.arange(w) + 0.5) / w, (np.arange(h) + 0.5) / h)
+    return np.stack([x, y, 0 * x + 0.5], -1).astype(np.float32)
+
+
+def pane(camera, thickness, tilt=0.0):
+    """A wide parallel pane at depth 2, leaning by `tilt` radians about the vertical."""
+    n = np.array([np.sin(tilt), 0, np.cos(tilt)])
+    rays = pixel_rays(camera).astype(float)
+    depth = -2 * n[2] / (rays @ n)
+    mask = np.ones(depth.shape, bool)
+    return depth, np.broadcast_to(n, rays.shape).copy(), mask, np.full(depth.shape, thickness)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.5])
+def test_a_pane_moves_rays_aside_and_keeps_their_direction(tilt):
+    depth, normal, mask, _ = pane(CAMERA, 0, tilt)
+    front = ti.Front(CAMERA, normal, depth, mask)
+    cosine = -np.sum(front.direction * front.normal, -1)
+    inner = np.sqrt(1 - (1 - cosine**2) / 1.5**2)
+    crossing = ti.cross(front, 0.3 / inner, ior=1.5, back="same")
+    np.testing.assert_allclose(crossing.direction, front.direction, atol=1e-9)
+    # Closed form: a pane of thickness t moves a ray aside by t sin(i) (1 - cos(i) / (n cos(r))).
+    offset = np.linalg.norm(np.cross(crossing.exit - front.point, front.direction), axis=-1)
+    expected = 0.3 * np.sqrt(1 - cosine**2) * (1 - cosine / (1.5 * inner))
+    np.testing.assert_allclose(offset, expected, atol=1e-9)
+
+
+def test_a_ball_bends_rays_twice_by_the_difference_of_angles():
+    camera = Camera(160, 160, 30)
+    depth, normal, mask, cosine = ball(camera)
+    front = ti.Front(camera, normal, depth, mask)
+    ci = cosine[mask]
+    cr = np.sqrt(1 - (1 - ci**2) / 1.5**2)
+    crossing = ti.cross(front, 2 * 0.6 * cr, ior=1.5)
+    # The exit lies on the ball, and the deviation is 2 (i - r), as for every ball lens.
+    np.testing.assert_allclose(np.linalg.norm(crossing.exit - np.array([0, 0, -3.0]), axis=-1), 0.6, atol=1e-6)
+    deviation = np.arccos(np.clip(np.sum(crossing.direction * front.direction, -1), -1, 1))
+    core = ci > 0.5  # at the rim a pixel sees many normals
+    np.testing.assert_allclose(deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.02)
+
+
+def test_without_refraction_the_background_is_seen_unchanged():
+    depth, normal, mask, cosine = ball(CAMERA)
+    picture = gradient(CAMERA)
+    thickness = 1.2 * cosine
+    out = ti.two_interface(
+        CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 6.0), picture, np.ones((8, 16, 3)), ior=1.0
+    )
+    np.testing.assert_allclose(out[mask], picture[mask], atol=1e-4)
+    assert (out[~mask] == 0).all()
+
+
+def test_a_ball_lens_turns_the_background_round():
+    depth, normal, mask, cosine = ball(CAMERA)
+    thickness = 1.2 * np.sqrt(1 - (1 - cosine**2) / 1.5**2)
+    out = ti.two_interface(
+        CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 9.0), gradient(CAMERA), np.zeros((8, 16, 3)), ior=1.5
+    )
+    row = out[20, mask[20], 0]
+    middle = len(row) // 2
+    assert row[middle - 3] > row[middle + 3] + 0.05
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.4])
+def test_no_light_is_made(roughness):
+    depth, normal, mask, cosine = ball(CAMERA)
+    white = np.ones((*SHAPE, 3))
+    out = ti.two_interface(
+        CAMERA, normal, depth, mask, 1.2 * cosine, np.full(SHAPE, 6.0), white, np.ones((8, 16, 3)), ior=1.5,
+        roughness=roughness,
+    )  # fmt: skip
+    assert (out[mask] <= 1 + 1e-6).all()
+    # Straight through the middle a smooth ball loses what is reflected twice: (1 - 0.04)^2 + 0.04.
+    if roughness == 0:
+        assert out[20, 24].tolist() == pytest.approx([0.9616] * 3, abs=2e-3)
+
+
+def test_transmission_and_tint_scale_what_is_behind():
+    depth, normal, mask, cosine = ball(CAMERA)
+    arguments = (CAMERA, normal, depth, mask, 1.2 * cosine, np.full(SHAPE, 6.0), gradient(CAMERA), np.zeros((8, 16, 3)))
+    clear = ti.two_interface(*arguments, ior=1.3)
+    dim = ti.two_interface(*arguments, ior=1.3, transmission=0.5, tint=(1, 0.5, 0))
+    np.testing.assert_allclose(dim, clear * [0.5, 0.25, 0], atol=1e-6)
+
+
+def test_rough_glass_blurs():
+    depth, normal, mask, thickness = pane(CAMERA, 0.05)
+    checker = np.repeat((np.indices(SHAPE).sum(0) // 2 % 2)[..., None], 3, -1).astype(float)
+    arguments = (CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 4.0), checker, np.zeros((8, 16, 3)))
+    clear, rough = (ti.two_interface(*arguments, ior=1.5, roughness=r) for r in (0.0, 0.5))
+    inner = np.s_[10:30, 10:38]
+    assert rough[inner].std() < 0.4 * clear[inner].std()
+    assert rough[inner].mean() == pytest.approx(clear[inner].mean(), rel=0.15)
+
+
+def test_distance_to_a_slanting_background():
+    camera = Camera(64, 64, 50)
+    n = np.array([0.3, 0.8, 0.5])
+    depth = -1.5 * n[2] / np.minimum(pixel_rays(camera).astype(float) @ n, -1e-3)
+    depth = np.where((depth > 0) & (depth < 50), depth, 0)  # n.p = -1.5 n_z
+    origin = np.array([[0.0, 0.0, -1.0], [0.1, 0.2, -1.2]])
+    direction = np.array([[0.0, -0.6, -0.8], [0.1, -0.7, -0.4]])
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    found = ti.background_distance(origin, direction, depth, camera)
+    np.testing.assert_allclose(found, (-1.5 * n[2] - origin @ n) / (direction @ n), rtol=0.02)
+
+
+def test_rays_that_meet_nothing_see_the_environment():
+    sky = np.zeros((16, 32, 3))
+    sky[:8] = 1.0  # the upper half
+    origin, direction = np.array([[0.0, 0, -2]] * 3), np.array([[0.0, 0.9, 0.436], [0, -0.9, 0.436], [0, 0, -1.0]])
+    behind = ti.Behind(np.full((*SHAPE, 3), 0.25), np.full(SHAPE, 5.0), sky)
+    found = ti.look(origin, direction, behind, CAMERA)
+    assert found[:, 0].tolist() == pytest.approx([1, 0, 0.25])
+    empty = ti.Behind(behind.picture, np.zeros(SHAPE), sky)
+    assert ti.look(origin[:1], direction[:1], empty, CAMERA)[0, 0] == 1
+
+
+def test_total_reflection_keeps_its_light():
+    # A wedge: the back leans away so far that the ray cannot leave.
+    depth, normal, mask, _ = pane(CAMERA, 0.0, tilt=0.7)
+    front = ti.Front(CAMERA, normal, depth, mask)
+    crossing = ti.cross(front, np.full(mask.sum(), 0.2), ior=2.4)
+    inner, _ = ti.refract(front.direction, front.normal, 1 / 2.4)
+    outward = ti.reflect(front.normal, ti._unit(crossing.exit))
+    total = np.sum(inner * outward, -1) < np.sqrt(1 - 1 / 2.4**2)
+    assert total.all()
+    np.testing.assert_allclose(crossing.share, 1 - crossing.reflectance)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"ior": 0.9}, "index of refraction is 0.9"),
+        ({"transmission": 1.5}, "Transmission is 1.5"),
+        ({"tint": (1, 2, 0)}, "tint is"),
+        ({"back": "odd"}, "back is 'odd'"),
+    ],
+)
+def test_bad_options_are_refused(change, words):
+    depth, normal, mask, thickness = pane(CAMERA, 0.1)
+    with pytest.raises(InputError, match=words):
+        ti.two_interface(
+            CAMERA, normal, depth, mask, thickness, depth + 1, gradient(CAMERA), np.ones((8, 16, 3)), **change
+        )
+
+
+def test_maps_of_another_size_are_refused():
+    depth, normal, mask, thickness = pane(CAMERA, 0.1)
+    with pytest.raises(InputError, match="thickness has shape"):
+        ti.two_interface(
+            CAMERA, normal, depth, mask, thickness[1:], depth + 1, gradient(CAMERA), np.ones((8, 16, 3))
+        )  # fmt: skip
+
+
+def test_positions_in_the_picture_agree_with_the_camera():
+    picture = gradient(CAMERA)
+    point = np.array([[0.2, -0.1, -2.0], [-0.3, 0.25, -3.0]])
+    place, _ = project(point, CAMERA)
+    np.testing.assert_allclose(ti.bilinear(picture, place)[:, :2], place / [48, 40], atol=1e-6)
