@@ -19,6 +19,7 @@ from materialist.cli import (
     relight,
     render,
     select,
+    studio,
     train,
 )
 from materialist.cli.outcome import run_to_exit_code
@@ -31,7 +32,22 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (invert, render, doctor, models, bench, train, export, select, edit, relight, insert, apply, batch):
+for module in (
+    invert,
+    render,
+    doctor,
+    models,
+    bench,
+    train,
+    export,
+    select,
+    edit,
+    relight,
+    insert,
+    apply,
+    batch,
+    studio,
+):
     module.register(app)
 
 

@@ -1,0 +1,49 @@
+"""`materialist studio [PHOTO|SCENE]`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("studio")(studio)
+
+
+def studio(
+    target: Annotated[
+        str | None, typer.Argument(metavar="[PHOTO|SCENE]", help="What to open first: a photo, or a scene package.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to serve on; other than this machine needs --password or --open.")
+    ] = ("127.0.0.1"),
+    port: Annotated[int, typer.Option(help="Port.")] = 7860,
+    work: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Where scenes and edits are kept; materialist-studio in this folder unless given."
+        ),
+    ] = None,
+    password: Annotated[str | None, typer.Option(metavar="WORD", help="Ask everyone for it.")] = None,
+    everyone: Annotated[bool, typer.Option("--open", help="Let everybody in who can reach --host.")] = False,
+    workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
+) -> None:
+    """Open the studio: a page in the browser to take photos apart and edit them."""
+    from materialist.studio.server import check_host, check_port, first_project, new_hub, serve
+    from materialist.studio.work import default_root
+
+    alone = check_host(host, password, everyone)
+    check_port(host, port)
+    hub = new_hub(work or default_root(), alone=alone, workers=workers)
+    hub.start = first_project(hub.work, target)
+    typer.echo(f"Scenes and edits are kept in {hub.work.root}")
+    serve(
+        hub,
+        host=host,
+        port=port,
+        password=password,
+        told=lambda address: typer.echo(f"The studio is open at {address} (Ctrl-C ends it)"),
+    )

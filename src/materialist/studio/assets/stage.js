@@ -1,0 +1,108 @@
+// The stage: shows a picture and its mask, and turns pointer and keys into picks at working pixels.
+const view = element.querySelector(".view");
+const photo = element.querySelector(".photo");
+const fill = element.querySelector(".fill");
+const outline = element.querySelector(".outline");
+const badge = element.querySelector(".badge");
+const marks = element.querySelector(".marks");
+const cross = element.querySelector(".cross");
+let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null;
+
+function show() {
+  const v = props.value || {};
+  if (v.width) { width = v.width; height = v.height; marks.setAttribute("viewBox", `0 0 ${width} ${height}`); }
+  view.classList.toggle("empty", !width);
+  if (v.picture !== undefined && v.picture !== photo.getAttribute("src")) {
+    if (v.picture) photo.src = v.picture; else { photo.removeAttribute("src"); width = 0; view.classList.add("empty"); }
+  }
+  if (v.badge !== undefined) badge.textContent = v.badge;
+  if (v.shown !== undefined) view.dataset.shown = v.shown;
+  if (v.fill !== undefined && v.fill !== maskUrl) {
+    maskUrl = v.fill;
+    outline.hidden = !v.outline;
+    if (v.outline) outline.src = v.outline;
+    fill.classList.remove("seen");
+    fill.style.maskImage = fill.style.webkitMaskImage = v.fill ? `url(${v.fill})` : "none";
+    void fill.offsetWidth;  // starts the animation again
+    fill.classList.toggle("seen", !!v.fill);
+    view.dataset.selected = v.fill ? "yes" : "";
+  }
+  if (v.lamps !== undefined) {
+    const r = Math.max(width, height) / 60;
+    marks.querySelectorAll(".lamp").forEach((n) => n.remove());
+    for (const [x, y] of v.lamps) marks.append(circle(x, y, r, "lamp"));
+  }
+}
+
+function circle(x, y, r, name) {
+  const c = document.createElementNS("http://www.w3.org/2000/svg", "circle");
+  c.setAttribute("cx", x); c.setAttribute("cy", y); c.setAttribute("r", r); c.setAttribute("class", name);
+  return c;
+}
+
+const tool = () => document.body.dataset.tool || "click";
+const size = () => parseFloat(document.body.dataset.brush || "12");
+function mode(e) {
+  if (e.shiftKey) return "add";
+  if (e.altKey) return "remove";
+  return document.body.dataset.mode || "new";
+}
+function at(e) {
+  const box = view.getBoundingClientRect();
+  const clamp = (v, top) => Math.min(Math.max(v, 0), top - 0.01);
+  return [clamp((e.clientX - box.left) / box.width * width, width), clamp((e.clientY - box.top) / box.height * height, height)];
+}
+function send(what) { view.classList.add("busy"); setTimeout(() => view.classList.remove("busy"), 4000); trigger("pick", what); }
+
+function trace() {
+  marks.querySelectorAll(".trace").forEach((n) => n.remove());
+  if (!down) return;
+  const [x0, y0] = path[0], [x1, y1] = path[path.length - 1];
+  if (tool() === "box") {
+    const r = document.createElementNS("http://www.w3.org/2000/svg", "rect");
+    r.setAttribute("x", Math.min(x0, x1)); r.setAttribute("y", Math.min(y0, y1));
+    r.setAttribute("width", Math.abs(x1 - x0)); r.setAttribute("height", Math.abs(y1 - y0));
+    r.setAttribute("class", "trace rect"); marks.append(r);
+  } else if (tool() === "brush") {
+    const l = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
+    l.setAttribute("points", path.map((p) => p.join(",")).join(" "));
+    l.setAttribute("stroke-width", 2 * size()); l.setAttribute("class", "trace stroke"); marks.append(l);
+  }
+}
+
+view.addEventListener("pointerdown", (e) => {
+  if (!width || e.button) return;
+  down = mode(e); path = [at(e)]; cross.style.display = "none"; cursor = null;
+  if (tool() === "box" || tool() === "brush") { view.setPointerCapture(e.pointerId); e.preventDefault(); trace(); }
+});
+view.addEventListener("pointermove", (e) => { if (down && tool() !== "click") { path.push(at(e)); trace(); } });
+view.addEventListener("pointercancel", () => { down = null; trace(); });
+view.addEventListener("pointerup", (e) => {
+  if (!down) return;
+  const how = down; path.push(at(e)); finish(tool(), how); down = null; trace();
+});
+function finish(kind, how) {
+  const [x0, y0] = path[0], [x1, y1] = path[path.length - 1];
+  if (kind === "box") send({ tool: "box", mode: how, at: [x0, y0, x1, y1] });
+  else if (kind === "brush") send({ tool: "brush", mode: how === "new" ? "add" : how, points: path.slice(0, 20000), radius: size() });
+  else send({ tool: kind, mode: how, at: [x0, y0] });
+}
+
+// Keys: arrows move a cross, Enter or Space clicks there; Shift and Alt as with the pointer.
+view.addEventListener("keydown", (e) => {
+  if (!width) return;
+  const step = (e.ctrlKey ? 1 : Math.max(width, height) / 40);
+  const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
+  if (move) {
+    cursor = cursor || [width / 2, height / 2];
+    cursor = [Math.min(Math.max(cursor[0] + move[0] * step, 0), width - 1), Math.min(Math.max(cursor[1] + move[1] * step, 0), height - 1)];
+    cross.style.display = "block"; cross.style.left = `${100 * cursor[0] / width}%`; cross.style.top = `${100 * cursor[1] / height}%`;
+    e.preventDefault();
+  } else if ((e.key === "Enter" || e.key === " ") && cursor) {
+    const kind = tool() === "brush" || tool() === "box" ? "brush" : tool();
+    path = [cursor]; finish(kind, mode(e)); e.preventDefault();
+  }
+});
+view.addEventListener("dragstart", (e) => e.preventDefault());
+show();
+watch("value", () => { view.classList.remove("busy"); show(); });

@@ -1,0 +1,90 @@
+"""The running studio: its work folder, its queue, and the pages that are open."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import re
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import InputError
+from materialist.studio.jobs import Jobs
+from materialist.studio.session import Session
+from materialist.studio.work import Project, WorkFolder
+
+ALONE = "me"
+"""The person, where the studio serves this machine only."""
+_LEAST_FREE = 1.2e9
+"""Bytes of memory that must be free before another scene is opened."""
+
+
+@dataclass
+class Hub:
+    """What all pages share."""
+
+    work: WorkFolder
+    jobs: Jobs
+    alone: bool = True
+    """Served on this machine only: everyone on it is the same person."""
+    start: Project | Path | None = None
+    """What to open first: a scene, or a photo to show on the opening tab."""
+    examples: bool = True
+    _sessions: dict[str, Session] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def person(self, token: Any) -> str:
+        """Who a page belongs to, from the token its browser keeps. Raises InputError for a made-up one."""
+        if self.alone:
+            return ALONE
+        if not isinstance(token, str) or not re.fullmatch(r"[a-z0-9]{16,32}", token):
+            raise InputError("The page has lost its session; reload it.")
+        return token
+
+    def session(self, page: str | None, person: str | None = None) -> Session:
+        """The session of a page, by Gradio's session hash; `person` starts one. Raises InputError where it is gone."""
+        if not page:
+            raise InputError("The page has lost its session; reload it.")
+        with self._lock:
+            known = self._sessions.get(page)
+            if known is None or (person is not None and known.person != person):
+                if person is None and not self.alone:
+                    raise InputError("The page has lost its session; reload it.")
+                known = self._sessions[page] = Session(person or ALONE)
+            return known
+
+    def open(self, session: Session, name: str) -> None:
+        """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
+        import psutil
+
+        project = self.work.project(name, None if self.alone else session.person)
+        session.close()
+        free()
+        if psutil.virtual_memory().available < _LEAST_FREE:
+            raise InputError("This machine has no memory left for another scene; close one in another tab.")
+        session.open(project)
+        self.work.touch(project)
+
+    def leave(self, page: str | None) -> None:
+        """Forget a page that was closed, and its memory; its work stays in the work folder, its jobs run on."""
+        with self._lock:
+            session = self._sessions.pop(page or "", None)
+        if session is not None:
+            session.close()
+            del session
+            free()
+
+    @property
+    def open_pages(self) -> int:
+        return len(self._sessions)
+
+
+def free() -> None:
+    """Give unused memory back to the system at once, where the C library can."""
+    gc.collect()
+    try:
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
+    except (OSError, AttributeError):
+        return

@@ -1,0 +1,72 @@
+"""Pictures of a scene while a slider moves: `edit.preview.Preview` behind the threads that may use it."""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from materialist.edit.recipe import Step, apply
+from materialist.types import Array, Scene
+
+_THREAD = ThreadPoolExecutor(1, thread_name_prefix="live")
+"""The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
+_KEPT = 24
+"""Edited scenes that are kept: moving the last of several steps must not replay those before."""
+
+
+class Live:
+    """A fitted scene, its preview (which takes seconds to build), and the edited scenes of late."""
+
+    def __init__(self, scene: Scene):
+        self.scene = scene
+        self._edited: OrderedDict[str, Scene] = OrderedDict()
+        self._preview: Future[Any] = _THREAD.submit(_build, scene)
+
+    @property
+    def ready(self) -> bool:
+        return self._preview.done()
+
+    def wait(self) -> None:
+        """Until the preview is there. Raises what went wrong with it."""
+        self._preview.result()
+
+    def edited(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene after the steps. Raises InputError."""
+        known, start = self.scene, 0
+        for count in range(len(steps), 0, -1):
+            hit = self._edited.get(_key(steps[:count]))
+            if hit is not None:
+                known, start = hit, count
+                break
+        for count in range(start + 1, len(steps) + 1):
+            known = apply(known, [steps[count - 1]])
+            self._edited[_key(steps[:count])] = known
+        while len(self._edited) > _KEPT:
+            self._edited.popitem(last=False)
+        return known
+
+    def picture(self, steps: tuple[Step, ...]) -> Array:
+        """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview."""
+        if not steps:
+            return self.scene.photo.linear
+        preview = self._preview.result()
+        edited = self.edited(steps)
+        return _THREAD.submit(preview.picture, edited).result()
+
+    def close(self) -> None:
+        """Give the memory back."""
+        self._preview.cancel()
+        self._preview = Future()
+        self._edited.clear()
+
+
+def _build(scene: Scene) -> Any:
+    from materialist.edit.preview import Preview
+
+    return Preview(scene)
+
+
+def _key(steps: tuple[Step, ...]) -> str:
+    return json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)

@@ -1,0 +1,174 @@
+"""The page: the stage with its tools on one side, the tabs on the other; on a phone one below the other."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import gradio as gr
+
+from materialist.studio.context import Context, steps
+from materialist.studio.follow import follow
+from materialist.studio.guard import guarded
+from materialist.studio.hub import Hub
+from materialist.studio.selection import read_pick
+
+TITLE = "Materialist studio"
+SPP, DRAFT_SPP = 256, 16
+"""Paths a pixel of the final picture, and of a quick look at it."""
+_HEAD = (
+    "<h1>Materialist</h1><p>One photo, taken apart into shape, material and light. Click something and change it.</p>"
+)
+
+
+def build(hub: Hub) -> Any:
+    """The Gradio page; `server` shows it."""
+    from materialist.studio import tab_light, tab_look, tab_material, tab_open, tab_take
+
+    context = Context(hub)
+    parts = context.parts
+    with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
+        parts["token"] = gr.BrowserState("", storage_key="materialist-person", secret="page")
+        parts["last"] = gr.BrowserState("", storage_key="materialist-last", secret="page")
+        gr.HTML(_HEAD, elem_id="head", js_on_load=None)
+        with gr.Row():
+            with gr.Column(scale=5, min_width=320):
+                _left(parts)
+            with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open") as tabs:
+                parts["tabs"] = tabs
+                tab_open.layout(context)
+                tab_material.layout(context)
+                tab_light.layout(context)
+                tab_look.layout(context)
+                tab_take.layout(context)
+        _wire(context)
+        for tab in (tab_material, tab_light, tab_look, tab_take):
+            tab.wire(context)
+        tab_open.wire(context, page)
+        page.unload(_leaver(hub))
+    return page
+
+
+def asset(name: str) -> str:
+    """The text of a file in assets."""
+    return _asset(name)
+
+
+@cache
+def _asset(name: str) -> str:
+    return (files("materialist.studio") / "assets" / name).read_text("utf-8")
+
+
+def _left(parts: dict[str, Any]) -> None:
+    """The stage, its tools, and the list of edits."""
+    parts["stage"] = gr.HTML(
+        {"picture": "", "width": 0, "height": 0, "badge": ""}, html_template=asset("stage.html"),
+        js_on_load=asset("stage.js"), elem_id="stage",
+    )  # fmt: skip
+    with gr.Row(elem_id="tools"):
+        tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
+        parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
+        modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
+        parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
+        parts["brush"] = gr.Slider(2, 60, 12, step=1, label="Brush size", scale=2, min_width=140)
+    with gr.Row():
+        parts["undo"] = gr.Button("Undo", size="sm", min_width=80)
+        parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
+        parts["draft"] = gr.Button("Quick look, path traced", size="sm", min_width=150)
+        parts["final"] = gr.Button("Final picture", size="sm", variant="primary", min_width=120)
+        parts["stop"] = gr.Button("Stop", size="sm", variant="stop", min_width=70, visible=False)
+    parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
+    parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
+
+
+def _wire(context: Context) -> None:
+    """Events of the left side."""
+    quick: dict[str, Any] = {"queue": False, "show_progress": "hidden", "api_visibility": "private"}
+    for name in ("tool", "mode", "brush"):
+        script = f"(v) => {{ document.body.dataset.{name} = v; }}"
+        context[name].change(None, context[name], None, js=script, api_visibility="private")
+
+    @guarded
+    def pick(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
+        session, wanted = context.session(request), read_pick(event._data)
+        if wanted["tool"] == "lamp":
+            from materialist.studio.tab_light import place_lamp
+
+            place_lamp(session, *wanted["at"])
+        else:
+            session.pick(wanted)
+        return context.everything(session)
+
+    @guarded
+    def act(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        session.act(str(event._data.get("what")), int(event._data.get("index", -1)))
+        return context.everything(session)
+
+    @guarded
+    def undo(request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        if not session.undo():
+            gr.Info("There is nothing to take back.")
+        return context.everything(session)
+
+    @guarded
+    def deselect(request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        session.deselect()
+        return context.everything(session)
+
+    context["stage"].pick(pick, None, context.all_parts, **quick)
+    context["steps"].act(act, None, context.all_parts, **quick)
+    context["undo"].click(undo, None, context.all_parts, **quick)
+    context["deselect"].click(deselect, None, context.all_parts, **quick)
+    _wire_final(context)
+
+
+def _wire_final(context: Context) -> None:
+    """Path-traced pictures, and the button that stops whatever this person has running."""
+    hub = context.hub
+    outputs = [*context.picture_parts, context["progress"], context["stop"]]
+
+    def render(spp: int) -> Any:
+        @guarded
+        def run(request: gr.Request) -> Any:
+            session = context.session(request)
+            _ = session.scene
+            steps_now = session.stack.active
+            edits = session.write_edits()
+            if not edits or session.project is None:
+                raise gr.Error("There is no edit to render yet: change something first.", print_exception=False)
+            target = session.desk / "final"
+            job = hub.jobs.submit(
+                "final", session.person, session.desk, scene=str(session.project.scene), edits=edits,
+                output=str(target), spp=spp,
+            )  # fmt: skip
+            session.running = job
+            for html in follow(hub.jobs, job):
+                yield {context["progress"]: html, context["stop"]: gr.update(visible=not job.over)}
+            if job.state == "done":
+                session.final = (steps_now, target)
+                yield {context["stage"]: session.stage(), context["steps"]: steps(session)}
+
+        return run
+
+    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    context["final"].click(render(SPP), None, outputs, **free)
+    context["draft"].click(render(DRAFT_SPP), None, outputs, **free)
+
+    @guarded
+    def stop(request: gr.Request) -> None:
+        session = context.session(request)
+        if session.running is not None:
+            hub.jobs.stop(session.running)
+
+    context["stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
+
+
+def _leaver(hub: Hub) -> Any:
+    def leave(request: gr.Request) -> None:
+        hub.leave(request.session_hash)
+
+    return leave

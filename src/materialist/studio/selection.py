@@ -1,0 +1,87 @@
+"""What is selected: objects that were clicked, boxed or brushed, one over the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from materialist.edit.select import select
+from materialist.errors import InputError
+from materialist.types import Array, Scene
+
+REPLACE, ADD, REMOVE = "new", "add", "remove"
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Regions of one scene; the mask is their union."""
+
+    parts: tuple[Array, ...] = ()
+    """[H, W] bool each."""
+
+    @property
+    def mask(self) -> Array | None:
+        """[H, W] bool, or None where nothing is selected."""
+        if not self.parts:
+            return None
+        mask = np.logical_or.reduce(self.parts)
+        return mask if mask.any() else None
+
+    def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "grabcut") -> Selection:
+        """With the object at a pixel: alone, added, or (where it is selected already) taken away."""
+        row, column = int(y), int(x)
+        mask = self.mask
+        inside = mask is not None and 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column]
+        if inside or mode == REMOVE:
+            return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
+        found = select(scene, click=(x, y), method=method)
+        return self._with(found, mode)
+
+    def box(self, scene: Scene, box: list[float], mode: str, method: str = "grabcut") -> Selection:
+        """With what is in a box."""
+        if mode == REMOVE:
+            x0, y0, x1, y1 = (round(v) for v in box)
+            gone = np.zeros(scene.depth.shape, bool)
+            gone[min(y0, y1) : max(y0, y1), min(x0, x1) : max(x0, x1)] = True
+            return self._without(gone)
+        return self._with(select(scene, box=box, method=method), mode)
+
+    def brush(self, scene: Scene, points: list[list[float]], radius: float, mode: str) -> Selection:
+        """With a stroke through pixels (x, y): added, or rubbed out."""
+        import cv2
+
+        if not points or len(points) > 20_000 or not 0.5 <= radius <= 500:
+            raise InputError("The brush stroke could not be read; paint again.")
+        stroke = np.zeros(scene.depth.shape, np.uint8)
+        line = np.round(np.clip(np.array(points, np.float64)[:, :2], -1e4, 1e4)).astype(np.int32)
+        cv2.polylines(stroke, [line[:, None]], False, 1, thickness=max(1, round(2 * radius)))
+        for x, y in line[[0, -1]]:
+            cv2.circle(stroke, (int(x), int(y)), max(1, round(radius)), 1, -1)
+        painted = stroke > 0
+        return self._without(painted) if mode == REMOVE else self._with(select(scene, mask=painted), ADD)
+
+    def _with(self, region: Array, mode: str) -> Selection:
+        return Selection((*self.parts, region) if mode == ADD else (region,))
+
+    def _without(self, region: Array) -> Selection:
+        left = tuple(p & ~region for p in self.parts)
+        return replace(self, parts=tuple(p for p in left if p.any()))
+
+
+def read_pick(data: Any) -> dict[str, Any]:
+    """A pointer event as the page sends it, with everything checked. Raises InputError."""
+    try:
+        tool, mode = str(data["tool"]), str(data.get("mode", REPLACE))
+        numbers = [float(v) for v in data.get("at", ())]
+        points = [[float(x), float(y)] for x, y in data.get("points", ())]
+        radius = float(data.get("radius", 1))
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        raise InputError("The click could not be read; reload the page.") from error
+    wanted = {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}
+    if tool not in wanted or len(numbers) != wanted[tool] or mode not in (REPLACE, ADD, REMOVE):
+        raise InputError("The click could not be read; reload the page.")
+    if not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all():
+        raise InputError("The click could not be read; reload the page.")
+    return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}

@@ -1,0 +1,296 @@
+"""One page and what is open on it: a scene, a selection, a stack of edits, and the way back."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.edit.recipe import Step, read_recipe, write_recipe
+from materialist.errors import InputError
+from materialist.studio import views
+from materialist.studio.jobs import Job
+from materialist.studio.live import Live
+from materialist.studio.selection import ADD, REMOVE, Selection
+from materialist.studio.stack import Stack
+from materialist.studio.work import Project
+from materialist.types import Array, Scene
+
+EDITS = "edits.yaml"
+_UNDO = 60
+"""How many steps back there are."""
+FILES = ("mask", "texture", "envmap", "mesh", "background", "file")
+"""Options that name a file."""
+
+
+class Session:
+    """What one page has open. Its methods may be called from any thread."""
+
+    def __init__(self, person: str):
+        self.person = person
+        self.lock = threading.RLock()
+        self.project: Project | None = None
+        self.live: Live | None = None
+        self.selection = Selection()
+        self.lamp = (2700.0, 1.0, 0.75)
+        """Kelvin, power, and the share of the way to the surface, of the next lamp."""
+        self.stack = Stack()
+        self._past: list[tuple[str, Stack, Selection]] = []
+        self._mask_urls = views.mask_urls(None)
+        self.running: Job | None = None
+        """The last job that this page asked for."""
+        self.final: tuple[tuple[Step, ...], Path] | None = None
+        """The steps of the last path-traced picture, and its files without their endings."""
+
+    @property
+    def scene(self) -> Scene:
+        """The open scene. Raises InputError where there is none."""
+        if self.live is None:
+            raise InputError("Open a photo first.")
+        return self.live.scene
+
+    @property
+    def desk(self) -> Path:
+        """Where this person's edits of the open photo lie."""
+        if self.project is None:
+            raise InputError("Open a photo first.")
+        return self.project.desk(self.person)
+
+    def open(self, project: Project) -> None:
+        """Open a project where it was left."""
+        from materialist.io.package import load_scene
+
+        loaded = load_scene(project.scene)
+        with self.lock:
+            self.close()
+            self.project, self.live = project, Live(loaded)
+            if (self.desk / EDITS).is_file():
+                self.stack = Stack(tuple(_confined(step, self.desk) for step in read_recipe(self.desk / EDITS)))
+            final = self.desk / "final"
+            if final.with_suffix(".jpg").is_file() and _age(final.with_suffix(".jpg")) >= _age(self.desk / EDITS):
+                self.final = (self.stack.active, final)
+
+    def close(self) -> None:
+        """Give the memory back; what was done stays in the work folder."""
+        with self.lock:
+            if self.live is not None:
+                self.live.close()
+            self.project = self.live = self.final = None
+            self.stack, self._past = Stack(), []
+            self._select(Selection())
+
+    # Selecting
+
+    def pick(self, pick: dict[str, Any], method: str = "grabcut") -> None:
+        """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError."""
+        with self.lock:
+            scene, mode, before = self.scene, pick["mode"], self.selection
+            if pick["tool"] == "click":
+                after = before.click(scene, *pick["at"], mode, method)
+            elif pick["tool"] == "box":
+                after = before.box(scene, pick["at"], mode, method)
+            else:
+                after = before.brush(scene, pick["points"], pick["radius"], mode)
+            self._remember("select")
+            self._select(after)
+            step = self._current("edit")
+            if after.mask is None or mode not in (ADD, REMOVE) or step is None or self.stack.current is None:
+                self.stack = self.stack.chosen(None)
+            else:  # the edit in hand grows or shrinks with its region
+                self._put(step, mask=self._write_mask(after.mask))
+
+    def deselect(self) -> None:
+        with self.lock:
+            self._remember("select")
+            self._select(Selection())
+            self.stack = self.stack.chosen(None)
+
+    # The stack of edits
+
+    def material(self, name: str, value: str | None) -> None:
+        """Set or clear (None) an option of the edit in hand; a new edit begins where there is none."""
+        with self.lock:
+            scene = self.scene
+            mask = self.selection.mask
+            step = self._current("edit")
+            if step is None:
+                if mask is None:
+                    raise InputError("Click the object that you want to change first.")
+                if not (mask & (scene.depth > 0)).any():
+                    raise InputError("The selection covers only sky; select a surface.")
+                self._remember("begin")
+                self.stack = self.stack.add(Step("edit", {"mask": self._write_mask(mask)}, self.desk))
+                step = self.stack.steps[-1]
+            else:
+                self._remember(f"{name} of {self.stack.current}")
+            self._put(step, **{name: value})
+
+    def light(self, **options: Any) -> None:
+        """Set or clear (None) options of the light step; it is made when the first is set."""
+        with self.lock:
+            _ = self.scene
+            self._remember(f"light {sorted(options)}")
+            place = self.stack.last("relight")
+            self.stack = self.stack.add(Step("relight", {}, self.desk)) if place is None else self.stack.chosen(place)
+            self._put(self.stack.steps[self.stack.current or 0], **options)
+            if not self.stack.steps[self.stack.current or 0].options:
+                self.stack = self.stack.without(self.stack.current or 0)
+                self._save()
+
+    def add(self, step: Step) -> None:
+        """Append a step of any kind."""
+        with self.lock:
+            self._remember("add")
+            self.stack = self.stack.add(replace(step, folder=self.desk))
+            self._save()
+
+    def act(self, what: str, index: int) -> None:
+        """One of the buttons of the list: toggle, up, down, remove, choose."""
+        with self.lock:
+            if not 0 <= index < len(self.stack.steps):
+                raise InputError("That edit is no longer there.")
+            self._remember(what)
+            stack = self.stack
+            changed = {
+                "toggle": lambda: stack.toggled(index), "up": lambda: stack.moved(index, -1),
+                "down": lambda: stack.moved(index, 1), "remove": lambda: stack.without(index),
+                "choose": lambda: stack.chosen(None if stack.current == index else index),
+            }  # fmt: skip
+            if what not in changed:
+                raise InputError("That button is not known; reload the page.")
+            self.stack = changed[what]()
+            if what == "choose":
+                self._select(self._region_of(self.stack.current))
+            self._save()
+
+    def undo(self) -> bool:
+        """Take back the last change; False where there is none."""
+        with self.lock:
+            if not self._past:
+                return False
+            _, self.stack, selection = self._past.pop()
+            self._select(selection)
+            self._save()
+            return True
+
+    def read_edits(self, file: Path) -> None:
+        """Put the steps of an uploaded edits.yaml in place of the stack. Raises InputError, and changes nothing."""
+        with self.lock:
+            scene, desk = self.scene, self.desk
+            steps = tuple(_confined(step, desk) for step in read_recipe(file))
+            if self.live is not None and scene is not None:
+                self.live.edited(tuple(step for step in steps if not step.skipped))
+            self._remember("load")
+            self.stack = Stack(steps)
+            self._save()
+
+    # Showing
+
+    def stage(self, picture: bool = True) -> dict[str, Any]:
+        """What the stage shows: the picture as a data URL (unless not asked for), the mask, and what it is."""
+        with self.lock:
+            live, steps, stack = self.live, self.stack.active, self.stack
+            if live is None:
+                return {"picture": "", "width": 0, "height": 0, "badge": "", **views.mask_urls(None)}
+            camera = live.scene.camera
+            shown = {"width": camera.width, "height": camera.height, "lamps": self._lamps(stack), **self._mask_urls}
+            final = self.final
+        if not picture:
+            return shown
+        if final is not None and final[0] == steps and steps:
+            return {**shown, "picture": views.file_url(final[1].with_suffix(".jpg")), "badge": "Final"}
+        badge = "Live preview" if steps else "Photo"
+        return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": badge}
+
+    def write_edits(self) -> str:
+        """The recipe as a file for other commands; an empty text where no step is on."""
+        with self.lock:
+            self._save()
+            return str(self.desk / EDITS) if self.stack.active else ""
+
+    def keep(self, file: Path, stem: str, suffix: str) -> str:
+        """Copy an uploaded file (checked before) to the desk under a name of ours; returns that name."""
+        name = f"{stem}-{self._number(stem)}{suffix}"
+        shutil.copyfile(file, self.desk / name)
+        return name
+
+    def new_name(self, stem: str, suffix: str) -> Path:
+        """A free place on the desk."""
+        return self.desk / f"{stem}-{self._number(stem)}{suffix}"
+
+    # Within
+
+    def _current(self, kind: str) -> Step | None:
+        k = self.stack.current
+        return self.stack.steps[k] if k is not None and self.stack.steps[k].kind == kind else None
+
+    def _put(self, step: Step, **options: Any) -> None:
+        assert self.stack.current is not None
+        merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
+        self.stack = self.stack.put(self.stack.current, replace(step, options=merged))
+        self._save()
+
+    def _remember(self, what: str) -> None:
+        """Keep the state for undo; a slider that moves on adds no further entry."""
+        steady = what.startswith("light ") or " of " in what
+        if not (steady and self._past and self._past[-1][0] == what):
+            self._past = [*self._past[-_UNDO:], (what, self.stack, self.selection)]
+
+    def _select(self, selection: Selection) -> None:
+        self.selection = selection
+        self._mask_urls = views.mask_urls(selection.mask)
+
+    def _region_of(self, index: int | None) -> Selection:
+        """The selection that a step was made with."""
+        step = self.stack.steps[index] if index is not None else None
+        if step is None or "mask" not in step.options:
+            return Selection()
+        from materialist.edit.select import select
+
+        return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
+
+    def _write_mask(self, mask: Array) -> str:
+        from materialist.io.image import write_png_bytes
+
+        file = self.new_name("mask", ".png")
+        write_png_bytes(file, mask.astype(np.uint8) * 255)
+        return file.name
+
+    def _number(self, stem: str) -> int:
+        pattern = re.compile(rf"{re.escape(stem)}-(\d+)\.")
+        taken = [int(m[1]) for p in self.desk.iterdir() if (m := pattern.match(p.name))]
+        return max(taken, default=0) + 1
+
+    def _lamps(self, stack: Stack) -> list[list[float]]:
+        """(x, y) of the lamps, for their marks."""
+        place = stack.last("relight")
+        lamps = stack.steps[place].options.get("lamps", []) if place is not None else []
+        return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
+
+    def _save(self) -> None:
+        if self.stack.steps:
+            write_recipe(self.desk / EDITS, list(self.stack.steps))
+        elif self.project is not None:
+            (self.desk / EDITS).unlink(missing_ok=True)
+
+
+def _confined(step: Step, desk: Path) -> Step:
+    """The step with its files on the desk. Raises InputError where it names a file elsewhere or one that is missing."""
+    for name in FILES:
+        value = step.options.get(name)
+        if value is None:
+            continue
+        if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
+            raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")
+        if not (desk / value).is_file():
+            raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
+    return replace(step, folder=desk)
+
+
+def _age(path: Path) -> float:
+    return path.stat().st_mtime if path.exists() else 0.0

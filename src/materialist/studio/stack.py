@@ -1,0 +1,78 @@
+"""The list of edits in the making. It is the same thing as edits.yaml: steps of `edit.recipe`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from materialist.edit.recipe import Step
+
+_WORDS = {"edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fall"}
+_SILENT = ("mask", "click", "box", "with", "skip", "thickness")
+"""Options that a summary leaves out: the picture shows them."""
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Steps in the order of their application, and which of them the sliders move."""
+
+    steps: tuple[Step, ...] = ()
+    current: int | None = None
+
+    def add(self, step: Step) -> Stack:
+        return Stack((*self.steps, step), len(self.steps))
+
+    def put(self, index: int, step: Step) -> Stack:
+        """With another step in the place of one."""
+        return Stack((*self.steps[:index], step, *self.steps[index + 1 :]), index)
+
+    def toggled(self, index: int) -> Stack:
+        """With a step switched off, or on again."""
+        step = self.steps[index]
+        options = {k: v for k, v in step.options.items() if k != "skip"}
+        return self.put(index, replace(step, options=options if step.skipped else {**options, "skip": "true"}))
+
+    def moved(self, index: int, by: int) -> Stack:
+        """With a step further up (by = -1) or down (+1)."""
+        other = index + by
+        if not 0 <= other < len(self.steps):
+            return self
+        steps = list(self.steps)
+        steps[index], steps[other] = steps[other], steps[index]
+        return Stack(tuple(steps), other)
+
+    def without(self, index: int) -> Stack:
+        return Stack((*self.steps[:index], *self.steps[index + 1 :]), None)
+
+    def chosen(self, index: int | None) -> Stack:
+        return replace(self, current=index)
+
+    def last(self, kind: str) -> int | None:
+        """The place of the last step of a kind."""
+        places = [k for k, step in enumerate(self.steps) if step.kind == kind]
+        return places[-1] if places else None
+
+    @property
+    def active(self) -> tuple[Step, ...]:
+        return tuple(step for step in self.steps if not step.skipped)
+
+
+def summary(step: Step) -> str:
+    """A step in a few words."""
+    parts = [f"{name.replace('_', ' ')} {_short(value)}" for name, value in step.options.items() if name not in _SILENT]
+    return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or 'as it is'}"
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"({len(value)})" if value and isinstance(value[0], list | tuple) else ",".join(_short(v) for v in value)
+    return Path(value).stem if isinstance(value, str) and "." in value and not _number(value) else str(value)
+
+
+def _number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,92 @@
+"""The tab to look: before and after, every map, the light, the mesh, and the report in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gradio as gr
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.studio import views
+from materialist.studio.context import Context
+from materialist.studio.follow import box, follow
+from materialist.studio.guard import guarded
+from materialist.studio.session import Session
+from materialist.types import Array
+
+
+def layout(context: Context) -> None:
+    """The components."""
+    parts = context.parts
+    with gr.Tab("Look", id="look") as tab:
+        parts["look"] = tab
+        parts["compare"] = gr.ImageSlider(
+            label="Before and after", interactive=False, format="jpeg", buttons=["fullscreen"], elem_id="compare"
+        )
+        parts["report"] = gr.Markdown("Open a photo first.", elem_id="report")
+        parts["maps"] = gr.Gallery(
+            label="What was found", columns=2, height="auto", object_fit="contain", interactive=False, format="jpeg",
+            buttons=["fullscreen"], elem_id="maps",
+        )  # fmt: skip
+        parts["mesh_button"] = gr.Button("Show the mesh", size="sm")
+        parts["mesh_progress"] = gr.HTML("", js_on_load=None)
+        parts["mesh"] = gr.Model3D(
+            label="The mesh: drag to turn, wheel to zoom", height=380, clear_color=(0.9, 0.92, 0.94, 1.0),
+            interactive=False, visible=False, elem_id="mesh",
+        )  # fmt: skip
+
+
+def wire(context: Context) -> None:
+    """The events."""
+    parts, hub = context.parts, context.hub
+    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+
+    @guarded
+    def look(request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        if session.live is None:
+            return {}
+        return {
+            parts["compare"]: compared(session),
+            parts["report"]: views.report(session.scene),
+            parts["maps"]: views.maps(session.scene),
+        }
+
+    @guarded
+    def mesh(request: gr.Request) -> Any:
+        session = context.session(request)
+        _ = session.scene
+        assert session.project is not None
+        file = session.desk / "mesh.glb"
+        if not file.is_file():
+            job = hub.jobs.submit(
+                "mesh", session.person, session.desk, scene=str(session.project.scene), output=str(file)
+            )
+            for html in follow(hub.jobs, job):
+                yield {parts["mesh_progress"]: html}
+            if job.state != "done":
+                return
+        yield {parts["mesh_progress"]: box(""), parts["mesh"]: gr.update(value=str(file), visible=True)}
+
+    parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **free)
+    parts["mesh_button"].click(mesh, None, [parts["mesh_progress"], parts["mesh"]], **free)
+
+
+def compared(session: Session) -> tuple[Array, Array]:
+    """(photo, edits), [h, w, 3] uint8: the path-traced picture where there is one of these edits."""
+    import cv2
+
+    live, steps = session.live, session.stack.active
+    assert live is not None
+    before = _bytes(live.scene.photo.linear)
+    if session.final is not None and session.final[0] == steps and steps:
+        after = cv2.imread(str(session.final[1].with_suffix(".jpg")))[..., ::-1]
+        native = _bytes(live.scene.photo.original)
+        before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
+        return np.asarray(before), np.ascontiguousarray(after)
+    return before, _bytes(live.picture(steps))
+
+
+def _bytes(linear: Array) -> Array:
+    return np.round(linear_to_srgb(linear) * 255).astype(np.uint8)

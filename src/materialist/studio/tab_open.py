@@ -1,0 +1,264 @@
+"""The tab that opens a photo, a scene, an example, or what was left before."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import gradio as gr
+
+from materialist.errors import InputError
+from materialist.io.examples import EXAMPLES, example_path
+from materialist.studio import uploads
+from materialist.studio.context import Context
+from materialist.studio.follow import box, follow
+from materialist.studio.guard import guarded
+from materialist.studio.jobs import Job
+from materialist.studio.session import Session
+from materialist.studio.views import file_url
+from materialist.studio.work import Project, write_card
+
+PREDICTORS = (
+    ("Automatic: the best that is installed", "auto"),
+    ("Built in, needs nothing", "classical"),
+    ("MatNet (its weights must be there)", "matnet"),
+    ("Marigold (its weights must be there)", "marigold"),
+)
+SIZES = (
+    (f"{side} pixels{note}", side)
+    for side, note in ((256, ": quick"), (384, ""), (512, ""), (768, ": slow"), (1024, ": slower"))
+)
+_SOURCES = {"exif": "from its EXIF data", "default": "assumed; it has no EXIF data that says"}
+
+
+def layout(context: Context) -> None:
+    """The components."""
+    parts = context.parts
+    with gr.Tab("Open", id="open"):
+        parts["file"] = gr.File(
+            label="Drop a photo, or a zipped scene (up to 60 MB)", type="filepath", height=140, elem_id="file",
+            file_types=[*sorted(uploads.PHOTOS), *sorted(uploads.RAW_SUFFIXES), ".zip"],
+        )  # fmt: skip
+        parts["facts"] = gr.HTML("", elem_id="facts", js_on_load=None)
+        with gr.Row():
+            parts["predictor"] = gr.Dropdown(list(PREDICTORS), value="auto", label="First guess by", min_width=150)
+            parts["size"] = gr.Dropdown(list(SIZES), value=512, label="Working size", min_width=130)
+            parts["fov"] = gr.Textbox("auto", label="Field of view, degrees", max_lines=1, min_width=130)
+        with gr.Row():
+            parts["start"] = gr.Button("Take the photo apart", variant="primary", elem_id="start", min_width=160)
+            parts["cancel"] = gr.Button("Cancel", variant="stop", visible=False, elem_id="cancel", min_width=90)
+        parts["fit"] = gr.HTML("", elem_id="fit", js_on_load=None)
+        parts["found"] = gr.Gallery(
+            label="Found so far", columns=3, height="auto", visible=False, object_fit="contain", interactive=False,
+            buttons=[],
+        )  # fmt: skip
+        parts["projects"] = gr.Dropdown([], label="Continue where you left", value=None, elem_id="projects")
+        parts["continue"] = gr.Button("Continue", size="sm", elem_id="continue")
+        names = [(f"{name.capitalize()} ({credit})", name) for name, (_, credit) in EXAMPLES.items()]
+        parts["example"] = gr.Dropdown(names, label="Or take an example photo", value=None, elem_id="example")
+
+
+def wire(context: Context, page: gr.Blocks) -> None:
+    """The events."""
+    parts, hub = context.parts, context.hub
+    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+
+    @guarded
+    def uploaded(file: str | None, request: gr.Request) -> Any:
+        session = context.session(request)
+        if file is None or Path(file).suffix.lower() == ".zip":
+            return "" if file is None else _zipped(file)
+        return _facts(context, session, Path(file), Path(file).name)
+
+    @guarded
+    def exemplified(name: str | None) -> Any:
+        return None if name is None else gr.update(value=None)
+
+    @guarded
+    def start(
+        file: str | None, example: str | None, predictor: str, size: int, fov: str, token: str, request: gr.Request
+    ):
+        session = hub.session(request.session_hash, hub.person(token))
+        if file is not None and Path(file).suffix.lower() == ".zip":
+            project = _unpacked(context, session, Path(file))
+        else:
+            project, job = _begun(context, session, file, example, predictor, size, fov)
+            yield from _following(context, session, project, job)
+            if not project.ready:
+                return
+        yield from _opened(context, session, project)
+
+    @guarded
+    def resume(name: str | None, token: str, request: gr.Request):
+        session = hub.session(request.session_hash, hub.person(token))
+        if not name:
+            raise InputError("Choose one of your photos in the list first.")
+        yield from _resumed(context, session, name)
+
+    @guarded
+    def arrive(token: str, last: str, request: gr.Request):
+        token = token if len(token) >= 16 else secrets.token_hex(8)
+        session = hub.session(request.session_hash, hub.person(token))
+        known = _projects(context, session)
+        yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
+        first = hub.start.name if isinstance(hub.start, Project) else last
+        if first and any(value == first for _, value in known):
+            yield from _resumed(context, session, first)
+
+    @guarded
+    def cancel(request: gr.Request) -> None:
+        session = context.session(request)
+        if session.running is not None:
+            hub.jobs.stop(session.running)
+
+    opening = [
+        *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
+        parts["projects"], parts["progress"],
+    ]  # fmt: skip
+    wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov", "token")]
+    parts["file"].change(uploaded, parts["file"], parts["facts"], **free)
+    parts["example"].input(exemplified, parts["example"], parts["file"], **free)
+    parts["start"].click(start, wanted, opening, **free)
+    parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **free)
+    parts["cancel"].click(cancel, None, None, queue=False, show_progress="hidden", api_visibility="private")
+    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], *opening], **free)
+
+
+def _facts(context: Context, session: Session, path: Path, name: str) -> str:
+    """What a photo is, read in a process of its own: a broken decoder must not take the studio along."""
+    uploads.checked_picture(path, name)
+    thumbnail = context.hub.work.cache / f"{secrets.token_hex(8)}.jpg"
+    try:
+        job = context.hub.jobs.run_now(
+            "photo", session.person, thumbnail.parent, photo=str(path), thumbnail=str(thumbnail)
+        )
+        if job.state != "done":
+            raise InputError(job.message.replace(str(path), name))
+        facts = job.result
+        source = _SOURCES.get(facts["fov_source"], facts["fov_source"])
+        lines = [f"{facts['width']} × {facts['height']} pixels", f"Field of view {facts['fov']:.1f}° ({source})"]
+        words = "<br>".join(escape(line) for line in (*lines, *facts["warnings"]))
+        return f'<div class="facts"><img src="{file_url(thumbnail)}" alt="The photo"><p>{words}</p></div>'
+    finally:
+        thumbnail.unlink(missing_ok=True)
+
+
+def _zipped(file: str) -> str:
+    return box(f"{Path(file).name} will be opened as a scene.")
+
+
+def _begun(
+    context: Context, session: Session, file: str | None, example: str | None, predictor: str, size: int, fov: str
+) -> tuple[Project, Job]:
+    """A project with its photo in it, and the inversion in the queue."""
+    hub = context.hub
+    if file is None and not example:
+        raise InputError("Drop a photo first, or choose an example.")
+    if predictor not in {value for _, value in PREDICTORS}:
+        raise InputError("Choose one of the listed ways to make the first guess.")
+    source = Path(file) if file is not None else example_path(str(example))
+    title = source.name if file is not None else f"Example: {example}"
+    suffix = uploads.checked_picture(source, source.name)
+    project = hub.work.new(title, session.person)
+    photo = project.folder / f"original{suffix}"
+    shutil.copyfile(source, photo)
+    project = Project(project.folder, project.title, project.owner, project.scene, photo)
+    write_card(project)
+    job = hub.jobs.submit(
+        "invert", session.person, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
+        predictor=predictor, size=int(size), fov=fov.strip() or "auto",
+    )  # fmt: skip
+    return project, job
+
+
+def _unpacked(context: Context, session: Session, file: Path) -> Project:
+    from materialist.io.package import load_scene
+
+    project = context.hub.work.new(file.stem, session.person)
+    try:
+        uploads.unpack_scene(file, project.scene, file.name)
+        load_scene(project.scene)
+    except Exception:
+        shutil.rmtree(project.folder, ignore_errors=True)
+        raise
+    return project
+
+
+def _following(context: Context, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
+    """Progress and first pictures of an inversion until it is over."""
+    parts, hub = context.parts, context.hub
+    session.running = job
+    yield {
+        parts["last"]: project.name,
+        parts["cancel"]: gr.update(visible=True),
+        parts["start"]: gr.update(interactive=False),
+    }
+    shown = 0
+    for html in follow(hub.jobs, job):
+        update: dict[Any, Any] = {parts["fit"]: html}
+        if len(job.found) > shown:
+            shown = len(job.found)
+            latest = {f["found"].removeprefix("first "): f for f in job.found}
+            pictures = [(str(project.folder / f["file"]), f["found"]) for f in latest.values()]
+            update[parts["found"]] = gr.update(value=pictures, visible=True)
+        yield update
+    failed = job.state != "done"
+    if failed and not project.ready:
+        shutil.rmtree(project.folder, ignore_errors=True)
+    yield {
+        parts["cancel"]: gr.update(visible=False), parts["start"]: gr.update(interactive=True),
+        **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: ""} if failed else {}),
+    }  # fmt: skip
+
+
+def _resumed(context: Context, session: Session, name: str) -> Iterator[dict[Any, Any]]:
+    """Open a project, or follow its inversion if that still runs."""
+    hub = context.hub
+    project = hub.work.project(name, None if hub.alone else session.person)
+    running = [j for j in hub.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
+    if running:
+        yield from _following(context, session, project, running[0])
+    if project.ready:
+        yield from _opened(context, session, project)
+    elif not running:
+        raise InputError("That photo was not taken apart to the end; start again.")
+
+
+def _opened(context: Context, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
+    """Show a project: its photo at once, the edits when the preview is ready."""
+    parts = context.parts
+    yield {parts["fit"]: box("Opening …")}
+    context.hub.open(session, project.name)
+    steps = session.stack
+    if session.live is None:
+        return
+    session.stack = type(steps)()
+    first = session.stage()
+    session.stack = steps
+    known = _projects(context, session)
+    yield {
+        **context.controls(session), parts["stage"]: first, parts["last"]: project.name,
+        parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
+        parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
+        parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
+    }  # fmt: skip
+    live = session.live
+    live.wait()
+    if session.live is live:
+        ready = box("Ready: click an object, then move a slider.")
+        yield {**context.everything(session), parts["fit"]: box("Open."), parts["progress"]: ready}
+
+
+def _projects(context: Context, session: Session) -> list[tuple[str, str]]:
+    """Titles and names for the list of what can be continued."""
+    found = context.hub.work.projects(None if context.hub.alone else session.person)
+    running = {j.folder for j in context.hub.jobs.of(session.person, "invert") if not j.over}
+    return [
+        (f"{p.title} · {p.name}" + ("" if p.ready else " (in work)"), p.name)
+        for p in found
+        if p.ready or p.folder in running
+    ]

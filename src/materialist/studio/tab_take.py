@@ -1,0 +1,159 @@
+"""The tab to take things away: pictures, the scene, other programs' formats, a video, the recipe, the commands."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import gradio as gr
+
+from materialist.errors import InputError
+from materialist.studio.context import Context
+from materialist.studio.follow import box, follow
+from materialist.studio.guard import guarded
+from materialist.studio.jobs import Job
+from materialist.studio.session import EDITS, Session
+
+KINDS = {
+    "png": ("Picture, PNG (path traced)", ".png"),
+    "exr": ("Picture, EXR: linear, for further work", ".exr"),
+    "edits": ("edits.yaml with its masks (zip)", ".zip"),
+    "scene": ("The edited scene, a package (zip)", ".zip"),
+    "glb": ("glTF with its light (zip)", ".zip"),
+    "blend": ("Blender: script and files (zip)", ".zip"),
+    "usd": ("USD (usdz)", ".usdz"),
+    "mitsuba": ("Mitsuba (zip)", ".zip"),
+    "html": ("A page that opens without a server", ".html"),
+    "turn": ("A video: the light goes round", ".mp4"),
+}
+"""What can be taken -> its name, and the suffix of the file."""
+FRAMES, FRAME_SPP = 24, 32
+
+
+def layout(context: Context) -> None:
+    """The components."""
+    parts = context.parts
+    with gr.Tab("Take away", id="take") as tab:
+        parts["take_tab"] = tab
+        choices = [(title, kind) for kind, (title, _) in KINDS.items()]
+        parts["what"] = gr.Radio(choices, value="png", label="What to take", elem_id="what")
+        with gr.Row():
+            parts["make"] = gr.Button("Prepare the file", variant="primary", elem_id="make", min_width=140)
+            parts["make_stop"] = gr.Button("Stop", variant="stop", visible=False, min_width=80)
+        parts["make_progress"] = gr.HTML("", js_on_load=None, elem_id="make_progress")
+        parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
+        parts["recipe"] = gr.File(label="Load an edits.yaml", type="filepath", height=110, file_types=[".yaml", ".yml"])
+        parts["commands"] = gr.Code("", language="shell", label="The same on the command line", interactive=False)
+
+
+def wire(context: Context) -> None:
+    """The events."""
+    parts, hub = context.parts, context.hub
+    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    outputs = [parts[name] for name in ("make_progress", "download", "make_stop", "stage")]
+
+    @guarded
+    def make(what: str, request: gr.Request) -> Any:
+        session = context.session(request)
+        if what not in KINDS:
+            raise InputError("Choose one of the listed things.")
+        _ = session.scene
+        yield {parts["download"]: gr.update(visible=False)}
+        file = session.new_name("take", KINDS[what][1])
+        if what == "edits":
+            _pack_edits(session, file)
+        else:
+            job, steps = _asked(context, session, what, file), session.stack.active
+            if job is not None:
+                session.running = job
+                for html in follow(hub.jobs, job):
+                    yield {parts["make_progress"]: html, parts["make_stop"]: gr.update(visible=not job.over)}
+                if job.state != "done":
+                    return
+            if what in ("png", "exr"):
+                if job is not None:
+                    session.final = (steps, session.desk / "final")
+                shutil.copyfile((session.desk / "final").with_suffix(file.suffix), file)
+        label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
+        yield {
+            parts["download"]: gr.update(value=str(file), label=label, visible=True), parts["make_progress"]: box("Ready."),
+            parts["stage"]: session.stage(),
+        }  # fmt: skip
+
+    @guarded
+    def stop(request: gr.Request) -> None:
+        session = context.session(request)
+        if session.running is not None:
+            hub.jobs.stop(session.running)
+
+    @guarded
+    def load(file: str | None, request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        if file is not None:
+            session.read_edits(Path(file))
+        return context.everything(session)
+
+    @guarded
+    def tell(request: gr.Request) -> str:
+        session = context.session(request)
+        return commands(session) if session.live is not None else ""
+
+    parts["make"].click(make, parts["what"], outputs, **free)
+    parts["make_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
+    parts["recipe"].upload(load, parts["recipe"], context.all_parts, **free)
+    parts["take_tab"].select(tell, None, parts["commands"], **free)
+
+
+def _asked(context: Context, session: Session, what: str, file: Path) -> Job | None:
+    """The job that makes the file; None where the final picture is there already."""
+    assert session.project is not None
+    edits, jobs = session.write_edits(), context.hub.jobs
+    scene = str(session.project.scene)
+    if what in ("png", "exr"):
+        if session.final is not None and session.final[0] == session.stack.active:
+            return None
+        output = str(session.desk / "final")
+        return jobs.submit("final", session.person, session.desk, scene=scene, edits=edits, output=output)
+    more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
+    return jobs.submit(
+        "take", session.person, session.desk, scene=scene, edits=edits, output=str(file), what=what, **more
+    )
+
+
+def _pack_edits(session: Session, file: Path) -> None:
+    """edits.yaml and every file it names."""
+    if not session.write_edits():
+        raise InputError("There is no edit to take away yet: change something first.")
+    desk = session.desk
+    names = {EDITS}
+    for step in session.stack.steps:
+        names |= {v for v in step.options.values() if isinstance(v, str) and (desk / v).is_file()}
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as pack:
+        for name in sorted(names):
+            pack.write(desk / name, name)
+
+
+def commands(session: Session) -> str:
+    """What to type for the same result."""
+    project = session.project
+    assert project is not None
+    made = session.scene.provenance
+    lines = [f"cd {_quoted(project.folder)}"]
+    if project.photo is not None:
+        options = "".join(f" --{k} {made[k]}" for k in ("size", "seed") if k in made)
+        lines.append(f"materialist invert {project.photo.name} -o {project.scene.name}{options}")
+    scene = project.scene.name if project.photo is not None else _quoted(project.scene)
+    if session.stack.active:
+        lines.append(f"materialist apply {scene} {session.desk.name}/{EDITS} -o out.png")
+    else:
+        lines.append(f"materialist render {scene} -o out.png")
+    lines.append(f"materialist export {scene} --to glb -o out.glb")
+    return "\n".join(lines)
+
+
+def _quoted(path: Path) -> str:
+    import shlex
+
+    return shlex.quote(str(path))

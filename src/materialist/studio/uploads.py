@@ -1,0 +1,161 @@
+"""What strangers send: checked by size and header before anything is decoded, and stored under names of ours."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import zipfile
+from pathlib import Path
+
+from materialist.errors import InputError
+from materialist.io.decode import RAW_SUFFIXES, check_size
+
+MAX_MEGABYTES = 60
+"""Largest upload."""
+MAX_PIXELS = 60_000_000
+"""Largest picture, from its header."""
+MAX_UNPACKED = 1_500_000_000
+"""Largest scene package once unpacked, bytes."""
+PHOTOS = frozenset(
+    (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr")
+)
+_MEMBER = re.compile(
+    r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
+    r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr"
+)
+"""The files of a scene package; nothing else is unpacked."""
+
+
+def checked_picture(path: Path, name: str) -> str:
+    """The suffix to store an uploaded picture under. Raises InputError for what is no picture, or too large.
+
+    `name` is what the user called it: shown in the message, and looked at for its ending alone.
+    """
+    suffix = Path(name).suffix.lower()
+    shown = " ".join(Path(name).name.split())[:60] or "The file"
+    if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
+        raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
+    _check_bytes(path, shown)
+    size = None if suffix in RAW_SUFFIXES else header_size(path, shown)
+    if size is not None:
+        width, height = size
+        if width * height > MAX_PIXELS:
+            raise InputError(
+                f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the studio takes up to "
+                f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
+            )
+        check_size(width, height, shown)
+    return suffix
+
+
+def header_size(path: Path, shown: str) -> tuple[int, int]:
+    """(width, height) from the header, without decoding. Raises InputError where there is none."""
+    head = path.open("rb").read(4096)
+    if head.startswith(b"\x76\x2f\x31\x01"):
+        return _exr_size(path, shown)
+    if head.startswith((b"#?RADIANCE", b"#?RGBE")):
+        match = re.search(rb"[-+]Y (\d{1,9}) [-+]X (\d{1,9})", head)
+        if match is None:
+            raise InputError(f"{shown} is damaged: its header has no size; export it again.")
+        return int(match[2]), int(match[1])
+    from PIL import Image
+    from pillow_heif import register_heif_opener
+
+    register_heif_opener()
+    try:
+        with Image.open(path) as image:
+            return image.size
+    except Image.DecompressionBombError as error:
+        raise InputError(
+            f"{shown} has far too many pixels; the studio takes up to {MAX_PIXELS / 1e6:.0f} megapixels."
+        ) from error
+    except Exception as error:  # decoders raise anything
+        raise InputError(f"{shown} is not an image this program can read; export it again as PNG or JPEG.") from error
+
+
+def _exr_size(path: Path, shown: str) -> tuple[int, int]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            low, high = file.header()["dataWindow"]
+        return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+    except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
+        raise InputError(f"{shown} is not a readable EXR file (truncated or damaged).") from error
+
+
+def unpack_scene(archive: Path, target: Path, name: str) -> None:
+    """Unpack a zipped scene package into `target`: known members only, under their own fixed names.
+
+    Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
+    """
+    shown = " ".join(Path(name).name.split())[:60]
+    _check_bytes(archive, shown)
+    try:
+        with zipfile.ZipFile(archive) as pack:
+            members = _members(pack, shown)
+            target.mkdir()
+            for entry, inside in members:
+                _unpack(pack, entry, target / inside, shown)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+        shutil.rmtree(target, ignore_errors=True)
+        raise InputError(f"{shown} is not a readable zip file ({error}); zip the scene folder again.") from error
+    except InputError:
+        shutil.rmtree(target, ignore_errors=True)
+        raise
+
+
+def _members(pack: zipfile.ZipFile, shown: str) -> list[tuple[zipfile.ZipInfo, str]]:
+    """Members that belong to a package, with their place in it; the package may lie in a folder of the zip."""
+    names = [info.filename for info in pack.infolist()[:10_000]]
+    root = next((n.removesuffix("scene.json") for n in names if re.fullmatch(r"([^/]+/)?scene\.json", n)), None)
+    if root is None:
+        raise InputError(f"{shown} holds no scene package (no scene.json); zip the folder that invert wrote.")
+    found = [
+        (info, info.filename.removeprefix(root))
+        for info in pack.infolist()
+        if info.filename.startswith(root) and _MEMBER.fullmatch(info.filename.removeprefix(root))
+    ]
+    total = sum(info.file_size for info, _ in found)
+    if total > MAX_UNPACKED:
+        raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {MAX_UNPACKED / 1e9:g} GB.")
+    return found
+
+
+def _unpack(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, shown: str) -> None:
+    """One member, never more than its header promises."""
+    target.parent.mkdir(exist_ok=True)
+    left = entry.file_size
+    with pack.open(entry) as source, target.open("wb") as out:
+        while block := source.read(1 << 20):
+            left -= len(block)
+            if left < 0:
+                raise InputError(f"{shown} is not what its index says; zip the scene folder again.")
+            out.write(block)
+
+
+def checked_mesh(path: Path, name: str) -> str:
+    """The suffix to store an uploaded mesh under. Raises InputError for a kind that could name other files.
+
+    PLY, STL and binary glTF hold everything in one file; OBJ is taken without its material library.
+    """
+    suffix = Path(name).suffix.lower()
+    shown = " ".join(Path(name).name.split())[:60]
+    if suffix not in (".ply", ".obj", ".stl", ".glb"):
+        raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
+    _check_bytes(path, shown)
+    content = path.read_bytes()
+    if suffix == ".glb" and re.search(rb'"uri"\s*:\s*"(?!data:)', content):
+        raise InputError(f"{shown} refers to other files; export it with everything embedded.")
+    if suffix == ".obj" and re.search(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b", content):
+        stripped = re.sub(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b.*$", b"", content)
+        path.write_bytes(stripped)
+    return suffix
+
+
+def _check_bytes(path: Path, shown: str) -> None:
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{shown} is empty (0 bytes); copy it again.")
+    if size > MAX_MEGABYTES * 1e6:
+        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {MAX_MEGABYTES} MB.")
