@@ -15,10 +15,12 @@ from materialist.train.trainer import Habits, Trainer
 NETWORK = {"widths": [8, 8, 16, 32], "blocks": [1, 1, 1, 1], "attention": 1, "decoder_blocks": [1, 1, 1], "fine": 8}
 
 
-def trainer(data: Path, run: Path, *, steps: int, resume=False, samples=0, processes=None, notes=None, **changes):
+def trainer(
+    data: Path, run: Path, *, steps: int, resume=False, samples=0, processes=None, notes=None, workers=0, **changes
+):
     """A run of a network that is a thousand times smaller than the real one."""
     options = {"network": NETWORK, "size": 32, "batch": 2, "warm_up": 2, "bfloat16": False, **changes}
-    habits = Habits(checkpoint_seconds=1e9, score_samples=samples, workers=0, seed=3)
+    habits = Habits(checkpoint_seconds=1e9, score_samples=samples, workers=workers, seed=3)
     note = (lambda _: None) if notes is None else notes.append
     return Trainer(
         recipe("bundled", **options), BundledTask(), SampleFolder(data), run, budget=Budget(steps=steps),

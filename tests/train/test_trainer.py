@@ -8,6 +8,7 @@ import socket
 import made_runs
 import made_samples
 import numpy as np
+import psutil
 import pytest
 import torch
 
@@ -77,6 +78,20 @@ def test_a_terminated_run_leaves_a_checkpoint(data, tmp_path):
     assert trainer.run() == {}
     assert checkpoint.load(tmp_path / "run")["step"] == 3
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_path):
+    trainer = made_runs.trainer(data, tmp_path / "run", steps=10_000, workers=1)
+    step = trainer._step
+
+    def terminated(batch):
+        for process in (*psutil.Process().children(), psutil.Process()):
+            process.terminate()
+        return step(batch)
+
+    trainer._step = terminated
+    assert trainer.run() == {}
+    assert checkpoint.load(tmp_path / "run")["step"] == 1
 
 
 def test_a_run_is_not_overwritten_nor_mixed_up(run, data):

@@ -14,7 +14,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.edit.relight import relight, triple
 from materialist.errors import InputError, OutputError, SetupError
-from materialist.io.image import write_png_bytes
+from materialist.io.image import probe_beside, write_png_bytes
 from materialist.types import Array, Lamp, Scene
 
 MAX_FRAMES = 3600
@@ -64,13 +64,7 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
         raise OutputError(f"{path} exists; give {'another name' if force else '--force to replace it'}.")
     if path.suffix:
         _ffmpeg()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.with_name(f".partial-{os.getpid()}.probe")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    probe_beside(path)
 
 
 def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, force: bool = False) -> int:

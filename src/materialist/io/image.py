@@ -52,6 +52,11 @@ def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
         raise InputError(f"The output {path} must end in .png (for looking) or .exr (linear, for further work).")
     if path.exists() and not force:
         raise OutputError(f"{path} exists; give --force to replace it, or another name.")
+    probe_beside(path)
+
+
+def probe_beside(path: Path) -> None:
+    """Write and remove a file next to PATH, whose folder is made; raises OutputError where that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         probe = path.with_name(f".partial-{os.getpid()}.probe")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Protocol, runtime_checkable
 
 from materialist.errors import InputError
@@ -25,6 +25,18 @@ class Predictor(Protocol):
 
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """Maps of the photo's working size, in the conventions of `Prediction`; the same seed gives the same maps."""
+        ...
+
+
+@runtime_checkable
+class Prepared(Protocol):
+    """A predictor that is told, before it is used, which of its maps are wanted."""
+
+    gives: tuple[str, ...]
+    """The maps that it has."""
+
+    def prepare(self, wanted: Collection[str]) -> None:
+        """Find what these maps need. Raises WeightsError where it is not there."""
         ...
 
 
@@ -52,9 +64,8 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
         gives = ", ".join(source.gives)
         options = " ".join(f"--{name} {spec}" for name in source.gives)
         raise InputError(f"'{spec}' gives only {gives}: use it for these beside another predictor, with {options}.")
-    prepare = getattr(source, "prepare", None)
-    if prepare is not None:
-        prepare(getattr(source, "gives"))  # noqa: B009 - no part of the protocol of whole predictors
+    if isinstance(source, Prepared):
+        source.prepare(source.gives)
     return source
 
 

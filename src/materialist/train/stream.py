@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import signal
 from collections.abc import Iterator
 
 import cv2
@@ -87,6 +88,8 @@ def kept_aside(source: Source, most: int) -> list[Sample]:
 
 
 def _quiet_worker(_: int) -> None:
-    """One thread a worker: the training itself has the others."""
+    """One thread a worker: the training itself has the others. A SIGTERM to the whole group is the trainer's to act on:
+    workers end with it."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     torch.set_num_threads(1)
     cv2.setNumThreads(0)
