@@ -1,0 +1,84 @@
+"""The visible front of one object, smooth enough to bend light: depth and predicted normals joined."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.geometry.symmetry import border_distance, spacing
+from materialist.types import Array
+
+REACH = 0.25
+"""Depth decides over lengths above this part of the object's size, normals below. Networks give the slant of a surface
+better than its relief, which is flat and noisy; where both are exact they agree."""
+STEEPEST = 0.12
+"""Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
+RIM = 1.5
+"""Pixels from the silhouette whose depth is not believed: there a depth map mixes the object with what is behind."""
+
+
+def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smooth: float = 0.01) -> Array:
+    """Planar depth of the object's front, with the slopes of the normals.
+
+    Solves min over z of |grad log z - g|^2 + |log z - log depth|^2 / (REACH size)^2 inside the mask, where g is the
+    slope that the normal demands: n . d(z r) = 0 gives d log z = -n . dr / (n . r).
+
+    Args:
+        depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
+        rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
+        smooth: standard deviation of the blur of the normals, as a part of the object's size (root of its area).
+
+    Returns:
+        [H, W] float64, scene units; `depth` outside the mask.
+    """
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import cg
+
+    size = float(np.sqrt(inside.sum()))
+    if inside.sum() < 9:
+        return np.asarray(depth, np.float64)
+    slope_x, slope_y = _slopes(_blurred_normals(normal, inside, smooth * size), rays)
+    log_depth = np.log(np.where(inside, depth, 1).astype(np.float64))
+    index = np.cumsum(inside.ravel()).reshape(inside.shape) - 1
+    first, second, wanted, weight = _pairs(inside, index, log_depth, slope_x, slope_y)
+    count = int(inside.sum())
+    ones = np.sqrt(weight)
+    rows = np.tile(np.arange(len(first)), 2)
+    step = coo_matrix((np.concatenate([-ones, ones]), (rows, np.concatenate([first, second]))), (len(first), count))
+    step = step.tocsr()
+    data = np.where(border_distance(inside)[inside] > RIM, 1.0, 0.02) / (REACH * size) ** 2
+    system = step.T @ step + diags(data + 1e-9)
+    change, _ = cg(system, step.T @ (ones * wanted), rtol=1e-4, maxiter=500, M=diags(1 / system.diagonal()))
+    out = np.asarray(depth, np.float64).copy()
+    out[inside] = np.exp(log_depth[inside] + np.clip(change, -0.5, 0.5))
+    return out
+
+
+def _slopes(normal: Array, rays: Array) -> tuple[Array, Array]:
+    """[H, W] change of log depth from one pixel to the next, to the right and downwards."""
+    length = np.linalg.norm(rays, axis=-1)
+    facing = np.minimum((normal * rays).sum(-1), -STEEPEST * length)  # n . r < 0 where the surface is seen
+    per_pixel = spacing(rays)
+    return -normal[..., 0] * per_pixel / facing, normal[..., 1] * per_pixel / facing
+
+
+def _pairs(inside: Array, index: Array, log_depth: Array, slope_x: Array, slope_y: Array):
+    """Linked neighbours [P]: their unknowns, the step wanted on top of the depth's own, and its weight."""
+    parts = []
+    for axis, slope in ((1, slope_x), (0, slope_y)):
+        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
+        both = inside[near] & inside[far]
+        own = (log_depth[far] - log_depth[near])[both]
+        asked = ((slope[near] + slope[far]) / 2)[both]
+        # Where the depth jumps, one part of the object hides another, and no slope joins them.
+        jump = np.abs(own) > np.maximum(6 * np.abs(asked), 0.05)
+        parts.append((index[near][both], index[far][both], asked - own, np.where(jump, 1e-3, 1.0)))
+    return tuple(np.concatenate(column) for column in zip(*parts))
+
+
+def _blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
+    """[H, W, 3] unit, the mean of those inside nearby."""
+    from scipy.ndimage import gaussian_filter
+
+    weighted = np.where(inside[..., None], normal, 0).astype(np.float64)
+    mixed = gaussian_filter(weighted, (sigma, sigma, 0)) if sigma > 0.1 else weighted
+    return mixed / np.maximum(np.linalg.norm(mixed, axis=-1, keepdims=True), 1e-9)

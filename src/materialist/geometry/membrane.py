@@ -1,0 +1,65 @@
+"""Values carried smoothly into places where they are not known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.types import Array
+
+SWEEPS = 24
+"""Relaxations at each size; the coarser sizes have done the rest."""
+
+
+def membrane(values: Array, known: Array) -> Array:
+    """Fill the unknown places of a map with a nearly harmonic surface: a membrane spanned by what is known around.
+
+    Args:
+        values: [H, W] or [H, W, C]; what is not known is not read.
+        known: [H, W] bool.
+
+    Returns:
+        float32 like `values`; known places as they were; the mean of nothing is 0.
+    """
+    known = np.asarray(known, bool)
+    flat = np.where(known[..., None], np.asarray(values, np.float32).reshape(*known.shape, -1), 0)
+    return _filled(flat, known).reshape(np.shape(values))
+
+
+def _filled(values: Array, known: Array) -> Array:
+    """[H, W, C] coarse to fine: half the size first, then relaxation."""
+    height, width = known.shape
+    if known.all() or not known.any():
+        return values
+    if min(height, width) < 2 or height * width <= 16:
+        return np.where(known[..., None], values, values[known].mean(0))
+    padded = np.pad(known, ((0, height % 2), (0, width % 2)))
+    weight = padded.astype(np.float32)[..., None]
+    total = _halved(np.pad(values, ((0, height % 2), (0, width % 2), (0, 0))) * weight)
+    count = _halved(weight)
+    coarse = _filled(total / np.maximum(count, 1e-9), count[..., 0] > 0)
+    fine = _doubled(coarse)[:height, :width]
+    return _relaxed(np.where(known[..., None], values, fine), known)
+
+
+def _halved(values: Array) -> Array:
+    """[H, W, C] -> [H/2, W/2, C], sums of four."""
+    rows = values[::2] + values[1::2]
+    return rows[:, ::2] + rows[:, 1::2]
+
+
+def _doubled(values: Array) -> Array:
+    return values.repeat(2, 0).repeat(2, 1)
+
+
+def _relaxed(values: Array, known: Array) -> Array:
+    """Each unknown place becomes the mean of its four neighbours, over and over; only around the unknown ones."""
+    rows, columns = np.flatnonzero((~known).any(1)), np.flatnonzero((~known).any(0))
+    window = np.s_[max(rows[0] - 1, 0) : rows[-1] + 2, max(columns[0] - 1, 0) : columns[-1] + 2]
+    part, free = values[window].copy(), ~known[window]
+    for _ in range(SWEEPS):
+        framed = np.pad(part, ((1, 1), (1, 1), (0, 0)), mode="edge")
+        mean = (framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]) / 4
+        part[free] = mean[free]
+    out = values.copy()
+    out[window] = part
+    return out

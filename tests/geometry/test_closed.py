@@ -1,0 +1,138 @@
+"""Closed objects: volumes in closed form, and a surface without a gap whatever the mask."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError
+from materialist.geometry.closed import closed_proxy
+from materialist.geometry.contour import open_edges, region, silhouette_field
+from materialist.types import Camera
+
+CAMERA = Camera(96, 80, 40.0)
+
+
+def ball(radius=0.6, centre=(0.1, 0.0, -3.0), camera=CAMERA):
+    """Depth, normal, mask and thickness of a ball before a wall at depth 5."""
+    rays = pixel_rays(camera).astype(float)
+    centre = np.asarray(centre)
+    a, b = (rays**2).sum(-1), rays @ centre
+    root = b * b - a * (centre @ centre - radius**2)
+    mask = root > 0
+    near = (b - np.sqrt(np.maximum(root, 0))) / a
+    depth = np.where(mask, near, 5.0)
+    normal = np.where(mask[..., None], (rays * near[..., None] - centre) / radius, [0, 0, 1])
+    thick = np.where(mask, 2 * np.sqrt(np.maximum(root, 0)) / a * np.linalg.norm(rays, axis=-1), 0)
+    return depth, normal, mask, thick
+
+
+def plate(mask, camera=None):
+    """Something 0.3 thick, facing the camera at depth 2, behind any mask."""
+    camera = camera or Camera(mask.shape[1], mask.shape[0], 40.0)
+    normal = np.tile([0.0, 0, 1], (*mask.shape, 1))
+    return np.full(mask.shape, 2.0), normal, mask, np.where(mask, 0.3, 0), camera
+
+
+def volume(shell):
+    a, b, c = np.moveaxis(shell.vertices[shell.faces].astype(float), 1, 0)
+    return float((a * np.cross(b, c)).sum() / 6)
+
+
+def euler(shell):
+    edges = np.sort(np.concatenate([shell.faces[:, [0, 1]], shell.faces[:, [1, 2]], shell.faces[:, [2, 0]]]), 1)
+    return len(np.unique(shell.faces)) - len(np.unique(edges, axis=0)) + len(shell.faces)
+
+
+def assert_watertight(shell):
+    """Every edge is run through once in each direction."""
+    faces = shell.faces.astype(np.int64)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    code = edges[:, 0] * len(shell.vertices) + edges[:, 1]
+    assert len(np.unique(code)) == len(code), "an edge is run through twice in one direction"
+    assert not len(open_edges(faces, len(shell.vertices)))
+    assert np.isfinite(shell.vertices).all() and len(np.unique(faces)) == len(shell.vertices)
+
+
+def test_a_ball_has_the_volume_and_the_normals_of_a_ball():
+    shell = closed_proxy(*ball(), CAMERA)
+    assert_watertight(shell)
+    assert euler(shell) == 2
+    assert volume(shell) == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
+    out = (shell.vertices - [0.1, 0, -3]) / 0.6
+    assert np.abs(np.linalg.norm(out, axis=-1) - 1).mean() < 0.02
+    cosine = (shell.normals * out).sum(-1)
+    assert np.mean(cosine) > 0.985 and np.quantile(cosine, 0.02) > 0.85
+
+
+def test_hollow_is_a_wall_around_a_cavity():
+    solid, hollow = (closed_proxy(*ball(), CAMERA, wall=wall) for wall in (None, 0.1))
+    assert_watertight(hollow)
+    assert euler(hollow) == 4
+    cavity = volume(solid) - volume(hollow)
+    assert cavity == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.12)
+    inner = np.s_[len(solid.vertices) :]
+    outwards = ((hollow.vertices[inner] - [0.1, 0, -3]) * hollow.normals[inner]).sum(-1)
+    assert outwards.mean() < -0.4, "the cavity's normals look into it"
+
+
+def test_noise_of_the_depth_does_not_reach_the_normals():
+    depth, normal, mask, thick = ball()
+    noisy = depth * (1 + np.random.default_rng(0).normal(0, 0.01, depth.shape))
+    clean, rough = (closed_proxy(d, normal, mask, thick, CAMERA) for d in (depth, noisy))
+    assert np.quantile((clean.normals * rough.normals).sum(-1), 0.05) > 0.985
+
+
+def masks():
+    rows, columns = np.mgrid[:48, :64]
+    ring = np.hypot(rows - 24, columns - 30)
+    yield "disc", ring < 15, 2
+    yield "ring", (ring < 18) & (ring > 7), 0
+    yield "two parts", (ring < 9) | ((rows > 40) & (columns > 50)), 4
+    yield "cut by the frame", (rows > 20) & (columns < 20), 2
+    yield "everything", np.ones((48, 64), bool), 2
+    yield "touching corners", (rows // 8 + columns // 8) % 2 == 0, None
+    yield "noise", np.random.default_rng(3).random((48, 64)) < 0.6, None
+    yield "a diagonal line", np.abs(rows - columns) < 3, 2
+
+
+@pytest.mark.parametrize(("name", "mask", "expected"), list(masks()), ids=[name for name, _, _ in masks()])
+def test_any_mask_gives_a_watertight_surface(name, mask, expected):
+    shell = closed_proxy(*plate(mask))
+    assert_watertight(shell)
+    assert volume(shell) > 0
+    if expected is not None:
+        assert euler(shell) == expected
+    assert ((shell.uv >= 0) & (shell.uv <= 1)).all()
+
+
+def test_an_object_cut_by_the_frame_ends_beyond_it():
+    depth, normal, mask, thick, camera = plate(np.mgrid[:48, :64][1] < 30)
+    shell = closed_proxy(depth, normal, mask, thick, camera)
+    column = shell.vertices[:, 0] / -shell.vertices[:, 2] * camera.focal + camera.width / 2
+    assert column.min() < -2
+
+
+def test_the_back_stays_before_what_stands_behind():
+    depth, normal, mask, thick = ball()
+    shell = closed_proxy(depth, normal, mask, thick, CAMERA, behind=np.full(depth.shape, 3.1))
+    assert -shell.vertices[:, 2].min() < 3.105
+    assert_watertight(shell)
+
+
+def test_the_silhouette_is_smoother_than_its_pixels():
+    rows, columns = np.mgrid[:64, :64]
+    found = region(silhouette_field(np.hypot(rows - 31.3, columns - 31.7) < 20))
+    radius = np.hypot(*(found.points[np.unique(found.border)] - [31.7, 31.3]).T)
+    assert radius.std() < 0.15 and radius.mean() == pytest.approx(20, abs=0.2)
+
+
+def test_bad_input_is_named():
+    depth, normal, mask, thick = ball()
+    with pytest.raises(InputError, match="thickness goes from"):
+        closed_proxy(depth, normal, mask, -thick, CAMERA)
+    with pytest.raises(InputError, match="covers no surface"):
+        closed_proxy(depth, normal, np.zeros_like(mask), thick, CAMERA)
+    with pytest.raises(InputError, match="too thin"):
+        closed_proxy(depth, normal, (np.indices((80, 96)) == 40).all(0), thick + 0.1, CAMERA)
+    with pytest.raises(InputError, match="normals are"):
+        closed_proxy(depth, normal[:5], mask, thick, CAMERA)
