@@ -59,7 +59,7 @@ def _again(name: str) -> bool:
 def photos(folder: Path, *names: str) -> Path:
     """Small photos, each its own."""
     for k, name in enumerate(names):
-        file = folder / (name if "." in name else f"{name}.png")
+        file = folder / (name if Path(name).suffix.lower() in (".png", ".jpg") else f"{name}.png")
         file.parent.mkdir(parents=True, exist_ok=True)
         pixels = np.random.default_rng(k).integers(0, 256, (16, 24, 3)).astype(np.uint8)
         Image.fromarray(pixels).save(file)

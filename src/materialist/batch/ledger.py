@@ -40,6 +40,7 @@ class Ledger:
         """Write one event. Raises OutputError when the disk is full or read-only."""
         entry = {"event": event, "key": self.key, **facts}
         line = ("\n" if self._cut else "") + json.dumps(entry, ensure_ascii=True) + "\n"
+        self._note(entry)  # first, so that a Ctrl-C during the write finds the summary no older than the file
         try:
             written = os.write(self._file, line.encode())
             self._cut = written < len(line)
@@ -48,7 +49,6 @@ class Ledger:
             os.fsync(self._file)
         except OSError as error:
             raise OutputError(f"{LEDGER} cannot be written: {error.strerror or error}.") from error
-        self._note(entry)
         return entry
 
     def close(self) -> None:

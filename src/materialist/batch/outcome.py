@@ -9,7 +9,7 @@ from typing import Any
 from materialist.batch.packages import together
 
 COLUMNS = (
-    "id", "name", "status", "reason", "psnr", "ssim", "seconds", "invert_seconds", "edit_seconds", "peak_rss_mb",
+    "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds", "peak_rss_mb",
     "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture_hash", "photo_hash",
     "warnings",
 )  # fmt: skip

@@ -127,6 +127,7 @@ class _Run:
         self._stages: dict[str, str] = {}
         self._tries: dict[str, int] = {}
         self._over: dict[str, str] = dict.fromkeys(finished, DONE)
+        self._before = {job.id: ledger.last.get(job.id) for job in jobs}
         self._worked = time.monotonic()
         self._written, self._writing = self._worked, 0.0
 
@@ -199,7 +200,9 @@ class _Run:
     def _row(self, photo: Listed) -> Row:
         entry = self._ledger.last.get(photo.id, {})
         name = self._names.get(photo.id) or entry.get("name", "")
-        return Row({**entry, "id": photo.id, "name": name, "status": self._over.get(photo.id, "open")})
+        stale = entry.get("event") not in (DONE, FAILED) or self._before.get(photo.id) is entry
+        status = "open" if stale else entry["event"]
+        return Row({**entry, "id": photo.id, "name": name, "status": status})
 
 
 _OF_THE_SCENE = ("invert_seconds", "photo_version", "scene_bytes", "photo_hash")

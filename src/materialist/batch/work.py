@@ -39,7 +39,7 @@ THUMBNAIL = (240, 150)
 
 def process(job: Job, tick: Tick) -> dict[str, Any]:
     """Do a job. Returns what the ledger and the summary say of it; raises what the inversion or the edit raises."""
-    start = time.perf_counter()
+    start, processor = time.perf_counter(), time.process_time()
     scene, facts = _scene(job, tick)
     strip = [scene.photo.linear, scene.rerender]
     warnings = [*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings]
@@ -66,6 +66,7 @@ def process(job: Job, tick: Tick) -> dict[str, Any]:
     del scene, strip
     gc.collect()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    facts["cpu_seconds"] = time.process_time() - processor
     return facts | {"seconds": time.perf_counter() - start, "peak_rss_mb": peak, "process": os.getpid()}
 
 
