@@ -42,6 +42,7 @@ KNOWN = (
     HubModel("marigold-normals", "prs-eth/marigold-normals-v1-1", "model_index.json", "normals", "OpenRAIL++", 2600),
     HubModel("marigold-depth", "prs-eth/marigold-depth-v1-1", "model_index.json", "depth", "OpenRAIL++", 2600),
     HubModel("depth-anything", "depth-anything/Depth-Anything-V2-Small-hf", "config.json", "depth", "Apache-2.0", 100),
+    HubModel("sam2", "facebook/sam2.1-hiera-tiny", "config.json", "selections: --with sam2", "Apache-2.0", 160),
 )  # fmt: skip
 """By name; any other repository of the same kind can be named by its id, owner/name."""
 
