@@ -159,7 +159,7 @@ def _ring(rng: np.random.Generator) -> tuple[Solid, bool]:
     return solids.moved(_tube(line, rng.uniform(0.25, 0.75) * radius, 24), tip=rng.uniform(0, 1.6)), False
 
 
-def _twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
+def twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
     """Twisted, bent and tapered prisms."""
     solid = shapes.superquadric([0.5, 1, rng.uniform(0.2, 0.5)], rng.uniform(0.1, 0.6), rng.uniform(0.2, 1), 40)
     twist, bend, taper = rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
@@ -203,7 +203,7 @@ def _stick(rng: np.random.Generator) -> tuple[Solid, bool]:
 
 _KINDS: dict[str, Callable[[np.random.Generator], tuple[Solid, bool]]] = {
     "body": _body, "vase": _vase, "superquadric": _superquadric, "figure": _figure, "cup": _cup, "blob": _blob,
-    "bottle": _bottle, "twisted": _twisted, "box": _box, "mug": _mug, "goblet": _goblet, "figure 2": _figure,
+    "bottle": _bottle, "twisted": twisted, "box": _box, "mug": _mug, "goblet": _goblet, "figure 2": _figure,
     "body 2": _body, "ring": _ring, "stick": _stick, "blob 2": _blob,
 }  # fmt: skip
 _ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2")

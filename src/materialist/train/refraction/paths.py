@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.bench.shapes import Solid
+from materialist.render.buffers import floats, integers
 from materialist.types import Array
 
 MOST = 24
@@ -43,8 +44,8 @@ class Tracer:
         self._mi = mi = setup()
         mesh = mi.Mesh("shape", len(solid.vertices), len(solid.faces))
         params = mi.traverse(mesh)
-        params["vertex_positions"] = solid.vertices.ravel().astype(np.float32)
-        params["faces"] = solid.faces.ravel().astype(np.uint32)
+        params["vertex_positions"] = floats(mi, solid.vertices)
+        params["faces"] = integers(mi, solid.faces)
         params.update()
         self._scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "shape": mesh})
         self._faces, self._normals = solid.faces, solid.normals
@@ -84,7 +85,8 @@ class Tracer:
     def _nearest(self, origin: Array, direction: Array) -> tuple[Array, Array, Array]:
         """Distance [n] (inf for none), face [n] and place in it [n, 2] of the nearest surface of every ray."""
         mi = self._mi
-        ray = mi.Ray3f(mi.Point3f(origin.T.astype(np.float32)), mi.Vector3f(direction.T.astype(np.float32)))
+        start, way = (mi.Vector3f(*(floats(mi, c) for c in x.T)) for x in (origin, direction))
+        ray = mi.Ray3f(mi.Point3f(start), way)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False)
         t = np.array(found.t, np.float64)
         return t, np.array(found.prim_index), np.array(found.prim_uv, np.float64).T

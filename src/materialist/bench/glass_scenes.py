@@ -1,0 +1,263 @@
+"""Objects in front of a textured floor and wall, as a photo shows them opaque and as they truly look as glass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.bench import lights, patterns, scenes, shapes
+from materialist.bench.shapes import Solid
+from materialist.camera import pixel_rays
+from materialist.color import luminance
+from materialist.errors import InputError
+from materialist.types import Array, Camera
+
+GROUPS = ("symmetric", "asymmetric")
+"""Whether an object's back is its front mirrored, as the paper sorts its objects."""
+VESSELS = ("bowl", "coffeemug", "teapot_newell", "wineglass")
+"""Meshes of the data folder that are walls around air; the protocol is about solid objects."""
+DEPTH = {"diffuse": 6, "glass": 40}
+"""Path lengths of the reference pictures."""
+ENVMAP_ROWS = 64
+"""Light is brought to so many rows: suns of a few texels make caustics that no affordable picture shows cleanly."""
+BRIGHTEST = 60.0
+"""Largest radiance of the light, as a multiple of its mean."""
+EXPOSED = 0.8
+"""Luminance of the brightest fiftieth of the background."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object of the benchmark, standing on y = 0, its longest side about 0.7."""
+
+    name: str
+    group: str
+    solid: Solid
+
+
+@dataclass(frozen=True)
+class Front:
+    """What is seen of a mesh from a camera."""
+
+    depth: Array
+    """[H, W] planar, 0 where there is nothing."""
+    normal: Array
+    """[H, W, 3] unit, camera frame, towards the viewer."""
+    thickness: Array
+    """[H, W] from the first to the last surface along the ray."""
+
+
+def things(data: Path | None, count: int, seed: int = 0) -> list[Thing]:
+    """The first `count` symmetric and `count` asymmetric objects: procedural, or watertight meshes of DATA/meshes."""
+    if data is None:
+        return [thing for k in range(count) for thing in (_turned(k, seed), _free(k, seed))]
+    found = []
+    for group in GROUPS:
+        files = sorted((data / "meshes" / group).glob("*.ply"))
+        files = [f for f in files if f.stem not in VESSELS]
+        order = np.random.default_rng([seed, 6]).permutation(len(files))
+        loaded = (Thing(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7)) for k in order)
+        closed = [thing for _, thing in zip(range(count), (t for t in loaded if is_closed(t.solid)), strict=False)]
+        if not closed:
+            raise InputError(f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none.")
+        found.append(closed)
+    return [thing for pair in zip(*found, strict=False) for thing in pair] + [
+        thing for rest in found for thing in rest[min(map(len, found)) :]
+    ]
+
+
+def is_closed(solid: Solid) -> bool:
+    """Whether every edge of the mesh has two faces that run through it in opposite directions."""
+    _, place = np.unique(np.round(solid.vertices, 7), axis=0, return_inverse=True)
+    faces = place.reshape(-1)[solid.faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    there = np.unique(edges @ np.array([1, place.max() + 1]), return_counts=True)
+    back = np.unique(edges @ np.array([place.max() + 1, 1]), return_counts=True)
+    return bool(np.array_equal(there[0], back[0]) and np.array_equal(there[1], back[1]))
+
+
+def _turned(index: int, seed: int) -> Thing:
+    """A solid of revolution or a superellipsoid: its own mirror image."""
+    rng = np.random.default_rng([seed, 7, index])
+    kind = index % 4
+    if kind == 0:
+        return Thing(f"ellipsoid {index}", "symmetric", shapes.superquadric(rng.uniform(0.45, 0.7, 3), 1, 1))
+    if kind == 1:
+        y = np.linspace(0, 1, 60)
+        radius = 0.17 + 0.07 * np.sin(rng.uniform(4, 8) * y + rng.uniform(0, 6)) + 0.05 * rng.uniform(-1, 1) * y
+        radius = radius * np.sqrt(np.clip(y / 0.12, 0, 1) * np.clip((1 - y) / 0.12, 0, 1)) + 1e-4
+        return Thing(f"baluster {index}", "symmetric", shapes.lathe(np.stack([radius, 0.7 * y], -1)))
+    if kind == 2:
+        return Thing(f"capsule {index}", "symmetric", shapes.capsule(rng.uniform(0.13, 0.2), rng.uniform(0.2, 0.35)))
+    extent = rng.uniform(0.4, 0.65, 3)
+    return Thing(
+        f"cushion {index}", "symmetric", shapes.superquadric(extent, rng.uniform(0.4, 0.8), rng.uniform(0.5, 1))
+    )
+
+
+def _free(index: int, seed: int) -> Thing:
+    """A lumpy or twisted body."""
+    from materialist.train.data import solids
+    from materialist.train.refraction.glassware import centred, twisted
+
+    rng = np.random.default_rng([seed, 8, index])
+    if index % 2:
+        body = centred(twisted(rng))
+        name = f"twisted {index}"
+    else:
+        body = centred(solids.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
+        name = f"blob {index}"
+    return Thing(name, "asymmetric", solids.grounded(shapes.placed(body, scale=0.65)))
+
+
+class GlassScene:
+    """One object in its room, seen by a camera: maps that a photo would give, and pictures under any light."""
+
+    def __init__(self, thing: Thing, size: int, seed: int = 0):
+        from materialist.render.variant import setup
+
+        self._mi = setup()
+        rng = np.random.default_rng([seed, 9, *thing.name.encode()])
+        self.thing = thing
+        view = _view(thing.solid, rng)
+        self.to_scene = view.to_scene
+        self.camera = Camera(size, size, view.fov)
+        turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
+        item = scenes.Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0)
+        self.item = scenes.in_camera(item, view)
+        self.room = [scenes.in_camera(i, view) for i in _room(rng)]
+
+    @cached_property
+    def front(self) -> Front:
+        """The object alone."""
+        return seen(self.item.solid, self.camera)
+
+    @cached_property
+    def behind(self) -> Front:
+        """The room alone."""
+        from materialist.train.data.solids import joined
+
+        return seen(joined([i.solid for i in self.room]), self.camera)
+
+    @cached_property
+    def mask(self) -> Array:
+        """[H, W] bool: where the object is."""
+        return self.front.depth > 0
+
+    def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
+        """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it)."""
+        mi = self._mi
+        description: dict[str, Any] = {"type": "scene", **_light(mi, envmap)}
+        description |= {f"room{k}": _mesh(mi, i.solid, _paint(mi, i.albedo)) for k, i in enumerate(self.room)}
+        if what == "diffuse":
+            description["object"] = _mesh(mi, self.item.solid, _paint(mi, self.item.albedo))
+        elif what == "glass":
+            description["object"] = _mesh(mi, self.item.solid, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
+        depth = DEPTH["glass" if what == "glass" else "diffuse"]
+        return path_traced(mi, description, self.camera, depth=depth, spp=spp, seed=seed)
+
+
+def seen(solid: Solid, camera: Camera) -> Front:
+    """What the camera sees of a mesh in its frame."""
+    from materialist.train.refraction.paths import Tracer
+
+    rays = pixel_rays(camera)
+    shape = rays.shape[:2]
+    # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
+    direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
+    found = Tracer(solid).trace(np.zeros_like(direction), direction)
+    hit = np.isfinite(found.first)
+    normal = found.normal / np.maximum(np.linalg.norm(found.normal, axis=-1, keepdims=True), 1e-12)
+    normal = np.where(np.sum(normal * direction, -1, keepdims=True) > 0, -normal, normal)
+    normal = np.where(hit[:, None], normal, [0, 0, 1])
+    thickness = found.solid * np.linalg.norm(direction, axis=-1)
+    depth = np.where(hit, found.first, 0)
+    return Front(
+        depth.reshape(shape).astype(np.float32), normal.reshape(*shape, 3).astype(np.float32),
+        thickness.reshape(shape).astype(np.float32),
+    )  # fmt: skip
+
+
+def environment(index: int, to_scene: Array, *, data: Path | None, seed: int = 0) -> Array:
+    """[ENVMAP_ROWS, 2 ENVMAP_ROWS, 3] light of that number in the camera frame, its peaks clipped."""
+    import cv2
+
+    full = lights.envmap(lights.environment(index, seed=seed, data=data), to_scene)
+    small = cv2.resize(full, (2 * ENVMAP_ROWS, ENVMAP_ROWS), interpolation=cv2.INTER_AREA)
+    return np.minimum(small, BRIGHTEST * luminance(small).mean()).astype(np.float32)
+
+
+def exposure(background: Array) -> float:
+    """The factor that exposes a picture of the room as a camera would."""
+    return EXPOSED / max(float(np.percentile(luminance(background), 98)), 1e-6)
+
+
+def path_traced(mi, description: dict[str, Any], camera: Camera, *, depth: int, spp: int, seed: int) -> Array:
+    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor."""
+    from materialist.bench.synthetic import _sensor
+
+    scene = mi.load_dict({**description, "sensor": _sensor(camera)})
+    integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 64})
+    side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
+    picture = np.array(mi.render(scene, integrator=integrator, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
+    return np.nan_to_num(picture).astype(np.float32)
+
+
+def _room(rng: np.random.Generator) -> list[scenes.Item]:
+    """A floor and a wall 0.6 to 1 behind the object, both patterned."""
+    x, y, z = np.eye(3)
+    back = rng.uniform(0.6, 1.0)
+    floor = shapes.panel(np.array([-3.0, 0, 3]), 6 * x, -(3 + back) * z, (9, 6))
+    wall = shapes.panel(np.array([-3.0, 0, -back]), 6 * x, 3 * y, (7, 3.5))
+    kinds = ("checker", "noise", "stripes", "wood", "spots")
+    chosen = rng.choice(kinds, 2)
+    return [scenes.Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0) for p, k in zip((floor, wall), chosen, strict=True)]
+
+
+def _view(solid: Solid, rng: np.random.Generator) -> scenes.View:
+    """A camera that looks down 8 to 25 degrees at the object, which takes about half of the picture."""
+    fov, tilt, azimuth = rng.uniform(30, 45), np.radians(rng.uniform(8, 25)), rng.uniform(-0.25, 0.25)
+    height = float(solid.vertices[:, 1].max())
+    reach = max(height, float(np.abs(solid.vertices[:, [0, 2]]).max()) * 1.6)
+    distance = reach / np.tan(np.radians(fov) / 2)
+    back = np.array([np.cos(tilt) * np.sin(azimuth), np.sin(tilt), np.cos(tilt) * np.cos(azimuth)])
+    right = np.cross([0, 1, 0], back)
+    right /= np.linalg.norm(right)
+    return scenes.View(
+        np.array([0, height / 2, 0]) + distance * back, np.stack([right, np.cross(back, right), back], -1), float(fov)
+    )
+
+
+def _light(mi, envmap: Array) -> dict[str, Any]:
+    from materialist.render.envmap import half_turn, on_mitsuba_grid
+
+    data = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+    return {"light": {"type": "envmap", "bitmap": mi.Bitmap(data[:, :-1]), "to_world": half_turn(mi)}}
+
+
+def _paint(mi, albedo: Array) -> dict[str, Any]:
+    bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
+    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
+
+
+def _mesh(mi, solid: Any, bsdf: dict[str, Any], emitter: dict[str, Any] | None = None) -> Any:
+    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
+    from materialist.render.buffers import floats, integers
+
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict(bsdf)
+    if emitter is not None:
+        props["emitter"] = mi.load_dict(emitter)
+    mesh = mi.Mesh(
+        "mesh", len(solid.vertices), len(solid.faces), props=props, has_vertex_normals=True, has_vertex_texcoords=True
+    )
+    params = mi.traverse(mesh)
+    params["vertex_positions"], params["vertex_normals"] = floats(mi, solid.vertices), floats(mi, solid.normals)
+    params["vertex_texcoords"], params["faces"] = floats(mi, solid.uv), integers(mi, solid.faces)
+    params.update()
+    return mesh
