@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from materialist.edit.portrait import Portrait
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -30,6 +31,8 @@ class Layers:
     """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
     relit: bool = False
     """Whether the light is another one."""
+    portrait: Portrait | None = None
+    """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
 
 
 def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None) -> Layers:
@@ -41,11 +44,14 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
     scene = studio.scene
     base, other = studio.twins(edited)
     changed = changed_pixels(scene, edited)
-    if scene.bodies != edited.bodies:
-        changed |= studio.covered(edited)
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal)
+    alone = None
+    if scene.bodies != edited.bodies:
+        alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
+        covered = studio.covered(edited)
+        changed |= covered if alone is None else covered & (alone.inside == 0)
     layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
-    return replace(layers, relit=is_relit(scene, edited))
+    return replace(layers, relit=is_relit(scene, edited), portrait=alone)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:

@@ -53,14 +53,34 @@ class Studio:
 
     def covered(self, edited: Scene) -> Array:
         """[H, W] bool: pixels in which a body is seen, at least in part, that the other of the two scenes lacks."""
-        from materialist.render.seen import bodies_seen
-
         seen = np.zeros(self.scene.depth.shape, bool)
         for scene, other in ((self.scene, edited), (edited, self.scene)):
             own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
             if own:
-                seen |= bodies_seen(self._target(scene).mi_scene, scene.camera, own) > 0
+                seen |= self._seen(scene, own) > 0
         return seen
+
+    def portrait(self, edited: Scene, *, spp: int, seed: int, clean: bool):
+        """The bodies that are new in `edited` at native size (`portrait.Portrait`), None where there are none to see.
+
+        Bodies that take the place of a surface of the photo are left to the photo's own outlines.
+        """
+        from materialist.edit.portrait import free_bodies, portrait
+        from materialist.render.scene import MAX_DEPTH
+
+        names = free_bodies(self.scene, edited, lambda names: self._seen(edited, names))
+        if not names:
+            return None
+        depth = _path_depth(edited) or MAX_DEPTH
+        return portrait(
+            self._target(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
+        )  # fmt: skip
+
+    def _seen(self, scene: Scene, names: list[str]) -> Array:
+        """[H, W] share of each pixel in which the named bodies are seen."""
+        from materialist.render.seen import bodies_seen
+
+        return bodies_seen(self._target(scene).mi_scene, scene.camera, names)
 
     def _target(self, scene: Scene):
         for other, target in self._built:

@@ -1,0 +1,171 @@
+"""New bodies at the photo's native resolution: their own radiance and a soft matte, for the composite."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from materialist.types import Array, Scene
+
+MOST = 1_500_000
+"""Pixels of a portrait that are traced; a larger one is traced smaller and enlarged."""
+FEWEST_PATHS = 24
+"""Paths a native pixel, whatever the working size gives: the denoiser needs as many."""
+MARGIN = 4
+"""Native pixels around the bodies that the denoiser sees."""
+CONTACT = 0.05
+"""What hides a body from nearer than this share of its extent is the ground it stands on, not a thing before it."""
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """The new bodies of an edit, as the photo would show them."""
+
+    inside: Array
+    """[H, W] float32 in [0, 1]: share of each pixel of working size that they cover."""
+    share: Array
+    """[H0, W0] float32: the same of each native pixel."""
+    picture: Array
+    """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
+
+
+def free_bodies(scene: Scene, edited: Scene, seen) -> list[str]:
+    """Names of the shapes of bodies that `edited` has and `scene` has not, and that stand before the photo's surface.
+
+    A body that takes the place of a surface (its depth was changed) belongs to the photo's own silhouette instead.
+    `seen(names)` gives the [H, W] share of pixels that bodies of the edited scene cover.
+    """
+    taken = scene.depth != edited.depth
+    names = [f"body{k}" for k, body in enumerate(edited.bodies) if body not in scene.bodies]
+    if not taken.any():
+        return names
+    free = []
+    for name in names:
+        share = seen([name])
+        if not share[taken].sum() > 0.5 * share.sum():
+            free.append(name)
+    return free
+
+
+def portrait(
+    target: Any, scene: Scene, edited: Scene, names: list[str], *, spp: int, seed: int, max_depth: int, clean: bool,
+) -> Portrait | None:  # fmt: skip
+    """Trace the named bodies of a `RenderScene` at native size; None where the camera sees none of them."""
+    from materialist.render import portrait as trace
+
+    camera, native = scene.camera, scene.photo.original.shape[:2]
+    working = (camera.height, camera.width)
+    bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+    chosen = {name: bodies[name] for name in names}
+    small = trace.look(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1]))
+    if not small.share.any():
+        return None
+    box = _box(small.share, native)
+    sight = trace.look(target.mi_scene, camera, chosen, native, box)
+    alone = trace.look(trace.only(target.mi_scene, names), camera, chosen, native, box)
+    factor = min(1.0, np.sqrt(MOST / ((box[1] - box[0]) * (box[3] - box[2]))))
+    size = (max(2, round(native[0] * factor)), max(2, round(native[1] * factor)))
+    part = _scaled(box, native, size)
+    paths = max(FEWEST_PATHS, round(spp * min(1.0, working[0] * working[1] / (size[0] * size[1]))))
+    picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth)
+    guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
+    if clean:
+        picture = _denoised(picture, guide)
+    picture = _purified(picture, guide.share)
+    picture = _enlarged(picture, sight.share.shape)
+    share = np.zeros(native, np.float32)
+    whole = np.zeros((*native, 3), np.float32)
+    rows, columns = slice(*box[:2]), slice(*box[2:])
+    share[rows, columns] = _behind_things(sight, alone, scene, box)
+    whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
+    return Portrait(small.share, share, whole)
+
+
+def _box(share: Array, native: tuple[int, int]) -> tuple[int, int, int, int]:
+    """The native rows and columns around what is covered at working size."""
+    edges = []
+    for axis in (0, 1):
+        places = np.flatnonzero(share.any(1 - axis))
+        scale = native[axis] / share.shape[axis]
+        edges += [
+            max(0, int(np.floor((places[0] - 1) * scale)) - MARGIN),
+            min(native[axis], int(np.ceil((places[-1] + 2) * scale)) + MARGIN),
+        ]
+    return edges[0], edges[1], edges[2], edges[3]
+
+
+def _scaled(box: tuple[int, int, int, int], native: tuple[int, int], size: tuple[int, int]):
+    """The box in a picture of another size."""
+    y, x = size[0] / native[0], size[1] / native[1]
+    top, left = int(box[0] * y), int(box[2] * x)
+    bottom, right = max(top + 1, round(box[1] * y)), max(left + 1, round(box[3] * x))
+    return top, min(bottom, size[0]), left, min(right, size[1])
+
+
+def _denoised(picture: Array, guide: Any) -> Array:
+    from materialist.errors import SetupError
+    from materialist.render.denoise import denoise
+
+    try:
+        return denoise(picture, albedo=guide.albedo, normal=guide.normal)
+    except SetupError:
+        return picture
+
+
+def _purified(picture: Array, share: Array) -> Array:
+    """[h, w, 3] without what is behind in pixels at the rim: they take the mean of the covered ones around."""
+    import cv2
+
+    sure = (share > 0.99).astype(np.float32)
+    total, norm = picture * sure[..., None], sure
+    blur = lambda v: cv2.GaussianBlur(v, (5, 5), 0.8)  # noqa: E731
+    near = blur(norm)[..., None]
+    mean = blur(np.ascontiguousarray(total)) / np.maximum(near, 1e-6)
+    return np.where(sure[..., None] > 0, picture, np.where(near > 1e-4, mean, picture)).astype(np.float32)
+
+
+def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
+    import cv2
+
+    if picture.shape[:2] == shape:
+        return picture
+    return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int]) -> Array:
+    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands before them.
+
+    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
+    """
+    import cv2
+
+    from materialist.edit.upsample import matte
+
+    native = scene.photo.original.shape[:2]
+    rows, columns = slice(*box[:2]), slice(*box[2:])
+    enlarge = lambda v: cv2.resize(v, native[::-1], interpolation=cv2.INTER_NEAREST)[rows, columns]  # noqa: E731
+    nearer = alone.depth - enlarge(scene.depth)
+    size = float(alone.depth.max() - alone.depth[alone.depth > 0].min()) + 1e-9
+    size = max(size, float(alone.depth.max()) * np.sqrt((alone.share > 0).mean()) * 0.05)
+    hidden = (alone.share > sight.share + 0.05) & (nearer > CONTACT * size)
+    if not hidden.any():
+        return sight.share
+    scale = max(native[0] / scene.depth.shape[0], 1.0)
+    kernel = np.ones((2 * int(np.ceil(2 * scale)) + 1,) * 2, np.uint8)
+    near = cv2.dilate(hidden.astype(np.uint8), kernel) > 0
+    whole = np.zeros(native, np.float32)
+    whole[rows, columns] = _spread(alone.depth)
+    depth = cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
+    thing = (scene.depth > 0) & (scene.depth < depth - CONTACT * size)
+    cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
+    return np.where(near, cut, sight.share).astype(np.float32)
+
+
+def _spread(depth: Array) -> Array:
+    """[h, w] with every 0 replaced by the nearest other value."""
+    from scipy import ndimage
+
+    index = ndimage.distance_transform_edt(depth == 0, return_distances=False, return_indices=True)
+    return depth[tuple(index)]

@@ -1,0 +1,101 @@
+"""Bodies on their own, at any resolution: what part of a pixel they cover, and how bright they are there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.types import Array, Body, Camera
+
+GRID = 4
+"""Rays along each side of a pixel."""
+Box = tuple[int, int, int, int]
+"""Rows and columns (top, bottom, left, right) of a part of a picture, the ends excluded."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What rays through the pixels of a box see first, of some bodies; means over the rays that meet one."""
+
+    share: Array
+    """[h, w] float32 in [0, 1]: share of each pixel in which one of the bodies is seen."""
+    albedo: Array
+    """[h, w, 3] float32 in [0, 1]; 0 where none is seen. White for glass and mirrors, as denoisers want it."""
+    normal: Array
+    """[h, w, 3] float32, camera frame; 0 where none is seen."""
+    depth: Array
+    """[h, w] float32 planar, scene units; 0 where none is seen."""
+
+
+def look(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> Sight:
+    """See `Sight`.
+
+    Args:
+        scene: a Mitsuba scene in which the bodies are shapes by these names (`RenderScene.mi_scene`).
+        size: (H, W) of the whole picture. box: the part of it that is wanted.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    top, bottom, left, right = box
+    h, w = bottom - top, right - left
+    half = float(np.tan(np.radians(camera.fov) / 2))
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    row, column = (a.ravel().astype(np.float32) for a in np.mgrid[top:bottom, left:right])
+    total = np.zeros((h * w, 8))
+    for k in range(GRID * GRID):
+        x = (mi.Float(column) + dr.opaque(mi.Float, (k % GRID + 0.5) / GRID)) / size[1] * 2 - 1
+        y = 1 - (mi.Float(row) + dr.opaque(mi.Float, (k // GRID + 0.5) / GRID)) / size[0] * 2
+        direction = mi.Vector3f(x * half, y * (half * camera.height / camera.width), -1)
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(direction)))
+        normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
+        for name, body in bodies.items():
+            hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
+            if hit.any():
+                part = [np.ones((hit.sum(), 1)), _albedo(body, uv[hit]), normal[hit], depth[hit, None]]
+                total[hit] += np.concatenate(part, 1)
+    count = np.maximum(total[:, :1], 1)
+    take = lambda v: np.ascontiguousarray(v.reshape(h, w, -1), np.float32)  # noqa: E731
+    share = take(total[:, :1] / GRID**2)[..., 0]
+    return Sight(share, take(total[:, 1:4] / count), take(total[:, 4:7] / count), take(total[:, 7:] / count)[..., 0])
+
+
+def _albedo(body: Body, uv: Array) -> Array:
+    """[n, 3] albedo at texture coordinates [n, 2], repeated; white where light goes on in one direction."""
+    surface = body.surface
+    h, w = surface.albedo.shape[:2]
+    x, y = (np.floor(np.nan_to_num(uv[:, k]) * n).astype(np.int64) % n for k, n in ((0, w), (1, h)))
+    clear = max(surface.transmission, float(surface.metallic.mean() * (surface.roughness.mean() < 0.2)))
+    return surface.albedo[y, x] * (1 - clear) + clear
+
+
+def only(scene, names: Sequence[str]):
+    """The named shapes of a Mitsuba scene as a scene of their own, to see what hides them."""
+    import mitsuba as mi
+
+    chosen = {shape.id(): shape for shape in scene.shapes() if shape.id() in names}
+    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **chosen})
+
+
+def radiance(target, size: tuple[int, int], box: Box, *, spp: int, seed: int, max_depth: int) -> Array:
+    """[h, w, 3] float32 linear: a part of the picture of a `RenderScene` at another resolution, path traced."""
+    mi, camera = target.mi, target.camera
+    top, bottom, left, right = box
+    # The sides of a picture are rounded: stretch upwards by what the two sizes differ in shape.
+    stretch = (camera.height / camera.width) / (size[0] / size[1])
+    transform = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
+    sensor = mi.load_dict({
+        "type": "perspective", "fov": camera.fov, "fov_axis": "x", "near_clip": 1e-4, "far_clip": 1e7,
+        "to_world": mi.ScalarTransform4f().scale([1, stretch, 1]) @ transform,
+        "film": {
+            "type": "hdrfilm", "width": size[1], "height": size[0], "rfilter": {"type": "box"},
+            "crop_offset_x": left, "crop_offset_y": top, "crop_width": right - left, "crop_height": bottom - top,
+            "pixel_format": "rgb", "component_format": "float32",
+        },
+        "sampler": {"type": "independent"},
+    })  # fmt: skip
+    integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
+    image = mi.render(target.mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed & 0xFFFFFFFF)
+    return np.array(image, np.float32)[..., :3]
