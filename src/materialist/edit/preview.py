@@ -42,8 +42,9 @@ class Preview:
         self._quick = TransportCache(scene.geometry, scene.camera, seed=seed, diffuse_samples=8, specular_samples=1)
         self._tables = self._engine.tables(scene.envmap)
         self._other: tuple[Array, Any] | None = None
-        self._base = self._shaded(scene.materials, self._tables)
-        self._sky_base = self._sky(scene.envmap)
+        self._part: tuple[Array, Any] | None = None
+        self._base = base = self._shaded(scene.materials, self._tables)
+        self._base_picture = self._image(base, self._sky(scene.envmap))
 
     def render(self, edited: Scene) -> Array:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
@@ -51,22 +52,27 @@ class Preview:
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
         self._check(edited)
-        return self._image(self._shaded(edited.materials, self._tables_for(edited)), self._sky(edited.envmap))
+        tables = self._tables_for(edited)
+        if tables is self._tables:
+            return self._image(self._reshaded(edited), self._sky(edited.envmap))
+        return self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
 
     def layers(self, edited: Scene) -> Layers:
         """What `composite.into_photo` needs, from the cache."""
         picture = self.render(edited)
-        base = self._image(self._base, self._sky_base)
+        base = self._base_picture
         relit = is_relit(self.scene, edited)
         differs = (picture != base).any(-1)
         return Layers(base, picture, differs, changed_pixels(self.scene, edited) & differs, picture, relit)
 
-    def picture(self, edited: Scene) -> Array:
-        """[H, W, 3] float32 linear: the edit in the photo at working size."""
+    def picture(self, edited: Scene, *, quick: bool = False) -> Array:
+        """[H, W, 3] float32 linear: the edit in the photo at working size; `quick` without soft borders, much sooner."""
         from dataclasses import replace
 
-        from materialist.edit.composite import into_photo
+        from materialist.edit.composite import into_photo, onto_working
 
+        if quick:
+            return onto_working(self.scene.photo, self.layers(edited))
         photo = replace(self.scene.photo, original=self.scene.photo.linear)
         return into_photo(photo, self.layers(edited))
 
@@ -92,13 +98,25 @@ class Preview:
         finally:
             engine.set_radiance(kept)
 
-    def _shaded(self, materials: Materials, tables):
-        """[P, 3] torch radiance of the surface pixels."""
+    def _reshaded(self, edited: Scene):
+        """[P, 3] under the fitted light: pixels whose materials changed are shaded anew, the others known."""
+        from materialist.transport.cache import Tables
+
+        pixels = self._engine.cache.pixels
+        moved = np.flatnonzero(changed_pixels(self.scene, edited).reshape(-1)[pixels])
+        if self._part is None or not np.array_equal(self._part[0], moved):
+            self._part = (moved, Tables(self._tables.diffuse[moved], self._tables.specular[:, moved]))
+        shaded = self._base.clone()
+        shaded[moved] = self._shaded(edited.materials, self._part[1], pixels[moved])
+        return shaded
+
+    def _shaded(self, materials: Materials, tables, pixels: Array | None = None):
+        """[P, 3] torch radiance of the surface pixels, or of some of them."""
         import torch
 
         from materialist.transport.shading import shade
 
-        pixels = self._engine.cache.pixels
+        pixels = self._engine.cache.pixels if pixels is None else pixels
         take = lambda m, n: torch.from_numpy(np.ascontiguousarray(m.reshape(-1, *([n] if n > 1 else [])))[pixels])  # noqa: E731
         with torch.no_grad():
             return shade(tables, take(materials.albedo, 3), take(materials.roughness, 1), take(materials.metallic, 1))

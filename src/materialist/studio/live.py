@@ -53,7 +53,7 @@ class Live:
             return self.scene.photo.linear
         preview = self._preview.result()
         edited = self.edited(steps)
-        return _THREAD.submit(preview.picture, edited).result()
+        return _THREAD.submit(preview.picture, edited, quick=True).result()
 
     def close(self) -> None:
         """Give the memory back."""
