@@ -9,9 +9,9 @@ from typing import Any
 from materialist.batch.packages import together
 
 COLUMNS = (
-    "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds", "peak_rss_mb",
-    "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture_hash", "photo_hash",
-    "warnings",
+    "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
+    "peak_rss_mb", "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture_hash",
+    "photo_hash", "warnings",
 )  # fmt: skip
 """What the summary says of each photo; of a photo that failed there is only the reason."""
 

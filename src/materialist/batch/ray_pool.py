@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from typing import Any
 
 from materialist.batch.job import Job
@@ -10,6 +11,8 @@ from materialist.batch.news import DONE, FAILED, LOST, News, describe
 from materialist.batch.work import ONE_THREAD
 from materialist.errors import SetupError
 
+PATIENCE = 10.0
+"""Seconds that a cluster has to take the phone."""
 LOCAL = "local"
 """The address that means: a cluster of this machine alone, for as long as the batch."""
 
@@ -24,6 +27,7 @@ class RayPool:
     def __init__(self, address: str, *, workers: int | None = None, device: str = "auto") -> None:
         ray = self._ray = _ray()
         local = address == LOCAL
+        _knock(address)
         try:
             # No 'address' here: a cluster that happens to run on this machine is not what was asked for.
             place: dict[str, Any] = {"address": "local", "num_cpus": workers} if local else {"address": address}
@@ -86,6 +90,17 @@ def _do(text: str) -> tuple[str, dict[str, Any]]:
         return DONE, process(Job.from_text(text), tick)
     except Exception as error:
         return FAILED, describe(error, stage[0])
+
+
+def _knock(address: str) -> None:
+    """Raise SetupError where nobody listens at HOST:PORT: Ray itself would try for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), PATIENCE).close()
+    except (OSError, OverflowError) as error:
+        raise SetupError(f"The Ray cluster at '{address}' does not answer: {error}.") from error
 
 
 def _ray() -> Any:
