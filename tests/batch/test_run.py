@@ -169,3 +169,17 @@ def test_the_scene_says_where_the_photo_lay(tmp_path):
     source = photos(tmp_path / "in", "a")
     run(source, tmp_path / "runs")
     assert load_scene(tmp_path / "runs/a.scene").photo.path == str(source / "a.png")
+
+
+def test_photos_behind_urls_are_fetched_kept_and_redone_when_they_change(tmp_path):
+    pytest.importorskip("fsspec")
+    source, runs = photos(tmp_path / "in", "a", "sub/b"), tmp_path / "runs"
+    url = f"file://{source}"
+    first = run(url, runs)
+    assert first.exit_code == 0 and [row["name"] for row in first.rows] == ["a", "b"]
+    assert load_scene(runs / "a.scene").photo.path == f"file://{source}/a.png"
+    assert first.hash == run(source, tmp_path / "paths").hash
+    photos(source, "x", "a")
+    (source / "x.png").unlink()
+    again = run(url, runs, resume=True)
+    assert again.kept == 1 and again.exit_code == 0 and again.hash != first.hash

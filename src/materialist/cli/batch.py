@@ -97,11 +97,11 @@ class BatchProgress:
     def __enter__(self) -> BatchProgress:
         if not self._quiet and not self._lines:
             from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+            from rich.progress import BarColumn, Progress, TextColumn
 
             self._bars = Progress(
-                TextColumn("{task.description:<28}", markup=False), BarColumn(bar_width=32), MofNCompleteColumn(),
-                TimeElapsedColumn(), TextColumn("{task.fields[note]}", markup=False), console=Console(stderr=True),
+                TextColumn("{task.description:<24}", markup=False), BarColumn(bar_width=16),
+                TextColumn("{task.fields[note]}", markup=False), console=Console(stderr=True),
             )  # fmt: skip
             self._bars.start()
             self._all = self._bars.add_task("photos", total=None, note="looking at what is there")
@@ -123,12 +123,12 @@ class BatchProgress:
         if status.news and "failed" in status.news:
             self._bars.console.print(status.news, markup=False, highlight=False)
         over = status.done + status.failed
-        self._bars.update(self._all, completed=over, total=status.total, note=_note(status))
+        self._bars.update(self._all, completed=over, total=status.total, note=f"{over}/{status.total}  {_note(status)}")
         for name in [name for name in self._each if name not in status.running]:
             self._bars.remove_task(self._each.pop(name))
         for name, stage in status.running.items():
             if name not in self._each:
-                self._each[name] = self._bars.add_task(f"  {name}"[:28], total=None, note=stage)
+                self._each[name] = self._bars.add_task(f"  {name}"[:24], total=None, note=stage)
             self._bars.update(self._each[name], note=stage)
 
 
