@@ -19,12 +19,19 @@ def test_one_worker_a_gpu_or_one_a_processor_as_far_as_memory_reaches(gpus, monk
     monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(64)), raising=False)
 
     def memory():
-        return type("Memory", (), {"available": 3 * local.WORKER_MB * 1e6 + 1})
+        return type("Memory", (), {"available": 3 * local.worker_mb(512) * 1e6 + 1})
 
     monkeypatch.setattr("psutil.virtual_memory", memory)
     assert local.default_workers("cpu") == 3
+    assert local.default_workers("cpu", 1024) == 1 < local.default_workers("cpu", 128) == 5
     monkeypatch.setattr("psutil.virtual_memory", lambda: type("Memory", (), {"available": 1e6}))
     assert local.default_workers("cpu") == 1
+
+
+@pytest.mark.parametrize(("size", "measured"), [(256, 839), (512, 1317), (1024, 3486), (2048, 11026)])
+def test_a_worker_fits_the_memory_that_is_counted_on(size, measured):
+    """Measured: docs/benchmarks.md, `bench invert`."""
+    assert measured < local.worker_mb(size) < 1.2 * measured
 
 
 def test_each_worker_has_one_thread_and_its_gpu(gpus, monkeypatch):

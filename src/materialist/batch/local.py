@@ -15,13 +15,16 @@ from materialist.batch.job import Job
 from materialist.batch.news import DONE, FAILED, LOST, News
 from materialist.errors import SetupError
 
-WORKER_MB = 1200
-"""Memory to count on for a worker, at 512 pixels."""
 PATIENCE = 3.0
 """Seconds that a worker has to end before it is killed."""
 
 
-def default_workers(device: str = "auto") -> int:
+def worker_mb(size: int) -> float:
+    """Memory to count on for a worker at a working size, MB: a tenth more than was measured."""
+    return 720 + 2.9e-3 * size**2
+
+
+def default_workers(device: str = "auto", size: int = 512) -> int:
     """One for each GPU that may be used, else one for each processor as far as memory reaches."""
     gpus = visible_gpus() if device != "cpu" else []
     if gpus:
@@ -29,7 +32,7 @@ def default_workers(device: str = "auto") -> int:
     import psutil
 
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / WORKER_MB)))
+    return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker_mb(size))))
 
 
 def visible_gpus() -> list[str]:

@@ -87,7 +87,7 @@ def batch(
         jobs, finished = plan(photos, ledger, Path(runs), asked, edits=recipe, spp=spp, function=function)
         run = _Run(Path(runs), photos, ledger, jobs, finished, progress or (lambda _: None), start, asked)
         if jobs:
-            run.work(_pool(ray, workers, len(jobs), device))
+            run.work(_pool(ray, workers, len(jobs), device, size))
         return run.outcome()
     finally:
         if run is not None:
@@ -95,14 +95,14 @@ def batch(
         ledger.close()
 
 
-def _pool(ray: str | None, workers: int | None, jobs: int, device: str) -> Pool:
+def _pool(ray: str | None, workers: int | None, jobs: int, device: str, size: int) -> Pool:
     if ray is not None:
         from materialist.batch.ray_pool import RayPool
 
         return RayPool(ray, workers=workers, device=device)
     from materialist.batch.local import LocalPool, default_workers
 
-    return LocalPool(min(workers or default_workers(device), jobs), device=device)
+    return LocalPool(min(workers or default_workers(device, size), jobs), device=device)
 
 
 def _check_edits(recipe: Path, spp: int) -> None:

@@ -57,19 +57,20 @@ def _serve(job: Any, say: Callable[[dict[str, Any]], None]) -> None:
     from materialist.batch.news import describe
     from materialist.batch.work import process
 
-    told = [0.0, "read"]
+    told, current = 0.0, "read"
 
     def tick(stage: str, done: int, total: int) -> None:
+        nonlocal told, current
         now = time.monotonic()
-        if stage == told[1] and now - float(told[0]) < QUIET:
+        if stage == current and now - told < QUIET:
             return
-        told[:] = [now, stage]
+        told, current = now, stage
         say({"kind": "progress", "facts": {"stage": stage, "done": done, "total": total}})
 
     try:
         facts = process(job, tick)
     except Exception as error:
-        say({"kind": "failed", "facts": describe(error, str(told[1]))})
+        say({"kind": "failed", "facts": describe(error, current)})
     else:
         say({"kind": "done", "facts": facts})
 
