@@ -1,6 +1,7 @@
 """Batches with a stand-in for the inversion: what is done, what is recorded, what is done again."""
 
 import json
+import os
 import time
 
 import numpy as np
@@ -183,3 +184,14 @@ def test_photos_behind_urls_are_fetched_kept_and_redone_when_they_change(tmp_pat
     (source / "x.png").unlink()
     again = run(url, runs, resume=True)
     assert again.kept == 1 and again.exit_code == 0 and again.hash != first.hash
+
+
+def test_a_file_name_that_is_no_utf8_is_a_photo_like_any_other(tmp_path):
+    source = photos(tmp_path / "in", "a")
+    try:
+        os.rename(source / "a.png", os.fsencode(source) + b"/caf\xe9.png")
+    except OSError:
+        pytest.skip("this file system takes only UTF-8")
+    outcome = run(source, tmp_path / "runs", workers=1)
+    assert outcome.exit_code == 0, reasons(outcome)
+    assert outcome.rows[0]["id"] == "caf\\udce9.png" and "caf" in (tmp_path / "runs/index.html").read_text()

@@ -7,6 +7,7 @@ keeps a second batch out of the folder.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 import os
@@ -140,11 +141,7 @@ def _last_options(events: list[dict[str, Any]]) -> dict[str, Any]:
 def _locked(folder: Path) -> int:
     lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        import fcntl
-
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:  # Windows: two batches in one folder are the user's to avoid
-        pass
     except BlockingIOError as error:
         os.close(lock)
         raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error

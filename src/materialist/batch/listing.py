@@ -66,10 +66,15 @@ def _of_folder(folder: Path, runs: Path) -> list[Listed]:
             for name in files:
                 if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:
                     path = Path(place) / name
-                    found.append(Listed(path.relative_to(folder).as_posix(), os.path.abspath(path)))
+                    found.append(Listed(_printable(path.relative_to(folder).as_posix()), os.path.abspath(path)))
     except OSError as error:
         raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
     return found
+
+
+def _printable(text: str) -> str:
+    """A path whose bytes are no UTF-8 can be opened but not written into a table: those bytes as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _raise(error: OSError) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 from typing import Any
 
@@ -33,7 +32,7 @@ class RayPool:
             place: dict[str, Any] = {"address": "local", "num_cpus": workers} if local else {"address": address}
             ray.init(
                 **place, log_to_driver=False, configure_logging=False, include_dashboard=False if local else None,
-                runtime_env={"env_vars": {**ONE_THREAD, "PYTHONPATH": os.environ.get("PYTHONPATH", "")}},
+                runtime_env={"env_vars": ONE_THREAD},
             )  # fmt: skip
         except Exception as error:
             reason = " ".join(str(error).split())

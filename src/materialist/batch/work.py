@@ -19,7 +19,7 @@ import numpy as np
 from materialist.batch.edits import edits_for, edits_key
 from materialist.batch.job import Job, thumbnail_path
 from materialist.batch.packages import file_hash, package_hash, whole_size
-from materialist.batch.remote import local_copy
+from materialist.batch.remote import is_url, local_copy
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
 from materialist.types import Array, Scene
@@ -85,7 +85,8 @@ def _scene(job: Job, tick: Tick) -> tuple[Scene, dict[str, Any]]:
     tick("read", 0, 1)
     with local_copy(job.location) as file:
         photo = read_photo(file if str(file) != job.location else job.location, size=size, fov=fov)
-    photo = replace(photo, path=job.id if "://" in job.id else job.location)
+    place = job.id if is_url(job.location) else job.location
+    photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     tick("start", 0, 1)
     begun = time.perf_counter()
     scene = _function(job.function)(photo, size=size, fov=fov, progress=tick, **options)
