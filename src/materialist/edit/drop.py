@@ -1,0 +1,231 @@
+"""Meshes that fall onto the photographed scene (paper, Physical Simulation)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.camera import unproject
+from materialist.edit.convex import convex_pieces, hull
+from materialist.edit.frames import MAX_FRAMES
+from materialist.edit.ground import blocks, field
+from materialist.edit.insert import extent, moved, put
+from materialist.edit.material import noted
+from materialist.edit.meshes import Model, read_model, repainted
+from materialist.edit.physics import Pose, Thing, fall, load
+from materialist.edit.support import Support
+from materialist.errors import InputError
+from materialist.types import Array, Body, Scene
+
+METRES = 0.2
+"""Longest side of a thing in the simulation: how fast it seems to fall tells its size."""
+REACH = 6.0
+"""Half of the side of the ground that things can fall onto, in longest sides."""
+UPRIGHT = 0.5
+"""Cosine to the camera's up from which a plane can be a floor or a table top."""
+FLAT = 0.004
+"""How plane a block of the ground must be, in longest sides."""
+
+
+def drop(
+    scene: Scene,
+    meshes: Sequence[str | Path | Model],
+    at: tuple[float, float] | Sequence[tuple[float, float]],
+    *,
+    frames: int = 48,
+    fps: float = 24.0,
+    height: float = 1.5,
+    spin: float = 0.3,
+    scale: float = 1.0,
+    material: str = "as-is",
+    gravity: tuple[float, float, float] | None = None,
+    metres: float = METRES,
+    seed: int = 0,
+    up: str = "auto",
+) -> list[Scene]:
+    """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
+
+    The visible surface and the planes that continue it are the ground; bodies that are in the scene already count as
+    part of it. Things are rigid, of one density, and collide as a few convex pieces each.
+
+    Args:
+        meshes: files, or what `meshes.read_model` made of them.
+        at: (x, y) at working size above which all fall, one over the other, or a place for each.
+        frames, fps: length of the film in frames, 2 to 3600, and frames a second.
+        height: of the lowest one over the ground, in multiples of its longest side.
+        spin: turns a second about an axis that `seed` chooses.
+        scale, material, up: as in `insert`.
+        gravity: direction in the camera frame; by default against the normal of the ground under the first place if it
+            can be a floor, of the largest plane that can, or the camera's -Y.
+        metres: what the longest side is taken for; small things fall fast.
+
+    Raises:
+        InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
+            missing.
+    """
+    _check(frames, fps, height, spin, metres)
+    load()
+    models = [repainted(m if isinstance(m, Model) else read_model(m, up=up), material) for m in meshes]
+    if not models:
+        raise InputError("Nothing falls; give at least one mesh.")
+    places = _places(at, len(models))
+    stood = [put(scene, model, place, scale=scale) for model, place in zip(models, places)]
+    to_up = upright(down(scene, stood[0][1], gravity))
+    size = max(extent(bodies) for bodies, _ in stood)
+    factor = metres / size
+    starts = _raised(stood, to_up, factor, height * metres)
+    rng = np.random.default_rng(seed)
+    things = []
+    for bodies, shift in starts:
+        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
+        centre = (points.min(0) + points.max(0)) / 2
+        axis = rng.normal(size=3)
+        turning = 2 * np.pi * spin * axis / np.linalg.norm(axis)
+        things.append(Thing(tuple(p - centre for p in _pieces(bodies, to_up, factor, shift, seed)), centre, turning))
+    ground = _ground(scene, things, to_up, factor, metres)
+    what: dict[str, Any] = {
+        "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
+        "height": height, "spin": spin, "scale": scale, "material": material, "seed": seed,
+    }  # fmt: skip
+    notes = [note for model in models for note in model.warnings]
+    film, last = [], scene
+    poses: list[Pose] | None = None
+    for frame in fall(things, ground, frames=frames, fps=fps):
+        if poses is None or _moves(poses, frame):
+            placed = tuple(
+                _posed(body, to_up, factor, shift, thing, pose)
+                for (bodies, shift), thing, pose in zip(starts, things, frame)
+                for body in bodies
+            )
+            last, poses = _with(scene, placed, notes, what), frame
+        film.append(last)
+    return film
+
+
+def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | None) -> Array:
+    """[3] unit direction of gravity, camera frame; see `drop`. Raises InputError for a direction of no length."""
+    if gravity is not None:
+        direction = np.asarray(gravity, np.float64)
+        if direction.shape != (3,) or not np.isfinite(direction).all() or not np.linalg.norm(direction) > 0:
+            raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
+        return direction / np.linalg.norm(direction)
+    if support.normal[1] > UPRIGHT:
+        return -support.normal
+    from materialist.edit.support import support_at
+
+    for label in range(int(scene.geometry.plane_label.max(initial=-1)) + 1):
+        rows, columns = np.nonzero(scene.geometry.plane_label == label)
+        if len(rows):
+            middle = len(rows) // 2
+            plane = support_at(scene, (float(columns[middle]), float(rows[middle])))
+            if plane.normal[1] > UPRIGHT:
+                return -plane.normal
+    return np.array([0.0, -1.0, 0.0])
+
+
+def upright(direction: Array) -> Array:
+    """[3, 3] rotation from the camera frame to one whose z axis is against gravity."""
+    z = -direction
+    x = np.cross([0.0, 0.0, 1.0], z) if abs(z[2]) < 0.9 else np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def _check(frames: int, fps: float, height: float, spin: float, metres: float) -> None:
+    if not 2 <= frames <= MAX_FRAMES:
+        raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
+    for name, value, low, high in (
+        ("frame rate", fps, 1, 240), ("height", height, 0, 100), ("spin", spin, -20, 20), ("metres", metres, 1e-3, 100),
+    ):  # fmt: skip
+        if not (np.isfinite(value) and low <= value <= high):
+            raise InputError(f"The {name} is {value:g}; it must lie in [{low:g}, {high:g}].")
+
+
+def _places(at: Any, count: int) -> list[tuple[float, float]]:
+    """A place for each mesh."""
+    several = bool(np.ndim(at[0])) if len(at) else False
+    places = [tuple(place) for place in at] if several else [tuple(at)] * count
+    if len(places) == 1:
+        places = places * count
+    if len(places) != count:
+        raise InputError(f"There are {len(places)} places for {count} meshes; give one, or as many.")
+    return places
+
+
+def _raised(
+    stood: list[tuple[tuple[Body, ...], Support]], to_up: Array, factor: float, height: float
+) -> list[tuple[tuple[Body, ...], Array]]:
+    """Each thing and the shift [3] (metres, z up) that lifts it to where it starts, clear of those below it."""
+    result: list[tuple[tuple[Body, ...], Array]] = []
+    boxes: list[tuple[Array, Array]] = []
+    for bodies, _ in stood:
+        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor
+        low, high = points.min(0), points.max(0)
+        lift = height
+        for other_low, other_high in boxes:
+            if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
+                lift = max(lift, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
+        shift = np.array([0.0, 0.0, lift])
+        boxes.append((low + shift, high + shift))
+        result.append((bodies, shift))
+    return result
+
+
+def _pieces(bodies: tuple[Body, ...], to_up: Array, factor: float, shift: Array, seed: int) -> list[Array]:
+    """Convex pieces [n, 3] of a thing, metres, z up."""
+    corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
+    faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
+    vertices = np.concatenate([body.vertices for body in bodies]).astype(np.float64) @ to_up.T * factor + shift
+    return convex_pieces(vertices, faces, seed=seed)
+
+
+def _ground(scene: Scene, things: list[Thing], to_up: Array, factor: float, metres: float) -> list[Array]:
+    from materialist.render.scene import RenderScene
+
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    starts = np.stack([thing.centre for thing in things])
+    top = float(max((thing.centre + p)[:, 2].max() for thing in things for p in thing.pieces)) + metres
+    visible = unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
+    half = REACH * metres + float(np.ptp(starts[:, :2], axis=0).max()) / 2
+    ground = field(
+        lambda x, y, top: _heights(target, to_up, factor, x, y, top), visible, starts[:, :2].mean(0), half, top, metres
+    )  # fmt: skip
+    found = blocks(ground, flat=FLAT * metres, depth=2 * metres)
+    return [hull(block) for block in found]
+
+
+def _heights(target: Any, to_up: Array, factor: float, x: Array, y: Array, top: float) -> Array:
+    """z [n] (metres) of what rays downwards from `top` meet first in a `RenderScene`, NaN for nothing."""
+    mi = target.mi
+    start = np.stack([x, y, np.full_like(x, top)], -1) / factor @ to_up  # back in the camera frame
+    origin = mi.Point3f(*(mi.Float(np.ascontiguousarray(start[:, k], np.float32)) for k in range(3)))
+    direction = mi.Vector3f(*(float(v) for v in -to_up[2]))
+    hit = target.mi_scene.ray_intersect_preliminary(mi.Ray3f(origin, direction))
+    distance = np.array(hit.t, np.float64) * factor
+    return np.where(np.isfinite(distance) & np.array(hit.is_valid()), top - distance, np.nan)
+
+
+def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, pose: Pose) -> Body:
+    """The body of the camera frame where the thing is now."""
+    turn = to_up.T @ pose.turn @ to_up
+    # In metres, z up: x -> R (x + shift - first centre) + centre.
+    move = (pose.turn @ (shift - thing.centre) + pose.centre) / factor @ to_up
+    return moved(body, turn, move)
+
+
+def _moves(before: list[Pose], now: list[Pose]) -> bool:
+    """Whether anything has moved by more than a thousandth of a turn or of METRES."""
+    return any(
+        np.abs(a.centre - b.centre).max() > 1e-3 * METRES or np.abs(a.turn - b.turn).max() > 2e-3
+        for a, b in zip(before, now)
+    )
+
+
+def _with(scene: Scene, bodies: tuple[Body, ...], notes: list[str], what: dict[str, Any]) -> Scene:
+    known = scene.report.warnings
+    report = replace(scene.report, warnings=(*known, *(note for note in notes if note not in known)))
+    return noted(replace(scene, bodies=(*scene.bodies, *bodies), report=report), "drop", what)

@@ -1,0 +1,106 @@
+"""Rigid bodies falling onto blocks that stay (MuJoCo): metres, seconds, z up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.errors import SetupError
+from materialist.types import Array
+
+STEP = 1e-3
+"""Seconds; at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper than that."""
+GRAVITY = 9.81
+STIFF = (4e-3, 1.0)
+"""Time constant and damping ratio of contacts: as stiff as the step allows, and no bouncing."""
+FRICTION = (0.6, 0.01, 0.0005)
+"""Sliding, torsional (m) and rolling (m)."""
+DENSITY = 600.0
+"""kg / m^3; wood. Things of one density fall alike."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A rigid body at its start."""
+
+    pieces: tuple[Array, ...]
+    """Convex pieces: corners [n, 3] each, relative to the centre."""
+    centre: Array
+    """[3] metres."""
+    spin: Array
+    """[3] angular velocity, rad/s."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a thing is at one moment: x -> turn (x - its first centre) + centre."""
+
+    centre: Array
+    """[3] metres."""
+    turn: Array
+    """[3, 3] rotation since the start."""
+    energy: float = 0.0
+    """Kinetic and potential energy of all things, joule; heights count from z = 0."""
+
+
+def fall(things: list[Thing], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
+    """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
+
+    Raises SetupError where mujoco is not installed.
+    """
+    mujoco = load()
+    model = _world(mujoco, things, ground)
+    data = mujoco.MjData(model)
+    for k, thing in enumerate(things):
+        data.qvel[6 * k + 3 : 6 * k + 6] = thing.spin
+    mujoco.mj_forward(model, data)
+    done = 0
+    for frame in range(frames):
+        target = round(frame / fps / STEP)
+        while done < target:
+            mujoco.mj_step(model, data)
+            done += 1
+        mujoco.mj_forward(model, data)
+        mujoco.mj_energyPos(model, data)
+        mujoco.mj_energyVel(model, data)
+        energy = float(data.energy.sum())
+        bodies = [data.body(f"thing{k}") for k in range(len(things))]
+        yield [Pose(b.xpos.copy(), b.xmat.reshape(3, 3).copy(), energy) for b in bodies]
+
+
+def load():
+    """The mujoco module. Raises SetupError with the command that installs it."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise SetupError(
+            "Falling objects need two more packages; install them with: pip install 'materialist[physics]'"
+        ) from error
+    return mujoco
+
+
+def _world(mujoco, things: list[Thing], ground: list[Array]):
+    spec = mujoco.MjSpec()
+    spec.option.timestep = STEP
+    spec.option.gravity = [0, 0, -GRAVITY]
+    if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
+        spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    for number, corners in enumerate(ground):
+        _piece(mujoco, spec, spec.worldbody, f"ground{number}", corners)
+    for k, thing in enumerate(things):
+        body = spec.worldbody.add_body(name=f"thing{k}", pos=[float(v) for v in thing.centre])
+        body.add_freejoint()
+        for number, corners in enumerate(thing.pieces):
+            _piece(mujoco, spec, body, f"thing{k}_{number}", corners)
+    return spec.compile()
+
+
+def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
+    spec.add_mesh(name=name, uservert=np.ascontiguousarray(corners, np.float64).ravel().tolist())
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, friction=list(FRICTION), condim=4, density=DENSITY,
+        solref=list(STIFF), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
+    )  # fmt: skip

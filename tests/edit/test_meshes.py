@@ -1,0 +1,178 @@
+"""Mesh files as bodies: what is read, what is refused, and that nothing outside of the folder is opened."""
+
+import numpy as np
+import pytest
+import trimesh
+from made_meshes import box_file, gltf_file, textured_obj
+from PIL import Image
+
+from materialist.edit.mesh_shape import creased_normals, edge_faults
+from materialist.edit.meshes import read_model, repainted
+from materialist.errors import InputError
+
+RED, GREEN, BLUE, WHITE = np.eye(3)[0], np.eye(3)[1], np.eye(3)[2], np.ones(3)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "glb"])
+def test_a_box_of_every_format(tmp_path, suffix):
+    model = read_model(box_file(tmp_path / f"box.{suffix}"), up="y")
+    np.testing.assert_allclose(np.ptp(model.vertices, axis=0), [1, 2, 0.5], atol=1e-5)
+    assert model.closed and not model.warnings
+    (body,) = model.parts
+    corners = body.vertices[body.faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outwards = (corners.mean(1) - model.vertices.mean(0)) * flat
+    assert (outwards.sum(1) > 0).all()
+    assert body.vertices.dtype == body.normals.dtype == body.uv.dtype == np.float32
+    np.testing.assert_allclose(np.linalg.norm(body.normals, axis=1), 1, atol=1e-5)
+
+
+def test_stl_stands_on_z(tmp_path):
+    path = box_file(tmp_path / "box.stl", (1.0, 0.5, 2.0))
+    np.testing.assert_allclose(np.ptp(read_model(path).vertices, axis=0), [1, 2, 0.5], atol=1e-5)
+    np.testing.assert_allclose(np.ptp(read_model(path, up="y").vertices, axis=0), [1, 0.5, 2], atol=1e-5)
+
+
+def test_edges_of_a_box_stay_and_a_ball_is_smooth(tmp_path):
+    (body,) = read_model(box_file(tmp_path / "box.stl")).parts
+    assert np.allclose(np.abs(body.normals).max(1), 1, atol=1e-6)
+    ball = trimesh.creation.icosphere(3)
+    normals = creased_normals(ball.vertices, ball.faces)
+    np.testing.assert_allclose(normals, ball.vertices[ball.faces], atol=0.02)
+
+
+def test_creased_normals_agree_with_a_loop():
+    shape = trimesh.creation.cylinder(1, 2, sections=12)
+    v, f = np.asarray(shape.vertices), np.asarray(shape.faces)
+    cross = np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]])
+    unit = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    for face in range(0, len(f), 7):
+        for k in range(3):
+            around = [g for g in range(len(f)) if np.isclose(v[f[g]], v[f[face, k]]).all(1).any()]
+            total = sum(cross[g] for g in around if unit[g] @ unit[face] > np.cos(np.radians(40)))
+            expected = total / np.linalg.norm(total)
+            np.testing.assert_allclose(creased_normals(v, f)[face, k], expected, atol=1e-9)
+
+
+def test_a_texture_lies_as_the_file_says(tmp_path):
+    (body,) = read_model(textured_obj(tmp_path)).parts
+    surface = body.surface
+    np.testing.assert_allclose(surface.albedo, [[RED, GREEN], [BLUE, WHITE]], atol=1e-6)
+    np.testing.assert_allclose(surface.metallic, 0.25)
+    np.testing.assert_allclose(surface.roughness, (2 / 8) ** 0.25)
+    top_left = np.argmin(np.abs(body.vertices - [0, 1, 0]).sum(1))
+    np.testing.assert_allclose(body.uv[top_left], [0, 0], atol=1e-6)  # v runs down
+
+
+def test_gltf_values_and_data_beside_it(tmp_path):
+    (body,) = read_model(gltf_file(tmp_path, "tri.bin")).parts
+    np.testing.assert_allclose(body.surface.albedo[0, 0], [0.2, 0.4, 0.6], atol=1e-3)
+    np.testing.assert_allclose([body.surface.roughness.item(), body.surface.metallic.item()], [0.3, 1], atol=1e-6)
+    np.testing.assert_allclose(body.uv, [[0, 0], [1, 0], [0, 1]], atol=1e-6)  # glTF's v runs down, too
+
+
+def test_colours_of_vertices_become_texels(tmp_path):
+    ball = trimesh.creation.icosphere(1)
+    ball.visual.vertex_colors = np.where(ball.vertices[:, :1] > 0, [[255, 0, 0, 255]], [[0, 0, 255, 255]])
+    ball.export(tmp_path / "ball.ply")
+    (body,) = read_model(tmp_path / "ball.ply").parts
+    albedo, uv = body.surface.albedo, body.uv
+    h, w = albedo.shape[:2]
+    seen = albedo[(uv[:, 1] * h).astype(int), (uv[:, 0] * w).astype(int)]
+    right = body.vertices[body.faces][:, :, 0].min(1) > 0.1
+    np.testing.assert_allclose(seen[body.faces[right].ravel()], np.tile(RED, (3 * right.sum(), 1)), atol=1e-3)
+
+
+@pytest.mark.parametrize("where", ["../secret.mtl", "/etc/hostname", "sub/../../secret.mtl", "http://a.b/c.mtl"])
+def test_material_files_outside_are_never_followed(tmp_path, where):
+    (tmp_path / "secret.mtl").write_text("newmtl paint\nKd 1 0 0\n")
+    (tmp_path / "in" / "sub").mkdir(parents=True)
+    path = textured_obj(tmp_path / "in", mtl=where)
+    with pytest.raises(InputError, match="outside of its folder"):
+        read_model(path)
+
+
+@pytest.mark.parametrize("where", ["../secret.png", "..\\secret.png", "file:///etc/hostname", "link.png"])
+def test_textures_outside_are_never_followed(tmp_path, where):
+    (tmp_path / "in").mkdir()
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "secret.png")
+    (tmp_path / "in" / "link.png").symlink_to(tmp_path / "secret.png")
+    with pytest.raises(InputError, match="outside of its folder"):
+        read_model(textured_obj(tmp_path / "in", texture=where))
+
+
+@pytest.mark.parametrize("uri", ["../tri.bin", "%2e%2e/tri.bin", "http://a.b/tri.bin", "file:tri.bin", "/tri.bin"])
+def test_gltf_addresses_outside_are_never_followed(tmp_path, uri):
+    (tmp_path / "in").mkdir()
+    gltf_file(tmp_path, "tri.bin")
+    with pytest.raises(InputError, match="outside of its folder"):
+        read_model(gltf_file(tmp_path / "in", uri))
+    with pytest.raises(InputError, match="outside of its folder"):
+        read_model(gltf_file(tmp_path / "in", "tri.bin", image=uri))
+
+
+def test_missing_textures_are_told_and_a_constant_serves(tmp_path):
+    model = read_model(textured_obj(tmp_path, texture="gone.png"))
+    assert any("gone.png is missing" in note for note in model.warnings)
+    np.testing.assert_allclose(model.parts[0].surface.albedo, 0.5)
+    model = read_model(gltf_file(tmp_path, "tri.bin", image="gone.png"))
+    assert any("gone.png is missing" in note for note in model.warnings)
+    with pytest.raises(InputError, match=r"gone\.bin"):
+        read_model(gltf_file(tmp_path, "gone.bin"))
+
+
+def write(path, content):
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def test_bad_meshes_have_a_sentence_each(tmp_path):
+    obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    bad = [
+        (write(tmp_path / "a.obj", ""), "is empty"),
+        (write(tmp_path / "b.obj", "v 0 0 0\nv 1 0 0\n"), "no triangles"),
+        (write(tmp_path / "c.obj", obj.replace("v 0 1 0", "v nan 1 0")), "NaN"),
+        (write(tmp_path / "d.obj", obj.replace("v 0 1 0", "v 2 0 0")), "no triangles"),
+        (write(tmp_path / "e.obj", obj.replace("f 1 2 3", "f 1 2 9")), "mesh|readable"),
+        (write(tmp_path / "f.glb", b"glTF" + b"\0" * 40), "not a readable GLB"),
+        (write(tmp_path / "g.fbx", "x"), "ends in"),
+        (tmp_path / "missing.obj", "cannot be read"),
+        (write(tmp_path / "h.ply", "ply\nformat ascii 1.0\nelement face 10000000\nend_header\n"), "Decimate"),
+        (write(tmp_path / "i.stl", b"\0" * 80 + (10**7).to_bytes(4, "little") + b"\0" * 100), "mesh|readable|tri"),
+    ]  # fmt: skip
+    for path, sentence in bad:
+        with pytest.raises(InputError, match=sentence) as error:
+            read_model(path)
+        assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="points up"):
+        read_model(box_file(tmp_path / "box.ply"), up="x")
+
+
+def test_what_is_not_manifold_or_not_closed_is_told(tmp_path):
+    fins = "v 0 0 0\nv 0 1 0\nv 1 0 0\nv -1 0 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"
+    model = read_model(write(tmp_path / "fins.obj", fins))
+    assert any("not manifold: 1 edges" in note for note in model.warnings) and not model.closed
+    assert any("not closed" in note for note in repainted(model, "glass").warnings)
+    box = trimesh.creation.box()
+    assert edge_faults(np.asarray(box.vertices), np.asarray(box.faces)) == (0, 0)
+    assert edge_faults(np.asarray(box.vertices), np.asarray(box.faces)[1:]) == (3, 0)
+
+
+def test_an_inside_out_mesh_is_turned(tmp_path):
+    box = trimesh.creation.box()
+    trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False).export(tmp_path / "box.ply")
+    (body,) = read_model(tmp_path / "box.ply").parts
+    assert ((body.vertices * body.normals).sum(1) > 0).all()
+
+
+def test_other_materials(tmp_path):
+    model = read_model(box_file(tmp_path / "box.ply"))
+    assert repainted(model, "as-is") is model
+    glass = repainted(model, "glass").parts[0].surface
+    assert (glass.transmission, glass.ior) == (1, 1.5)
+    mirror = repainted(model, "mirror").parts[0].surface
+    assert mirror.metallic.min() == 1 and mirror.albedo.min() > 0.9 and mirror.roughness.max() < 0.1
+    np.testing.assert_allclose(repainted(model, "#ff0000").parts[0].surface.albedo[0, 0], RED)
+    np.testing.assert_allclose(repainted(model, "0.1,0.2,0.3").parts[0].surface.albedo[0, 0], [0.1, 0.2, 0.3])
+    with pytest.raises(InputError, match="as-is, glass, mirror"):
+        repainted(model, "wood")
