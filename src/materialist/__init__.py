@@ -27,6 +27,7 @@ _HOME = {
     "relight": "edit.relight",
     "lamp": "edit.relight",
     "insert": "edit.insert",
+    "drop": "edit.drop",
     "composite": "edit.composite",
     **dict.fromkeys(
         (
@@ -54,6 +55,7 @@ __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
     from materialist.edit.composite import composite as composite
+    from materialist.edit.drop import drop as drop
     from materialist.edit.insert import insert as insert
     from materialist.edit.material import edit as edit
     from materialist.edit.relight import lamp as lamp

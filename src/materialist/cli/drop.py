@@ -1,0 +1,90 @@
+"""`materialist drop SCENE MESH ... --at X,Y -o OUT.mp4`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.outcome import report_success
+from materialist.cli.picture import Denoise, FullRender, SceneArgument, numbers
+from materialist.cli.progress import StageProgress
+from materialist.errors import InputError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("drop")(drop)
+
+
+def drop(
+    scene: SceneArgument,
+    meshes: Annotated[list[Path], typer.Argument(metavar="MESH...", help="OBJ, PLY, STL, glTF or GLB.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A .mp4, or a folder of frames.")],
+    at: Annotated[
+        list[str], typer.Option("--at", metavar="X,Y", help="Over which pixel of the working size; one, or one each.")
+    ],
+    frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
+    fps: Annotated[int, typer.Option(help="Frames per second.")] = 24,
+    height: Annotated[float, typer.Option(help="Over the ground, in longest sides.")] = 1.5,
+    spin: Annotated[float, typer.Option(help="Turns per second about an axis that the seed chooses.")] = 0.3,
+    scale: Annotated[float, typer.Option(help="Factor on the size; 1 is a sixth of the picture's width there.")] = 1.0,
+    material: Annotated[str, typer.Option(help="as-is, glass, mirror, R,G,B (linear) or #rrggbb.")] = "as-is",
+    gravity: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Its direction in the camera frame: X right, Y up, Z back.")
+    ] = None,
+    metres: Annotated[float, typer.Option(help="What the longest side is taken for; small things fall fast.")] = 0.2,
+    up: Annotated[str, typer.Option(help="Axis of the files that points up: y, z; auto: z for STL.")] = "auto",
+    spp: Annotated[int, typer.Option(help="Paths per pixel, of each rendering.")] = 32,
+    denoise: Denoise = True,
+    full_render: FullRender = False,
+    save: Annotated[
+        Path | None, typer.Option("--save", metavar="SCENE2", help="Write the scene of the last frame.")
+    ] = None,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
+    force: Force = False,
+) -> None:
+    """Let meshes fall onto what the photo shows, and film it."""
+    from materialist.edit.composite import developed
+    from materialist.edit.drop import drop as simulate
+    from materialist.edit.film import filmed
+    from materialist.edit.frames import ensure_video_writable, write_frames
+    from materialist.edit.meshes import read_model
+    from materialist.io.package import load_scene, save_scene
+    from materialist.io.target import ensure_writable
+
+    if not 2 <= spp <= 1_000_000:
+        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
+    if not 1 <= fps <= 120:
+        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
+    ensure_video_writable(output, force=force)
+    if save is not None:
+        ensure_writable(save, force)
+    start = time.monotonic()
+    places = [numbers(text, 2, "--at") for text in at]
+    models = [read_model(path, up=up) for path in meshes]
+    loaded = load_scene(scene)
+    film = simulate(
+        loaded, models, places, frames=frames, fps=fps, height=height, spin=spin, scale=scale, material=material,
+        gravity=numbers(gravity, 3, "--gravity") if gravity else None, metres=metres, seed=seed,
+    )  # fmt: skip
+    last: list[Any] = [None]
+    with StageProgress(quiet=as_json) as progress:
+        pictures = filmed(
+            loaded, film, spp=spp, seed=seed, denoise=denoise, full_render=full_render, device=device.value,
+            progress=progress, last=last,
+        )  # fmt: skip
+        write_frames(output, pictures, fps=fps, force=force)
+    if save is not None and not full_render:
+        save_scene(developed(loaded, film[-1], last[0]), save, force=force)
+    warnings = [note for note in film[-1].report.warnings if note not in loaded.report.warnings]
+    report_success(
+        "drop", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
+        frames=frames, fps=fps, scene=str(save) if save else None, warnings=warnings,
+        edits=film[-1].provenance.get("edits", []), seconds=time.monotonic() - start,
+    )  # fmt: skip
