@@ -12,13 +12,13 @@ _EVERY = 0.3
 """Seconds between two looks at a job."""
 _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
-    "geometry": "Building the surface", "cache": "Tracing light paths", "light": "Finding the light",
+    "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
     "materials": "Finding the materials", "rerender": "Rendering the result", "save": "Saving", "load": "Loading",
     "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
 }  # fmt: skip
 _SHARE = {
-    "start": (0.0, 0.08), "read": (0.08, 0.1), "predict": (0.1, 0.14), "geometry": (0.14, 0.17), "cache": (0.17, 0.35),
-    "light": (0.35, 0.5), "materials": (0.5, 0.72), "rerender": (0.72, 0.97), "save": (0.97, 1.0),
+    "start": (0.0, 0.08), "read": (0.08, 0.1), "predict": (0.1, 0.14), "geometry": (0.14, 0.17), "trace": (0.17, 0.3),
+    "light": (0.3, 0.5), "materials": (0.5, 0.72), "rerender": (0.72, 0.97), "save": (0.97, 1.0),
 }  # fmt: skip
 """Stage of an inversion -> where its part of the bar begins and ends, by the seconds that it usually takes."""
 
@@ -61,13 +61,11 @@ def words(stage: str) -> str:
 def share(job: Job) -> float:
     """How much of a job is done, in [0, 1]; it never runs back."""
     inside = min(1.0, job.done / job.total) if job.total else 0.0
-    key = next((name for name in _SHARE if job.stage.startswith(name)), None)
-    if job.kind == "invert" and key is not None:
-        low, high = _SHARE[key]
+    if job.kind == "invert":
+        low, high = next((part for name, part in _SHARE.items() if job.stage.startswith(name)), (0.0, 0.0))
         inside = low + (high - low) * inside
-    before = getattr(job, "shown_share", 0.0)
-    job.shown_share = max(before, inside) if job.kind == "invert" else inside  # type: ignore[attr-defined]
-    return float(job.shown_share)  # type: ignore[attr-defined]
+    job.shown = max(job.shown, inside)
+    return job.shown
 
 
 def box(text: str, part: float | None = None, bad: bool = False) -> str:

@@ -36,6 +36,8 @@ class Job:
     stage: str = ""
     done: int = 0
     total: int = 0
+    shown: float = 0.0
+    """The longest that its bar was, in [0, 1]: it never runs back."""
     message: str = ""
     """One sentence where it failed."""
     found: list[dict[str, Any]] = field(default_factory=list)

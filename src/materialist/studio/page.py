@@ -8,15 +8,17 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.studio import tab_light, tab_look, tab_material, tab_open, tab_take
 from materialist.studio.context import Context, steps
 from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.hub import Hub
 from materialist.studio.selection import read_pick
+from materialist.studio.session import Final
 
 TITLE = "Materialist studio"
-SPP, DRAFT_SPP = 256, 16
-"""Paths a pixel of the final picture, and of a quick look at it."""
+DRAFT_SPP = 16
+"""Paths a pixel of a quick look at the final picture."""
 _HEAD = (
     "<h1>Materialist</h1><p>One photo, taken apart into shape, material and light. Click something and change it.</p>"
 )
@@ -24,16 +26,14 @@ _HEAD = (
 
 def build(hub: Hub) -> Any:
     """The Gradio page; `server` shows it."""
-    from materialist.studio import tab_light, tab_look, tab_material, tab_open, tab_take
-
     context = Context(hub)
     parts = context.parts
     with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
         parts["token"] = gr.BrowserState("", storage_key="materialist-person", secret="page")
         parts["last"] = gr.BrowserState("", storage_key="materialist-last", secret="page")
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
-        with gr.Row():
-            with gr.Column(scale=5, min_width=320):
+        with gr.Row(elem_id="body"):
+            with gr.Column(scale=5, min_width=320, elem_id="left"):
                 _left(parts)
             with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open") as tabs:
                 parts["tabs"] = tabs
@@ -71,7 +71,7 @@ def _left(parts: dict[str, Any]) -> None:
         parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
-        parts["brush"] = gr.Slider(2, 60, 12, step=1, label="Brush size", scale=2, min_width=140)
+        parts["brush"] = gr.Slider(2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[])
     with gr.Row():
         parts["undo"] = gr.Button("Undo", size="sm", min_width=80)
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
@@ -93,9 +93,7 @@ def _wire(context: Context) -> None:
     def pick(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session, wanted = context.session(request), read_pick(event._data)
         if wanted["tool"] == "lamp":
-            from materialist.studio.tab_light import place_lamp
-
-            place_lamp(session, *wanted["at"])
+            tab_light.place_lamp(session, *wanted["at"])
         else:
             session.pick(wanted)
         return context.everything(session)
@@ -149,13 +147,13 @@ def _wire_final(context: Context) -> None:
             for html in follow(hub.jobs, job):
                 yield {context["progress"]: html, context["stop"]: gr.update(visible=not job.over)}
             if job.state == "done":
-                session.final = (steps_now, target)
+                session.final = Final(steps_now, target, spp)
                 yield {context["stage"]: session.stage(), context["steps"]: steps(session)}
 
         return run
 
     free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
-    context["final"].click(render(SPP), None, outputs, **free)
+    context["final"].click(render(tab_take.SPP), None, outputs, **free)
     context["draft"].click(render(DRAFT_SPP), None, outputs, **free)
 
     @guarded

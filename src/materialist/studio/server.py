@@ -80,8 +80,9 @@ def serve(
     try:
         _, address, _ = page.launch(
             server_name=host, server_port=port, share=False, quiet=True, prevent_thread_lock=True, show_error=True,
-            auth=_door(password), auth_message="Any name will do; the password counts.", max_file_size=f"{uploads.MAX_MEGABYTES}mb",
-            allowed_paths=[str(hub.work.root)], blocked_paths=[], theme=_theme(gr), css=asset("style.css"),
+            auth=_door(password), auth_message="Any name will do; the password counts.",
+            max_file_size=f"{uploads.MAX_MEGABYTES}mb", allowed_paths=[], theme=_theme(gr),
+            css=asset("style.css"),
             js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
         )  # fmt: skip
         if told is not None:

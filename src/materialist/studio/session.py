@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import threading
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,22 @@ FILES = ("mask", "texture", "envmap", "mesh", "background", "file")
 """Options that name a file."""
 
 
+@dataclass(frozen=True)
+class Final:
+    """A path-traced picture."""
+
+    steps: tuple[Step, ...]
+    """The edits in it."""
+    path: Path
+    """Its files (.png, .exr, .jpg), without the ending."""
+    spp: int
+    """Paths a pixel."""
+
+    def of(self, steps: tuple[Step, ...]) -> bool:
+        """Whether it shows these edits."""
+        return bool(steps) and self.steps == steps
+
+
 class Session:
     """What one page has open. Its methods may be called from any thread."""
 
@@ -44,8 +60,7 @@ class Session:
         self._mask_urls = views.mask_urls(None)
         self.running: Job | None = None
         """The last job that this page asked for."""
-        self.final: tuple[tuple[Step, ...], Path] | None = None
-        """The steps of the last path-traced picture, and its files without their endings."""
+        self.final: Final | None = None
 
     @property
     def scene(self) -> Scene:
@@ -71,9 +86,6 @@ class Session:
             self.project, self.live = project, Live(loaded)
             if (self.desk / EDITS).is_file():
                 self.stack = Stack(tuple(_confined(step, self.desk) for step in read_recipe(self.desk / EDITS)))
-            final = self.desk / "final"
-            if final.with_suffix(".jpg").is_file() and _age(final.with_suffix(".jpg")) >= _age(self.desk / EDITS):
-                self.final = (self.stack.active, final)
 
     def close(self) -> None:
         """Give the memory back; what was done stays in the work folder."""
@@ -202,8 +214,9 @@ class Session:
             final = self.final
         if not picture:
             return shown
-        if final is not None and final[0] == steps and steps:
-            return {**shown, "picture": views.file_url(final[1].with_suffix(".jpg")), "badge": "Final"}
+        if final is not None and final.of(steps):
+            badge = f"Path traced, {final.spp} paths a pixel"
+            return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge}
         badge = "Live preview" if steps else "Photo"
         return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": badge}
 
@@ -290,7 +303,3 @@ def _confined(step: Step, desk: Path) -> Step:
         if not (desk / value).is_file():
             raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
     return replace(step, folder=desk)
-
-
-def _age(path: Path) -> float:
-    return path.stat().st_mtime if path.exists() else 0.0

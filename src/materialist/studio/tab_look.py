@@ -10,10 +10,12 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.studio import views
 from materialist.studio.context import Context
-from materialist.studio.follow import box, follow
+from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.session import Session
 from materialist.types import Array
+
+MESH = "mesh.glb"
 
 
 def layout(context: Context) -> None:
@@ -33,7 +35,7 @@ def layout(context: Context) -> None:
         parts["mesh_progress"] = gr.HTML("", js_on_load=None)
         parts["mesh"] = gr.Model3D(
             label="The mesh: drag to turn, wheel to zoom", height=380, clear_color=(0.9, 0.92, 0.94, 1.0),
-            interactive=False, visible=False, elem_id="mesh",
+            interactive=False, elem_id="mesh",
         )  # fmt: skip
 
 
@@ -54,23 +56,26 @@ def wire(context: Context) -> None:
         }
 
     @guarded
-    def mesh(request: gr.Request) -> Any:
+    def make_mesh(request: gr.Request) -> Any:
         session = context.session(request)
         _ = session.scene
         assert session.project is not None
-        file = session.desk / "mesh.glb"
-        if not file.is_file():
-            job = hub.jobs.submit(
-                "mesh", session.person, session.desk, scene=str(session.project.scene), output=str(file)
-            )
-            for html in follow(hub.jobs, job):
-                yield {parts["mesh_progress"]: html}
-            if job.state != "done":
-                return
-        yield {parts["mesh_progress"]: box(""), parts["mesh"]: gr.update(value=str(file), visible=True)}
+        file = session.desk / MESH
+        if file.is_file():
+            return
+        scene = str(session.project.scene)
+        job = hub.jobs.submit("mesh", session.person, session.desk, scene=scene, output=str(file))
+        yield from follow(hub.jobs, job)
+
+    @guarded
+    def show_mesh(request: gr.Request) -> Any:
+        file = context.session(request).desk / MESH
+        return hub.handed(file) if file.is_file() else None
 
     parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **free)
-    parts["mesh_button"].click(mesh, None, [parts["mesh_progress"], parts["mesh"]], **free)
+    # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
+    made = parts["mesh_button"].click(make_mesh, None, parts["mesh_progress"], **free)
+    made.then(show_mesh, None, parts["mesh"], **free)
 
 
 def compared(session: Session) -> tuple[Array, Array]:
@@ -80,8 +85,8 @@ def compared(session: Session) -> tuple[Array, Array]:
     live, steps = session.live, session.stack.active
     assert live is not None
     before = _bytes(live.scene.photo.linear)
-    if session.final is not None and session.final[0] == steps and steps:
-        after = cv2.imread(str(session.final[1].with_suffix(".jpg")))[..., ::-1]
+    if session.final is not None and session.final.of(steps):
+        after = cv2.imread(str(session.final.path.with_suffix(".jpg")))[..., ::-1]
         native = _bytes(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)

@@ -23,15 +23,12 @@ from materialist.studio.views import file_url
 from materialist.studio.work import Project, write_card
 
 PREDICTORS = (
-    ("Automatic: the best that is installed", "auto"),
-    ("Built in, needs nothing", "classical"),
-    ("MatNet (its weights must be there)", "matnet"),
-    ("Marigold (its weights must be there)", "marigold"),
+    ("Automatic", "auto"),
+    ("Built in", "classical"),
+    ("MatNet", "matnet"),
+    ("Marigold", "marigold"),
 )
-SIZES = (
-    (f"{side} pixels{note}", side)
-    for side, note in ((256, ": quick"), (384, ""), (512, ""), (768, ": slow"), (1024, ": slower"))
-)
+SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
 _SOURCES = {"exif": "from its EXIF data", "default": "assumed; it has no EXIF data that says"}
 
 
@@ -45,7 +42,13 @@ def layout(context: Context) -> None:
         )  # fmt: skip
         parts["facts"] = gr.HTML("", elem_id="facts", js_on_load=None)
         with gr.Row():
-            parts["predictor"] = gr.Dropdown(list(PREDICTORS), value="auto", label="First guess by", min_width=150)
+            parts["predictor"] = gr.Dropdown(
+                list(PREDICTORS),
+                value="auto",
+                label="First guess by",
+                min_width=150,
+                info="MatNet and Marigold need their weights",
+            )
             parts["size"] = gr.Dropdown(list(SIZES), value=512, label="Working size", min_width=130)
             parts["fov"] = gr.Textbox("auto", label="Field of view, degrees", max_lines=1, min_width=130)
         with gr.Row():
@@ -203,7 +206,7 @@ def _following(context: Context, session: Session, project: Project, job: Job) -
         if len(job.found) > shown:
             shown = len(job.found)
             latest = {f["found"].removeprefix("first "): f for f in job.found}
-            pictures = [(str(project.folder / f["file"]), f["found"]) for f in latest.values()]
+            pictures = [(hub.handed(project.folder / f["file"]), f["found"]) for f in latest.values()]
             update[parts["found"]] = gr.update(value=pictures, visible=True)
         yield update
     failed = job.state != "done"

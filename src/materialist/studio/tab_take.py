@@ -14,7 +14,7 @@ from materialist.studio.context import Context
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
-from materialist.studio.session import EDITS, Session
+from materialist.studio.session import EDITS, Final, Session
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -29,7 +29,7 @@ KINDS = {
     "turn": ("A video: the light goes round", ".mp4"),
 }
 """What can be taken -> its name, and the suffix of the file."""
-FRAMES, FRAME_SPP = 24, 32
+SPP, FRAMES, FRAME_SPP = 256, 24, 32
 
 
 def layout(context: Context) -> None:
@@ -74,13 +74,14 @@ def wire(context: Context) -> None:
                     return
             if what in ("png", "exr"):
                 if job is not None:
-                    session.final = (steps, session.desk / "final")
+                    session.final = Final(steps, session.desk / "final", SPP)
                 shutil.copyfile((session.desk / "final").with_suffix(file.suffix), file)
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
-            parts["download"]: gr.update(value=str(file), label=label, visible=True), parts["make_progress"]: box("Ready."),
+            parts["download"]: gr.update(value=hub.handed(file), label=label, visible=True),
+            parts["make_progress"]: box("Ready."),
             parts["stage"]: session.stage(),
-        }  # fmt: skip
+        }
 
     @guarded
     def stop(request: gr.Request) -> None:
@@ -112,10 +113,11 @@ def _asked(context: Context, session: Session, what: str, file: Path) -> Job | N
     edits, jobs = session.write_edits(), context.hub.jobs
     scene = str(session.project.scene)
     if what in ("png", "exr"):
-        if session.final is not None and session.final[0] == session.stack.active:
+        final = session.final
+        if final is not None and final.of(session.stack.active) and final.spp >= SPP:
             return None
         output = str(session.desk / "final")
-        return jobs.submit("final", session.person, session.desk, scene=scene, edits=edits, output=output)
+        return jobs.submit("final", session.person, session.desk, scene=scene, edits=edits, output=output, spp=SPP)
     more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
     return jobs.submit(
         "take", session.person, session.desk, scene=scene, edits=edits, output=str(file), what=what, **more

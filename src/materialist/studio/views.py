@@ -92,5 +92,6 @@ def _url(pixels: Array, suffix: str, kind: str) -> str:
     import cv2
 
     order = [2, 1, 0, 3][: pixels.shape[-1]]
-    data: Any = cv2.imencode(suffix, np.ascontiguousarray(pixels[..., order]), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1]
+    quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY] if suffix == ".jpg" else []
+    data: Any = cv2.imencode(suffix, np.ascontiguousarray(pixels[..., order]), quality)[1]
     return f"data:{kind};base64,{base64.b64encode(data.tobytes()).decode()}"

@@ -15,8 +15,7 @@ function show() {
   if (v.picture !== undefined && v.picture !== photo.getAttribute("src")) {
     if (v.picture) photo.src = v.picture; else { photo.removeAttribute("src"); width = 0; view.classList.add("empty"); }
   }
-  if (v.badge !== undefined) badge.textContent = v.badge;
-  if (v.shown !== undefined) view.dataset.shown = v.shown;
+  if (v.badge !== undefined) { badge.textContent = v.badge; view.dataset.kind = v.badge.startsWith("Path traced") ? "final" : "live"; }
   if (v.fill !== undefined && v.fill !== maskUrl) {
     maskUrl = v.fill;
     outline.hidden = !v.outline;
