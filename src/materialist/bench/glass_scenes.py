@@ -22,8 +22,8 @@ VESSELS = ("bowl", "coffeemug", "teapot_newell", "wineglass")
 """Meshes of the data folder that are walls around air; the protocol is about solid objects."""
 DEPTH = {"diffuse": 6, "glass": 40}
 """Path lengths of the reference pictures."""
-ENVMAP_ROWS = 64
-"""Light is brought to so many rows: suns of a few texels make caustics that no affordable picture shows cleanly."""
+ENVMAP_ROWS = {"room": 64, "envmap": 256}
+"""Light in a room is brought to few rows: small suns make caustics that no affordable picture shows cleanly."""
 BRIGHTEST = 60.0
 """Largest radiance of the light, as a multiple of its mean."""
 EXPOSED = 0.8
@@ -116,21 +116,24 @@ def _free(index: int, seed: int) -> Thing:
 
 
 class GlassScene:
-    """One object in its room, seen by a camera: maps that a photo would give, and pictures under any light."""
+    """One object, seen by a camera: maps that a photo would give, and pictures under any light.
 
-    def __init__(self, thing: Thing, size: int, seed: int = 0):
+    `background` is 'room', a floor and a wall, or 'envmap': nothing but the light, as in the paper.
+    """
+
+    def __init__(self, thing: Thing, size: int, seed: int = 0, background: str = "room"):
         from materialist.render.variant import setup
 
         self._mi = setup()
         rng = np.random.default_rng([seed, 9, *thing.name.encode()])
-        self.thing = thing
+        self.thing, self.background = thing, background
         view = _view(thing.solid, rng)
         self.to_scene = view.to_scene
         self.camera = Camera(size, size, view.fov)
         turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
         item = scenes.Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0)
         self.item = scenes.in_camera(item, view)
-        self.room = [scenes.in_camera(i, view) for i in _room(rng)]
+        self.room = [scenes.in_camera(i, view) for i in _room(rng)] if background == "room" else []
 
     @cached_property
     def front(self) -> Front:
@@ -142,6 +145,10 @@ class GlassScene:
         """The room alone."""
         from materialist.train.data.solids import joined
 
+        if not self.room:
+            size = (self.camera.height, self.camera.width)
+            normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*size, 3))
+            return Front(np.zeros(size, np.float32), normal, np.zeros(size, np.float32))
         return seen(joined([i.solid for i in self.room]), self.camera)
 
     @cached_property
@@ -150,7 +157,10 @@ class GlassScene:
         return self.front.depth > 0
 
     def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
-        """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it)."""
+        """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it).
+
+        Of 'glass' only the rectangle around the object is rendered, the rest is 0.
+        """
         mi = self._mi
         description: dict[str, Any] = {"type": "scene", **_light(mi, envmap)}
         description |= {f"room{k}": _mesh(mi, i.solid, _paint(mi, i.albedo)) for k, i in enumerate(self.room)}
@@ -158,8 +168,9 @@ class GlassScene:
             description["object"] = _mesh(mi, self.item.solid, _paint(mi, self.item.albedo))
         elif what == "glass":
             description["object"] = _mesh(mi, self.item.solid, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
-        depth = DEPTH["glass" if what == "glass" else "diffuse"]
-        return path_traced(mi, description, self.camera, depth=depth, spp=spp, seed=seed)
+        if what != "glass":
+            return path_traced(mi, description, self.camera, depth=DEPTH["diffuse"], spp=spp, seed=seed)
+        return path_traced(mi, description, self.camera, depth=DEPTH["glass"], spp=spp, seed=seed, around=self.mask)
 
 
 def seen(solid: Solid, camera: Camera) -> Front:
@@ -183,12 +194,13 @@ def seen(solid: Solid, camera: Camera) -> Front:
     )  # fmt: skip
 
 
-def environment(index: int, to_scene: Array, *, data: Path | None, seed: int = 0) -> Array:
-    """[ENVMAP_ROWS, 2 ENVMAP_ROWS, 3] light of that number in the camera frame, its peaks clipped."""
+def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int = 0) -> Array:
+    """[h, 2h, 3] light of that number in the frame of the scene's camera, its peaks clipped; h is ENVMAP_ROWS."""
     import cv2
 
-    full = lights.envmap(lights.environment(index, seed=seed, data=data), to_scene)
-    small = cv2.resize(full, (2 * ENVMAP_ROWS, ENVMAP_ROWS), interpolation=cv2.INTER_AREA)
+    full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.to_scene)
+    rows = ENVMAP_ROWS[scene.background]
+    small = full if rows == len(full) else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
     return np.minimum(small, BRIGHTEST * luminance(small).mean()).astype(np.float32)
 
 
@@ -197,15 +209,27 @@ def exposure(background: Array) -> float:
     return EXPOSED / max(float(np.percentile(luminance(background), 98)), 1e-6)
 
 
-def path_traced(mi, description: dict[str, Any], camera: Camera, *, depth: int, spp: int, seed: int) -> Array:
-    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor."""
+def path_traced(
+    mi, description: dict[str, Any], camera: Camera, *, depth: int, spp: int, seed: int, around: Array | None = None
+) -> Array:
+    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor, or of the rectangle around a mask of it."""
     from materialist.bench.synthetic import _sensor
 
-    scene = mi.load_dict({**description, "sensor": _sensor(camera)})
+    sensor, window = _sensor(camera), np.s_[:, :]
+    if around is not None:
+        rows, columns = np.flatnonzero(around.any(1)), np.flatnonzero(around.any(0))
+        window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        sensor["film"] |= {
+            "crop_offset_x": int(columns[0]), "crop_offset_y": int(rows[0]),
+            "crop_width": int(columns[-1] - columns[0] + 1), "crop_height": int(rows[-1] - rows[0] + 1),
+        }  # fmt: skip
+    scene = mi.load_dict({**description, "sensor": sensor})
     integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 64})
     side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
     picture = np.array(mi.render(scene, integrator=integrator, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
-    return np.nan_to_num(picture).astype(np.float32)
+    whole = np.zeros((camera.height, camera.width, 3), np.float32)
+    whole[window] = np.nan_to_num(picture)
+    return whole
 
 
 def _room(rng: np.random.Generator) -> list[scenes.Item]:

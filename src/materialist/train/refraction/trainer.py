@@ -14,8 +14,8 @@ from torch import Tensor
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
-from materialist.predict.refraction.crop import MASK
-from materialist.predict.refraction.network import RefractionNet
+from materialist.predict.refraction.crop import MASK, SIDE
+from materialist.predict.refraction.network import STRIDE, RefractionNet
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
 from materialist.train.refraction import lessons
@@ -48,8 +48,12 @@ class Recipe:
     logarithm: float = 0.3
     """Weight of the difference of logarithms beside that of the lengths."""
     bfloat16: bool = False
+    side: int = SIDE
+    """Pixels on a side of the views: smaller ones train faster, and most can be learnt on them."""
 
     def __post_init__(self) -> None:
+        if self.side < STRIDE or self.side > SIDE or self.side % STRIDE:
+            raise InputError(f"The side is {self.side} pixels; give a multiple of {STRIDE} up to {SIDE}.")
         if self.batch < 1 or not 0 < self.rate < 1:
             raise InputError(f"batch is {self.batch}, the rate {self.rate:g}; give at least 1, and between 0 and 1.")
 
@@ -135,7 +139,7 @@ class Trainer:
             if len(order) < size:
                 order = np.resize(order, size)
             for k in range(0, len(order) - size + 1, size):
-                yield prepared(views, order[k : k + size], rng)
+                yield prepared(views, order[k : k + size], rng, self.recipe.side)
 
     def _step(self, batch: dict[str, Tensor]) -> dict[str, float]:
         recipe = self.recipe
@@ -157,7 +161,7 @@ class Trainer:
         return {"loss": loss.item(), **{k: v.item() for k, v in terms.items()}}
 
 
-def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator) -> dict[str, Tensor]:
+def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator, side: int = SIDE) -> dict[str, Tensor]:
     """A batch: maps [B, C, S, S] and target [B, 2, S, S] float32, hollow [B]; mirrored and recoloured at random."""
     maps, target = views["maps"][chosen].astype(np.float32), views["target"][chosen].astype(np.float32)
     flip = rng.random(len(chosen)) < 0.5
@@ -167,7 +171,19 @@ def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator) -
     inside = maps[:, MASK : MASK + 1]
     maps[:, :3] = (np.clip((maps[:, :3] + 0.5 * inside)[:, order] * gain, 0, 1) - 0.5) * inside
     hollow = torch.from_numpy(views["hollow"][chosen].astype(np.float32))
+    if side != SIDE:
+        maps, target = _smaller(maps, target, side)
     return {"maps": torch.from_numpy(maps), "target": torch.from_numpy(target), "hollow": hollow}
+
+
+def _smaller(maps: Array, target: Array, side: int) -> tuple[Array, Array]:
+    """Both at side x side pixels: means over what is known, a pixel is inside where half of it is."""
+    small = lambda x: torch.nn.functional.interpolate(torch.from_numpy(x), (side, side), mode="area").numpy()  # noqa: E731
+    shares = [small(np.ascontiguousarray(w, np.float32)) for w in (maps[:, MASK : MASK + 1], target[:, :1] > 0)]
+    inside = [share > 0.5 for share in shares]
+    means = [small(x) / np.maximum(share, 1e-6) * i for x, share, i in zip((maps, target), shares, inside)]
+    means[0][:, MASK] = inside[0][:, 0]
+    return means[0], means[1]
 
 
 def losses(found: Tensor, batch: dict[str, Tensor], recipe: Recipe) -> dict[str, Tensor]:

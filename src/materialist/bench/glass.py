@@ -1,0 +1,227 @@
+"""`bench glass`: how close an object made glass comes to the same object truly of glass.
+
+The paper's protocol (section "Evaluation of Transparency Editing", and "Sensitivity Analysis of d"): a grey diffuse
+object is seen; its glass is predicted from what is seen of it, and compared with a path-traced dielectric within the
+object's mask. Symmetric and asymmetric objects, the true background or one inpainted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist import metrics
+from materialist.bench import glass_models as models
+from materialist.bench import glass_scenes as scenes
+from materialist.bench.glass_models import Background
+from materialist.bench.report import Column, Report, write
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError
+from materialist.types import Array
+
+COLUMNS = (
+    Column("psnr_symmetric", "PSNR symmetric", "higher", 2),
+    Column("psnr_asymmetric", "PSNR asymmetric", "higher", 2),
+    Column("ssim_symmetric", "SSIM symmetric", "higher"),
+    Column("ssim_asymmetric", "SSIM asymmetric", "higher"),
+    Column("lpips_symmetric", "LPIPS symmetric", "lower"),
+    Column("lpips_asymmetric", "LPIPS asymmetric", "lower"),
+    Column("thickness_symmetric", "d error symmetric", "lower"),
+    Column("thickness_asymmetric", "d error asymmetric", "lower"),
+)
+NOTE = (
+    "Within the object's mask only, on sRGB-encoded pictures at the exposure of the photo; truth is a path-traced "
+    "dielectric. True depth and normals of the visible side, true light. `d` says where the thickness comes from, its "
+    "error is mean absolute over mean true thickness; `noise` multiplies the predicted d by 1 + e, e uniform in "
+    "[-0.5, 0.5], one e a draw. `background alone` shows the background without any refraction. The inpainted "
+    "background is Telea's, in the continued planes of the visible room. LPIPS only where the package and its weights "
+    "are installed."
+)
+NOISE = 0.5
+"""Largest relative error of the thickness in the sensitivity test (paper, eq. ablation_d)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One object under one light with one index of refraction."""
+
+    scene: scenes.GlassScene
+    envmap: Array
+    photo: Array
+    """[H, W, 3] linear radiance, the object grey."""
+    truth: Array
+    """[H, W, 3] linear radiance, the object glass."""
+    gain: float
+    """Exposure of all pictures of the case."""
+    ior: float
+    name: str
+
+
+def run(
+    *, data: Path | None, output: Path, shapes: int = 2, envmaps: int = 2, iors: str | float = "1.1,1.3",
+    background: str = "room", size: int = 128, spp: int = 144, full: bool = False, draws: int = 10, pictures: int = 6,
+    seed: int = 0, device: str = "auto",
+) -> None:  # fmt: skip
+    """Compare the two-interface model and the closed proxy with true glass.
+
+    `shapes` objects of each group, each under `envmaps` lights with each of `iors` (comma-separated); `full` is the
+    paper's 20 objects x 30 lights x 1.1 and 1.3. `background` is 'room', a patterned floor and wall, or 'envmap',
+    nothing but the light. `draws` noisy thicknesses a case; `pictures` cases are drawn.
+    """
+    from materialist.render.variant import setup
+
+    refraction = [float(x) for x in str(iors).split(",")]
+    if full:
+        shapes, envmaps, refraction = 10, 30, [1.1, 1.3]
+    if min(shapes, envmaps, spp) < 1 or size < 32 or not all(1 < x <= 3 for x in refraction):
+        raise InputError(
+            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, size {size}, iors {iors}: give at least 1, 1, 1, 32 "
+            "pixels, and indices of refraction above 1 up to 3."
+        )
+    if background not in scenes.ENVMAP_ROWS:
+        raise InputError(f"The background is {background!r}; choose room or envmap.")
+    setup(device)
+    rows: list[dict[str, Any]] = []
+    drawn: list[Array] = []
+    settings = {"data": None if data is None else str(data), "shapes": shapes, "envmaps": envmaps, "iors": str(iors),
+                "background": background, "size": size, "spp": spp, "seed": seed}  # fmt: skip
+    report = Report("Glass", NOTE, settings, COLUMNS, rows, plotted=("psnr_symmetric", "psnr_asymmetric"))
+    options: dict[str, Any] = {"background": background, "size": size, "spp": spp, "seed": seed}
+    for case, room in cases(data, shapes, envmaps, refraction, **options):
+        found, strip = compared(case, room, spp=spp, draws=draws, seed=seed)
+        rows.extend(found)
+        if len(drawn) < pictures:
+            drawn.append(strip)
+            _draw(drawn, output / "sheet.png")
+        write(report, output)  # what is there already is worth having when a long run is stopped
+
+
+def cases(
+    data: Path | None, shapes: int, envmaps: int, iors: list[float], *, background: str, size: int, spp: int, seed: int
+) -> Iterator[tuple[Case, Array]]:
+    """Every case with the picture [H, W, 3] of its room without the object."""
+    for k, thing in enumerate(scenes.things(data, shapes, seed)):
+        scene = scenes.GlassScene(thing, size, seed, background)
+        for j in range(envmaps):
+            envmap = scenes.environment(k * envmaps + j, scene, data=data, seed=seed)
+            room = scene.render(envmap, "room", spp=spp, seed=1)
+            photo = scene.render(envmap, "diffuse", spp=spp, seed=2)
+            for ior in iors:
+                truth = scene.render(envmap, "glass", ior=ior, spp=2 * spp, seed=3)
+                name = f"{thing.name} light {j} ior {ior:g}"
+                yield Case(scene, envmap, photo, truth, scenes.exposure(room), ior, name), room
+
+
+def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tuple[list[dict[str, Any]], Array]:
+    """The rows of all methods for one case, and a strip of pictures."""
+    scene, shown = case.scene, {}
+    seen = np.clip(case.photo * case.gain, 0, 1)
+    behind = {
+        "true": models.true_background(scene, room),
+        "inpainted": models.inpainted_background(scene, case.photo),
+    }
+    d = models.thicknesses(scene, seen)
+    best = "predicted" if "predicted" in d else "symmetry"
+    rows = []
+
+    def add(method: str, picture: Array, thickness: Array | None = None) -> None:
+        rows.append({"method": method, "sample": case.name, **figures(case, picture, thickness)})
+        shown[method] = picture
+
+    for kind, background in behind.items():
+        add(f"background alone, {kind}", models.plain_background(scene, background))
+    for model in (_two_interface, _closed):
+        for source, thickness in d.items():
+            add(f"{model.__name__[1:]}, {source} d", model(case, thickness, behind["true"], spp), thickness)
+        name = f"{model.__name__[1:]}, {best} d, inpainted"
+        add(name, model(case, d[best], behind["inpainted"], spp), d[best])
+    same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
+    add(f"two_interface, {best} d, back normal = front normal", same, d[best])
+    rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
+    order = ("two_interface, true d", f"two_interface, {best} d", f"closed, {best} d", f"closed, {best} d, inpainted")
+    return rows, _strip(case, room, [shown[name] for name in order])
+
+
+def _two_interface(case: Case, thickness: Array, behind: Background, spp: int) -> Array:
+    return models.two_interface(case.scene, thickness, behind, case.envmap, case.ior)
+
+
+def _closed(case: Case, thickness: Array, behind: Background, spp: int) -> Array:
+    return models.closed_proxy(case.scene, thickness, behind, case.envmap, case.ior, spp=spp)
+
+
+Model = Callable[[Case, Array, Background, int], Array]
+
+
+def sensitivity(case: Case, d: Array, behind: Background, *, draws: int, seed: int) -> list[dict[str, Any]]:
+    """Rows of the two-interface model with thickness d (1 + e) (paper, Sensitivity Analysis of d)."""
+    rng = np.random.default_rng([seed, 10, *case.name.encode()])
+    rows = []
+    for k in range(draws):
+        noisy = d * (1 + rng.uniform(-NOISE, NOISE))
+        picture = _two_interface(case, noisy, behind, 1)
+        row = {"method": "two_interface, noise on d", "sample": f"{case.name} draw {k}"}
+        rows.append({**row, **figures(case, picture, noisy)})
+    return rows
+
+
+def figures(case: Case, picture: Array, thickness: Array | None) -> dict[str, float]:
+    """The figures of a picture [H, W, 3] inside the mask, named by the object's group."""
+    mask, group = case.scene.mask, case.scene.thing.group
+    truth = case.truth * case.gain
+    # Outside the mask both are the truth, so that windows that reach over its border compare equals.
+    inside = np.where(mask[..., None], picture * case.gain, truth)
+    found = {"psnr": metrics.psnr(inside, truth, mask=mask), "ssim": masked_ssim(inside, truth, mask)}
+    if (distance := _lpips(inside, truth, mask)) is not None:
+        found["lpips"] = distance
+    if thickness is not None:
+        true = case.scene.front.thickness
+        found["thickness"] = float(np.abs(thickness - true)[mask].sum() / true[mask].sum())
+    return {f"{name}_{group}": value for name, value in found.items()}
+
+
+def masked_ssim(a: Array, b: Array, mask: Array) -> float:
+    """SSIM of linear pictures [H, W, 3] on their sRGB encoding, its map averaged over the mask [H, W]."""
+    from skimage.metrics import structural_similarity
+
+    options: dict[str, Any] = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
+    _, each = structural_similarity(
+        linear_to_srgb(a), linear_to_srgb(b), data_range=1, channel_axis=-1, full=True, **options
+    )
+    return float(each[mask].mean())
+
+
+def _lpips(a: Array, b: Array, mask: Array) -> float | None:
+    from materialist.bench.materials import lpips
+
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return lpips(a[window], b[window])
+
+
+def _strip(case: Case, room: Array, pictures: list[Array]) -> Array:
+    """[H, n W, 3] sRGB: the photo, the truth, and predictions, each before the true room."""
+    inside = case.scene.mask[..., None]
+    shown = [case.photo, *(np.where(inside, p, room) for p in (case.truth, *pictures))]
+    return np.concatenate([linear_to_srgb(p * case.gain) for p in shown], 1)
+
+
+def _draw(strips: list[Array], path: Path) -> None:
+    """The strips as one picture with a line of headings."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    titles = ("photo", "true glass", "two-interface, true d", "two-interface", "closed proxy", "closed, inpainted")
+    wide = strips[0].shape[1] // len(titles)
+    figure = Figure(figsize=(1.5 * len(titles), 1.5 * len(strips) + 0.2), dpi=110)
+    FigureCanvasAgg(figure)
+    axis = figure.add_axes((0, 0, 1, 1 - 0.2 / figure.get_figheight()))
+    axis.imshow(np.concatenate(strips))
+    axis.axis("off")
+    for k, title in enumerate(titles):
+        axis.text((k + 0.5) * wide, -4, title, ha="center", va="bottom", fontsize=8)
+    figure.savefig(path)
