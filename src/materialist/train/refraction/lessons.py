@@ -70,6 +70,11 @@ def views(index: int, plan: Plan) -> dict[str, Array]:
     }
 
 
+def count(folder: Path) -> int:
+    """How many shapes of a set are there."""
+    return sum(1 for _ in folder.glob("[0-9]*.npz"))
+
+
 def load(folder: Path) -> dict[str, Array]:
     """All views of a set, as `views` has them. Raises InputError when FOLDER holds no set."""
     files = sorted(folder.glob("[0-9]*.npz"))

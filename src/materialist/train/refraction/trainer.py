@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
@@ -48,8 +49,10 @@ class Recipe:
     logarithm: float = 0.3
     """Weight of the difference of logarithms beside that of the lengths."""
     bfloat16: bool = False
-    side: int = SIDE
-    """Pixels on a side of the views: smaller ones train faster, and most can be learnt on them."""
+    side: int = 64
+    """Pixels on a side of the views at first: smaller ones train faster, and most can be learnt on them."""
+    full_size: float = 0.7
+    """Part of the run after which views have their full SIDE."""
 
     def __post_init__(self) -> None:
         if self.side < STRIDE or self.side > SIDE or self.side % STRIDE:
@@ -73,7 +76,9 @@ class Trainer:
         self.network = RefractionNet()
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
         r = self.recipe
-        self.optimizer = torch.optim.AdamW(self.network.parameters(), r.rate, (0.9, 0.98), weight_decay=r.weight_decay)
+        self.optimizer = torch.optim.AdamW(
+            self.network.parameters(), r.rate, (0.9, 0.98), weight_decay=r.weight_decay, fused=True
+        )
         self.clock, self.epoch = Clock(budget), 0
         exists = (folder / checkpoint.NAME).is_file()
         if exists and not resume:
@@ -84,6 +89,8 @@ class Trainer:
             self.network.load_state_dict(state["network"])
             self.averaged.load_state_dict(state["averaged"])
             self.optimizer.load_state_dict(state["optimizer"])
+            for group in self.optimizer.param_groups:
+                group["fused"] = True
             self.epoch, self.clock = state["epoch"], Clock(budget, step=state["step"], seconds=state["seconds"])
 
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
@@ -130,16 +137,19 @@ class Trainer:
 
     def _batches(self) -> Iterator[dict[str, Tensor]]:
         """Epoch after epoch over the views that are there, in random order, every other one mirrored."""
+        known, side, views = -1, 0, {}
         while True:
-            # Read anew each time: a set that is still being made grows.
-            views = lessons.load(self.data)
+            wanted = SIDE if self.clock.progress >= self.recipe.full_size else self.recipe.side
+            if (lessons.count(self.data), wanted) != (known, side):  # a set that is still being made grows
+                known, side = lessons.count(self.data), wanted
+                views = smaller(lessons.load(self.data), side)
             self.epoch += 1
             rng = np.random.default_rng([self.seed, self.epoch])
             order, size = rng.permutation(len(views["maps"])), self.recipe.batch
             if len(order) < size:
                 order = np.resize(order, size)
             for k in range(0, len(order) - size + 1, size):
-                yield prepared(views, order[k : k + size], rng, self.recipe.side)
+                yield prepared(views, order[k : k + size], rng)
 
     def _step(self, batch: dict[str, Tensor]) -> dict[str, float]:
         recipe = self.recipe
@@ -156,12 +166,11 @@ class Trainer:
         self.clock.step += 1
         decay = min(recipe.ema, (1 + self.clock.step) / (10 + self.clock.step))
         with torch.no_grad():
-            for mine, theirs in zip(self.averaged.parameters(), self.network.parameters(), strict=True):
-                mine.lerp_(theirs, 1 - decay)
+            torch._foreach_lerp_(list(self.averaged.parameters()), list(self.network.parameters()), 1 - decay)
         return {"loss": loss.item(), **{k: v.item() for k, v in terms.items()}}
 
 
-def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator, side: int = SIDE) -> dict[str, Tensor]:
+def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator) -> dict[str, Tensor]:
     """A batch: maps [B, C, S, S] and target [B, 2, S, S] float32, hollow [B]; mirrored and recoloured at random."""
     maps, target = views["maps"][chosen].astype(np.float32), views["target"][chosen].astype(np.float32)
     flip = rng.random(len(chosen)) < 0.5
@@ -171,19 +180,25 @@ def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator, s
     inside = maps[:, MASK : MASK + 1]
     maps[:, :3] = (np.clip((maps[:, :3] + 0.5 * inside)[:, order] * gain, 0, 1) - 0.5) * inside
     hollow = torch.from_numpy(views["hollow"][chosen].astype(np.float32))
-    if side != SIDE:
-        maps, target = _smaller(maps, target, side)
     return {"maps": torch.from_numpy(maps), "target": torch.from_numpy(target), "hollow": hollow}
 
 
-def _smaller(maps: Array, target: Array, side: int) -> tuple[Array, Array]:
-    """Both at side x side pixels: means over what is known, a pixel is inside where half of it is."""
-    small = lambda x: torch.nn.functional.interpolate(torch.from_numpy(x), (side, side), mode="area").numpy()  # noqa: E731
-    shares = [small(np.ascontiguousarray(w, np.float32)) for w in (maps[:, MASK : MASK + 1], target[:, :1] > 0)]
-    inside = [share > 0.5 for share in shares]
-    means = [small(x) / np.maximum(share, 1e-6) * i for x, share, i in zip((maps, target), shares, inside)]
-    means[0][:, MASK] = inside[0][:, 0]
-    return means[0], means[1]
+def smaller(views: dict[str, Array], side: int, at_a_time: int = 256) -> dict[str, Array]:
+    """Views at side x side pixels: means over what is known; a pixel is inside where half of it is."""
+    if side == views["maps"].shape[-1]:
+        return views
+    count = len(views["maps"])
+    result = {name: np.empty((*views[name].shape[:2], side, side), np.float16) for name in ("maps", "target")}
+    shrink = lambda x: F.interpolate(torch.from_numpy(x), (side, side), mode="area").numpy()  # noqa: E731
+    for k in range(0, count, at_a_time):
+        part = slice(k, k + at_a_time)
+        maps, target = views["maps"][part].astype(np.float32), views["target"][part].astype(np.float32)
+        for name, values, weight in (
+            ("maps", maps, maps[:, MASK : MASK + 1]), ("target", target, (target[:, :1] > 0).astype(np.float32))
+        ):  # fmt: skip
+            share = shrink(np.ascontiguousarray(weight))
+            result[name][part] = np.where(share > 0.5, shrink(values) / np.maximum(share, 1e-6), 0)
+    return {**result, "hollow": views["hollow"]}
 
 
 def losses(found: Tensor, batch: dict[str, Tensor], recipe: Recipe) -> dict[str, Tensor]:

@@ -1,0 +1,104 @@
+"""The benchmark of glass: its scenes are what they claim, its figures look inside the mask alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from materialist import bench
+from materialist.bench import glass, shapes
+from materialist.bench import glass_models as models
+from materialist.bench import glass_scenes as scenes
+from materialist.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def scene(mitsuba):
+    return scenes.GlassScene(scenes.things(None, 1)[0], 40)
+
+
+def test_closed_meshes_are_told_from_open_ones():
+    assert scenes.is_closed(shapes.box(np.ones(3))) and scenes.is_closed(shapes.capsule(0.2, 0.3))
+    box = shapes.box(np.ones(3))
+    assert not scenes.is_closed(shapes.Solid(box.vertices, box.faces[1:], box.normals, box.uv))
+    assert all(scenes.is_closed(thing.solid) for thing in scenes.things(None, 4))
+
+
+def test_groups_are_as_symmetric_as_they_say():
+    for thing in scenes.things(None, 4):
+        z = thing.solid.vertices[:, 2]
+        if thing.group == "symmetric":
+            assert z.min() == pytest.approx(-z.max(), rel=0.02)
+
+
+def test_the_views_maps_belong_together(scene):
+    front, behind, mask = scene.front, scene.behind, scene.mask
+    assert 0.05 < mask.mean() < 0.6
+    assert (behind.depth[mask] > front.depth[mask]).all()  # the object stands before its room
+    assert (front.thickness[mask] > 0).all() and (front.thickness[~mask] == 0).all()
+    assert (np.sum(front.normal * [0, 0, 1], -1) > -0.6).all()
+    assert scene.camera.width == 40
+
+
+def test_without_refraction_both_models_show_the_background(scene, mitsuba):
+    envmap = np.full((16, 32, 3), 0.5, np.float32)
+    room = scene.render(envmap, "room", spp=64)
+    behind = models.true_background(scene, room)
+    mask = scene.mask
+    for picture in (
+        models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6),
+        models.closed_proxy(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-4, spp=16),
+    ):
+        assert np.abs(picture - room)[mask].mean() < 0.03 * room[mask].mean()
+        assert (picture[~mask] == 0).all()
+
+
+def test_the_hole_is_filled_and_its_surroundings_stay(scene):
+    photo = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
+    found = models.inpainted_background(scene, photo)
+    mask = scene.mask
+    near = np.zeros_like(mask)
+    near[1:-1, 1:-1] = mask[2:, 1:-1] | mask[:-2, 1:-1] | mask[1:-1, 2:] | mask[1:-1, :-2] | mask[1:-1, 1:-1]
+    near |= np.roll(near, 1, 0) | np.roll(near, -1, 0) | np.roll(near, 1, 1) | np.roll(near, -1, 1)
+    assert np.array_equal(found.picture[~near], photo[~near])
+    assert np.isfinite(found.picture).all()
+    # The planes of floor and wall go on behind the object.
+    error = np.abs(found.depth - scene.behind.depth)[mask] / scene.behind.depth[mask]
+    assert np.median(error) < 0.02
+
+
+def test_figures_look_inside_the_mask_alone(scene):
+    truth = np.random.default_rng(1).random((40, 40, 3)).astype(np.float32)
+    case = glass.Case(scene, np.ones((8, 16, 3)), truth, truth, 0.5, 1.3, "case")
+    outside = np.where(scene.mask[..., None], truth, 0)
+    found = glass.figures(case, outside, scene.front.thickness * 1.5)
+    assert found["psnr_symmetric"] == np.inf and found["ssim_symmetric"] == pytest.approx(1)
+    assert found["thickness_symmetric"] == pytest.approx(0.5, rel=1e-4)
+    worse = glass.figures(case, outside * 0.8, None)
+    assert worse["psnr_symmetric"] < 30 and worse["ssim_symmetric"] < 1 and "thickness_symmetric" not in worse
+
+
+def test_noise_on_the_thickness_is_drawn_as_often_as_asked(scene, mitsuba):
+    envmap = np.full((16, 32, 3), 0.5, np.float32)
+    room = scene.render(envmap, "room", spp=4)
+    case = glass.Case(scene, envmap, room, room, 1.0, 1.3, "case")
+    rows = glass.sensitivity(case, scene.front.thickness, models.true_background(scene, room), draws=3, seed=0)
+    errors = [row["thickness_symmetric"] for row in rows]
+    assert len(set(errors)) == 3 and max(errors) <= 0.5
+
+
+@pytest.mark.slow
+def test_the_whole_benchmark_runs(tmp_path):
+    folder = bench.run(
+        "glass", output=tmp_path / "report", shapes=1, envmaps=1, iors="1.2", size=32, spp=4, draws=1, pictures=1
+    )
+    report = json.loads((folder / "report.json").read_text())
+    assert {"closed, true d", "two_interface, true d"} <= report["means"].keys()
+    assert (folder / "sheet.png").is_file()
+
+
+def test_bad_options_are_refused(tmp_path):
+    with pytest.raises(InputError, match="indices of refraction"):
+        bench.run("glass", output=tmp_path / "a", iors="0.9")
+    with pytest.raises(InputError, match="choose room or envmap"):
+        bench.run("glass", output=tmp_path / "b", background="sea")

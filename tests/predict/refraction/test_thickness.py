@@ -1,0 +1,129 @@
+"""From maps of a photo to thickness: the window around the object, what the network sees, what comes back."""
+
+import numpy as np
+import pytest
+import torch
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError, WeightsError
+from materialist.geometry.symmetry import symmetric_thickness
+from materialist.predict.refraction import WEIGHTS, thickness, weights
+from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, SIDE, Window, features
+from materialist.predict.refraction.network import LEAST, Architecture, RefractionNet
+from materialist.types import Camera
+
+SMALL = Architecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
+
+
+def ball(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
+    """Photo, mask, normal, depth and true thickness of a ball."""
+    rays = pixel_rays(camera).astype(float)
+    length = np.linalg.norm(rays, axis=-1)
+    d, centre = rays / length[..., None], np.asarray(centre)
+    b = d @ centre
+    square = b**2 - centre @ centre + radius**2
+    mask = square > 0
+    chord = np.sqrt(np.maximum(square, 0))
+    point = d * (b - chord)[..., None]
+    normal = np.where(mask[..., None], (point - centre) / radius, [0, 0, 1])
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    photo = np.clip(np.where(mask[..., None], 0.3 + 0.4 * normal[..., 1:2], 0.2), 0, 1) * np.ones(3)
+    return photo, mask, normal, np.where(mask, -point[..., 2], 5.0), np.where(mask, 2 * chord, 0)
+
+
+@pytest.fixture
+def plain(tmp_path):
+    """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
+    torch.manual_seed(0)
+    weights.save(tmp_path / "plain.safetensors", RefractionNet(SMALL), {"step": 0})
+    return tmp_path / "plain.safetensors"
+
+
+@pytest.mark.parametrize("size", [(70, 64), (260, 300)])
+def test_an_untrained_network_gives_the_symmetry_prior(plain, size):
+    camera = Camera(size[1], size[0], 45)
+    photo, mask, normal, depth, _ = ball(camera)
+    found = thickness(photo, mask, normal, depth, camera, weights=plain)
+    mirror = symmetric_thickness(depth, normal, mask, camera)
+    step = LEAST * np.sqrt(mask.sum()) * np.median(depth[mask]) / camera.focal
+    assert np.abs(found.solid - mirror - step)[mask].mean() < 0.12 * mirror[mask].mean()
+    np.testing.assert_allclose(found.hollow[mask], found.solid[mask] / 2, rtol=1e-4)
+    assert found.solid.shape == mask.shape and found.solid.dtype == np.float32
+    assert (found.solid[~mask] == 0).all() and (found.hollow[~mask] == 0).all()
+
+
+def test_thickness_is_in_scene_units(plain):
+    camera = Camera(80, 80, 45)
+    photo, mask, normal, depth, _ = ball(camera)
+    one, ten = (thickness(photo, mask, normal, s * depth, camera, weights=plain).solid for s in (1, 10))
+    np.testing.assert_allclose(ten, 10 * one, rtol=1e-3, atol=1e-4)
+
+
+def test_features_do_not_depend_on_place_or_scale():
+    views = []
+    for centre, fov in (((0.0, 0, -3), 45), ((0.0, 0, -3), 60)):
+        camera = Camera(200, 200, fov)
+        photo, mask, normal, depth, _ = ball(camera, centre)
+        window = Window.around(mask)
+        views.append(features(window.cut(photo, mask, normal, depth, pixel_rays(camera))))
+    a, b = views
+    assert a.shape == (CHANNELS, SIDE, SIDE)
+    both = (a[MASK] > 0) & (b[MASK] > 0)
+    assert both.mean() > 0.5 and np.mean(a[MASK] != b[MASK]) < 0.03
+    inner = both & (a[7] > 0.4)
+    for channel in range(3, CHANNELS):
+        np.testing.assert_allclose(a[channel][inner].mean(), b[channel][inner].mean(), atol=0.05)
+    assert np.abs(a[3] + a[3][:, ::-1])[both & both[:, ::-1]].mean() < 0.03  # straight ahead: x is odd
+
+
+def test_windows_reach_over_the_border_and_come_back():
+    inside = np.zeros((60, 40), bool)
+    inside[30:60, 0:12] = True
+    window = Window.around(inside)
+    assert window.left < 0 and window.top + window.side > 60
+    values = np.add.outer(np.arange(60.0), 0.1 * np.arange(40.0)).astype(np.float32) + 5
+    maps = np.repeat(values[..., None], 3, -1)
+    view = window.cut(maps, inside, maps, values, pixel_rays(Camera(40, 60, 40)))
+    back = window.put_back(view.depth, view.inside, inside)
+    np.testing.assert_allclose(back[32:58, 1:11], values[32:58, 1:11], rtol=0.02)
+    assert (back[~inside] == 0).all()
+    # The rays of the window are those of the camera, also beyond its border.
+    rays = pixel_rays(Camera(40, 60, 40))
+    step = rays[0, 1, 0] - rays[0, 0, 0]
+    assert view.rays[0, 0, 0] == pytest.approx(
+        rays[0, 0, 0] + step * (window.left - 0.5 + window.side / SIDE / 2), abs=1e-5
+    )
+
+
+def test_bad_input_is_refused(plain, tmp_path):
+    camera = Camera(48, 48, 45)
+    photo, mask, normal, depth, _ = ball(camera)
+    with pytest.raises(InputError, match="covers no surface"):
+        thickness(photo, 0 * mask, normal, depth, camera, weights=plain)
+    with pytest.raises(InputError, match="photo has shape"):
+        thickness(photo[1:], mask, normal, depth, camera, weights=plain)
+    with pytest.raises(WeightsError, match="no weights of RefractionNet"):
+        thickness(photo, mask, normal, depth, camera, weights=tmp_path / "none.safetensors")
+    (tmp_path / "odd.safetensors").write_bytes(plain.read_bytes()[:2000])
+    with pytest.raises(WeightsError):
+        thickness(photo, mask, normal, depth, camera, weights=tmp_path / "odd.safetensors")
+
+
+def test_the_network_is_bounded_and_zero_outside():
+    torch.manual_seed(2)
+    network = RefractionNet(SMALL)
+    torch.nn.init.normal_(network.head.weight, std=3)
+    maps = torch.rand(2, CHANNELS, 64, 64)
+    maps[:, MASK] = (maps[:, MASK] > 0.5).float()
+    solid, hollow = network(maps).unbind(1)
+    assert (solid[maps[:, MASK] == 0] == 0).all() and (hollow <= solid).all()
+    assert (solid <= (maps[:, MIRROR] + LEAST) * np.exp(3.001)).all()
+
+
+@pytest.mark.skipif(not WEIGHTS.is_file(), reason="this checkout has no weights of RefractionNet")
+def test_the_shipped_weights_know_a_ball():
+    camera = Camera(160, 160, 40)
+    photo, mask, normal, depth, true = ball(camera)
+    found = thickness(photo, mask, normal, depth, camera)
+    assert np.abs(found.solid - true)[mask].sum() < 0.25 * true[mask].sum()
+    assert WEIGHTS.stat().st_size < 6e6

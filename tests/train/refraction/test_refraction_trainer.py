@@ -1,0 +1,91 @@
+"""The trainer of RefractionNet, on two shapes."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from materialist.cli import app
+from materialist.errors import InputError, OutputError
+from materialist.predict.refraction import weights
+from materialist.predict.refraction.crop import MASK, MIRROR, SIDE
+from materialist.train.budget import Budget
+from materialist.train.refraction import lessons, scores, trainer
+from materialist.train.refraction.trainer import Recipe, Trainer
+
+RECIPE = Recipe(batch=4, warm_up=1, side=32, rate=1e-3)
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lessons")
+    lessons.produce(folder, lessons.Plan(shapes=2, views=3))
+    return folder
+
+
+def test_it_learns_resumes_and_leaves_weights(views, tmp_path):
+    run = tmp_path / "run"
+    torch.manual_seed(0)
+    Trainer(run, views, views, budget=Budget(steps=3), recipe=RECIPE).run()
+    with pytest.raises(OutputError, match="holds a run already"):
+        Trainer(run, views, None, budget=Budget(steps=1), recipe=RECIPE)
+    resumed = Trainer(run, views, views, budget=Budget(steps=3), recipe=RECIPE, resume=True)
+    assert resumed.clock.step == 3
+    figures = resumed.run()
+    assert figures.keys() >= {"solid", "symmetry", "hollow"}
+    network, facts = weights.load(run / "weights.safetensors")
+    assert facts["step"] == 6 and facts["recipe"]["batch"] == 4
+    again = scores.score(network, lessons.load(views))
+    assert again["solid"] == pytest.approx(figures["solid"], rel=1e-2)
+    assert len((run / "scores.jsonl").read_text().splitlines()) == 2
+
+
+def test_the_loss_falls(views):
+    torch.manual_seed(1)
+    batch = trainer.prepared(trainer.smaller(lessons.load(views), 32), np.arange(6), np.random.default_rng(0))
+    network = trainer.RefractionNet()
+    optimizer = torch.optim.Adam(network.parameters(), 2e-3)
+    history = []
+    for _ in range(12):
+        loss = sum(trainer.losses(network(batch["maps"]), batch, RECIPE).values())
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        history.append(loss.item())
+    assert history[-1] < 0.8 * history[0]
+
+
+def test_smaller_views_keep_their_thickness(views):
+    full = lessons.load(views)
+    rng = np.random.default_rng
+    a, b = (trainer.prepared(trainer.smaller(full, side), np.arange(6), rng(0)) for side in (SIDE, 32))
+    assert b["maps"].shape[-1] == b["target"].shape[-1] == 32
+    for name, channel in (("maps", MIRROR), ("target", 0)):
+        mean = [(x[name][:, channel] * x["maps"][:, MASK]).sum() / x["maps"][:, MASK].sum() for x in (a, b)]
+        assert mean[0].item() == pytest.approx(mean[1].item(), rel=0.06)
+
+
+def test_relative_errors():
+    truth = np.ones((2, 4, 4))
+    inside = np.zeros((2, 4, 4), bool)
+    inside[:, 1:3] = True
+    assert scores.relative_error(truth * [[[1.5]], [[1.0]]], truth, inside).tolist() == [0.5, 0]
+    mixed = np.where(np.arange(4) < 2, 2.0, 0.01) * truth
+    assert scores.pixel_error(mixed * 1.25, mixed, inside).tolist() == pytest.approx([0.25, 0.25])
+
+
+def test_bad_recipes_are_refused():
+    with pytest.raises(InputError, match="side is 40"):
+        Recipe(side=40)
+    with pytest.raises(InputError, match="batch is 0"):
+        Recipe(batch=0)
+
+
+def test_the_command_makes_views(tmp_path):
+    options = ["--shapes", "1", "--views", "1", "--heldout", "1", "--data-only", "--json"]
+    result = CliRunner().invoke(app, ["train", "refraction", "-o", str(tmp_path / "run"), *options])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout.splitlines()[-1])["data"].endswith("views")
+    assert (tmp_path / "run" / "views" / "train" / "00000.npz").is_file()

@@ -1,0 +1,94 @@
+"""Shapes and views that RefractionNet learns from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from materialist.errors import InputError
+from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, SIDE
+from materialist.train.data import solids
+from materialist.train.refraction import lessons, view
+from materialist.train.refraction.glassware import Shape, shape
+from materialist.train.refraction.paths import Tracer
+
+
+@pytest.mark.parametrize("index", range(16))
+def test_every_kind_of_shape_is_usable(index):
+    made = shape(index)
+    vertices = made.solid.vertices
+    assert np.isfinite(vertices).all() and np.ptp(vertices, axis=0).max() == pytest.approx(1)
+    np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
+    assert made.solid.faces.max() < len(vertices)
+    # A ray straight down through the middle of a body's box meets it from outside, whatever it is.
+    origin = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 24), [2.0], np.linspace(-0.4, 0.4, 24)), -1).reshape(-1, 3)
+    found = Tracer(made.solid).trace(origin, np.broadcast_to([0.0, -1, 0], origin.shape))
+    hit = np.isfinite(found.first)
+    assert hit.any()
+    assert (found.material <= found.solid + 1e-3).all()
+    share = found.material[hit].sum() / found.solid[hit].sum()
+    assert share > 0.6 or made.hollow
+    assert not made.hollow or (found.material[hit] < 0.9 * found.solid[hit]).any() or share < 1
+
+
+def test_shapes_depend_on_their_numbers_alone():
+    assert np.array_equal(shape(3).solid.vertices, shape(3).solid.vertices)
+    others = shape(19), shape(3, "heldout"), shape(3, seed=1)  # the same kind as 3
+    assert all(not np.array_equal(shape(3).solid.vertices, o.solid.vertices) for o in others)
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return Shape(solids.moved(solids.ball(96), scale=0.5), False, "ball", True)
+
+
+def test_a_balls_view_is_consistent(ball):
+    lesson = view.lesson(ball, Tracer(ball.solid), np.random.default_rng(1), exact=True)
+    maps, target = lesson.maps.astype(float), lesson.target.astype(float)
+    assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (2, SIDE, SIDE)
+    inside = maps[MASK] > 0.5
+    assert np.array_equal(inside, target[0] > 0)
+    assert (maps[:, ~inside] == 0).all()
+    # A ball's size is the root of its disc's area: its greatest thickness is 2 r / (sqrt(pi) r), seen from afar.
+    assert target[0].max() == pytest.approx(2 / np.sqrt(np.pi), rel=0.15)
+    assert np.abs(maps[MIRROR] - target[0])[inside].mean() < 0.06 * target[0][inside].mean()
+    np.testing.assert_allclose(target[0], target[1], atol=0.02)
+    # Seen normals look towards the viewer: n.v is positive, largest in the middle.
+    assert maps[7][inside].min() > -1e-3 and maps[7].max() > 0.98
+
+
+def test_stretching_the_rays_is_stretching_the_shape(ball):
+    rng = np.random.default_rng(4)
+    pose = view.draw_pose(rng, upright=True)
+    stretched = replace(ball.solid, vertices=ball.solid.vertices @ pose.stretch.T)
+    normals = solids.smooth_normals(stretched.vertices, stretched.faces)
+    stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
+    plain = replace(pose, stretch=np.eye(3))
+    rays = view.window_rays(stretched.vertices @ pose.to_camera.T + pose.centre)
+    a, normal_a = view.look(Tracer(ball.solid), pose, rays)
+    b, normal_b = view.look(Tracer(stretched), plain, rays)
+    both = np.isfinite(a.first) & np.isfinite(b.first)
+    assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
+    np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
+    np.testing.assert_allclose(a.solid[both], b.solid[both], atol=6e-3)
+    inner = both & (a.solid > 0.3)
+    agreement = np.sum(normal_a.reshape(-1, 3)[inner] * normal_b.reshape(-1, 3)[inner], -1)
+    assert np.median(agreement) > 0.999
+
+
+def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
+    plan = lessons.Plan(shapes=2, views=2)
+    lessons.produce(tmp_path / "set", plan)
+    first = lessons.load(tmp_path / "set")
+    assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
+    before = (tmp_path / "set" / "00001.npz").stat().st_mtime_ns
+    lessons.produce(tmp_path / "set", replace(plan, shapes=3))
+    assert (tmp_path / "set" / "00001.npz").stat().st_mtime_ns == before
+    assert len(lessons.load(tmp_path / "set")["maps"]) == 6
+    assert np.array_equal(lessons.views(1, plan)["maps"], first["maps"][2:])
+    with pytest.raises(InputError, match="other things"):
+        lessons.produce(tmp_path / "set", replace(plan, seed=5))
+    with pytest.raises(InputError, match="no views to learn from"):
+        lessons.load(tmp_path)
+    with pytest.raises(InputError, match="split is 'odd'"):
+        lessons.Plan(split="odd")
