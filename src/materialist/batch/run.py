@@ -126,7 +126,7 @@ class _Run:
         self._names = {job.id: job.name for job in jobs}
         self._stages: dict[str, str] = {}
         self._tries: dict[str, int] = {}
-        self._over: dict[str, str] = dict.fromkeys(finished, DONE)
+        self._through = self._failed = 0
         self._before = {job.id: ledger.last.get(job.id) for job in jobs}
         self._worked = time.monotonic()
         self._written, self._writing = self._worked, 0.0
@@ -180,22 +180,22 @@ class _Run:
             _stop_if_for_all(facts)
         if news.kind == LOST:
             facts = {**facts, "reason": f"{facts['reason']} It was begun {TRIES} times.", "stage": stage}
-        if news.kind == DONE and is_url(job.location):
+        if "photo_hash" in facts and is_url(job.location):
             facts = {**facts, "photo_version": fingerprint(job.location)}
         before = self._ledger.last.get(job.id, {}) if job.inverted else {}
         kind = DONE if news.kind == DONE else FAILED
         known = {key: before[key] for key in _OF_THE_SCENE if key in before}
         self._ledger.append(kind, id=job.id, name=job.name, attempts=self._tries[job.id], **{**known, **facts})
-        self._over[job.id] = kind
+        self._through += 1
+        self._failed += kind == FAILED
         self._tell(_line(job, kind, facts))
 
     def _tell(self, news: str | None) -> None:
-        over = len(self._over) - len(self._kept)
-        failed = sum(kind == FAILED for kind in self._over.values())
-        rate = over / max(time.monotonic() - self._worked, 1e-9)
-        left = (len(self._photos) - len(self._over)) / rate if rate else None
+        total, over = len(self._photos), len(self._kept) + self._through
+        rate = self._through / max(time.monotonic() - self._worked, 1e-9)
+        left = (total - over) / rate if rate else None
         running = {self._names[id]: stage for id, stage in self._stages.items()}
-        self._watch(Status(len(self._photos), len(self._over) - failed, failed, rate, left, running, news))
+        self._watch(Status(total, over - self._failed, self._failed, rate, left, running, news))
 
     def _row(self, photo: Listed) -> Row:
         entry = self._ledger.last.get(photo.id, {})
