@@ -20,7 +20,9 @@ def register(app: typer.Typer) -> None:
 
 def bench(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass, edit.")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="Folder for the report.")],
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,
     seed: Seed = 0,

@@ -12,12 +12,12 @@ from materialist.types import Array
 
 SAME = 1.05
 """Volume of the hull over that of the shape up to which the hull alone stands for it."""
-CONCAVE = 0.08
+CONCAVE = 0.12
 """Concavity that is left in a piece (CoACD's threshold)."""
 PIECES = 16
-COARSE = 48
+COARSE = 24
 """Cells along the longest side to which a fine mesh is thinned out before it is taken apart."""
-FINE = 4000
+FINE = 1500
 """Triangles from which a mesh counts as fine."""
 
 
@@ -56,8 +56,8 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
     coacd.set_log_level("error")
     v, f = thinned(vertices, faces) if len(faces) > FINE else _welded(vertices, faces)
     parts = coacd.run_coacd(
-        coacd.Mesh(v, f), threshold=CONCAVE, max_convex_hull=PIECES, preprocess_resolution=30, resolution=1000,
-        mcts_nodes=15, mcts_iterations=60, seed=seed,
+        coacd.Mesh(v, f), threshold=CONCAVE, max_convex_hull=PIECES, preprocess_resolution=30, resolution=400,
+        mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
     )  # fmt: skip
     return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]
 
