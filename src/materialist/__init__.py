@@ -27,6 +27,8 @@ _HOME = {
     "relight": "edit.relight",
     "lamp": "edit.relight",
     "insert": "edit.insert",
+    "glass": "edit.glass",
+    "remove": "edit.remove",
     "drop": "edit.drop",
     "composite": "edit.composite",
     **dict.fromkeys(
@@ -56,10 +58,12 @@ __all__ = ["__version__", *sorted(_HOME)]
 if TYPE_CHECKING:
     from materialist.edit.composite import composite as composite
     from materialist.edit.drop import drop as drop
+    from materialist.edit.glass import glass as glass
     from materialist.edit.insert import insert as insert
     from materialist.edit.material import edit as edit
     from materialist.edit.relight import lamp as lamp
     from materialist.edit.relight import relight as relight
+    from materialist.edit.remove import remove as remove
     from materialist.edit.select import select as select
     from materialist.errors import InputError as InputError
     from materialist.errors import MaterialistError as MaterialistError

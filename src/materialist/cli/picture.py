@@ -38,6 +38,16 @@ Denoise = Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the
 FullRender = Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")]
 Save = Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")]
 
+Background = Annotated[
+    Path | None, typer.Option(metavar="PNG", help="The same view without the object, in place of inpainting.")
+]
+Inpainter = Annotated[
+    str | None, typer.Option("--inpaint", metavar="sd:MODEL", help="A diffusion model: a folder, or owner/name.")
+]
+Shadow = Annotated[
+    float, typer.Option(help="Repaint the ground around it by this share of its size: shadows that stayed there.")
+]
+
 
 def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     """`count` numbers from a text such as 310,220. Raises InputError."""
@@ -61,6 +71,15 @@ def chosen_region(scene: Any, clicks: list[str] | None, box: str | None, mask: P
         mask=mask,
         method=method.value,
     )
+
+
+def chosen_inpainter(text: str | None, seed: int, device: str) -> Any:
+    """What --inpaint names, or None for patches."""
+    if text is None:
+        return None
+    from materialist.edit.inpaint import inpainter
+
+    return inpainter(text, seed=seed, device=device)
 
 
 def check_before(output: Path, save: Path | None, spp: int, force: bool) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio
 from materialist.edit.portrait import Portrait
+from materialist.edit.revealed import revealed
 from materialist.edit.upsample import GuidedUpsample, matte, strips
 from materialist.types import Array, Photo, Scene
 
@@ -50,7 +51,7 @@ def composite(
     if full_render:
         return plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
     layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
-    return into_photo(scene.photo, layers)
+    return into_photo(*revealed(scene, edited, layers))
 
 
 def pictures(
@@ -65,7 +66,8 @@ def pictures(
         if full_render:
             yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         else:
-            yield into_photo(scene.photo, render_layers(studio, edited, spp=spp, seed=seed, clean=denoise))
+            layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
+            yield into_photo(*revealed(scene, edited, layers))
     tick("frames", len(edits), len(edits))
 
 

@@ -33,6 +33,8 @@ class Layers:
     """Whether the light is another one."""
     portrait: Portrait | None = None
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
+    covered: Array | None = None
+    """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
 
 
 def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None) -> Layers:
@@ -44,14 +46,19 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
     scene = studio.scene
     base, other = studio.twins(edited)
     changed = changed_pixels(scene, edited)
-    guides = (scene.materials.albedo, edited.materials.albedo, scene.normal)
-    alone = None
+    guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
+    alone, covered = None, None
     if scene.bodies != edited.bodies:
         alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
         covered = studio.covered(edited)
-        changed |= covered if alone is None else covered & (alone.inside == 0)
+        if alone is not None:
+            covered &= alone.inside == 0
+        changed |= covered
+        if clean and covered.any():
+            albedo, normal = studio.body_guides(edited, covered)
+            guides = (guides[0], albedo, guides[2], normal)
     layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
-    return replace(layers, relit=is_relit(scene, edited), portrait=alone)
+    return replace(layers, relit=is_relit(scene, edited), portrait=alone, covered=covered)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:
@@ -70,7 +77,7 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 
 def difference(
-    base: Render, edited: Render, changed: Array, guides: tuple[Array, Array, Array], *, spp: int, seed: int,
+    base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
     clean: bool = True, progress=None,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
@@ -81,7 +88,8 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
-        guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3].
+        guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
+            another one, of the edited scene.
         clean: denoise both pictures before they are compared, where the denoiser is installed.
     """
     if spp < 2:
@@ -125,7 +133,7 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
     return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
 
 
-def denoised(base: Array, edited: Array, guides: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+def denoised(base: Array, edited: Array, guides: tuple[Array, ...]) -> tuple[Array, Array]:
     """Both pictures without noise; as they are where the denoiser is not installed."""
     from materialist.errors import SetupError
     from materialist.render.denoise import denoise
@@ -133,7 +141,7 @@ def denoised(base: Array, edited: Array, guides: tuple[Array, Array, Array]) -> 
     try:
         return (
             denoise(base, albedo=guides[0], normal=guides[2]),
-            denoise(edited, albedo=guides[1], normal=guides[2]),
+            denoise(edited, albedo=guides[1], normal=guides[-1]),
         )
     except SetupError:
         return base, edited

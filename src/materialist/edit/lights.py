@@ -76,6 +76,21 @@ class Studio:
             self._target(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
         )  # fmt: skip
 
+    def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
+        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with its bodies' own where `covered`."""
+        from materialist.render.portrait import look
+
+        bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+        rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
+        box = (int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1)
+        sight = look(self._target(edited).mi_scene, edited.camera, bodies, covered.shape, box)
+        albedo, normal = edited.materials.albedo.copy(), edited.normal.copy()
+        part = np.s_[box[0] : box[1], box[2] : box[3]]
+        share = np.where(covered[part], sight.share, 0)[..., None]
+        albedo[part] = share * sight.albedo + (1 - share) * albedo[part]
+        normal[part] = share * sight.normal + (1 - share) * normal[part]
+        return albedo, normal
+
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
         from materialist.render.seen import bodies_seen

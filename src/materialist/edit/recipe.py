@@ -6,10 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from materialist.edit.background import without
+from materialist.edit.glass import glass
 from materialist.edit.insert import insert
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, read_envmap, relight
 from materialist.edit.select import select
+from materialist.edit.thickness import METHODS
 from materialist.errors import InputError, OutputError
 from materialist.types import Scene
 
@@ -19,7 +22,12 @@ MATERIAL = (
 )  # fmt: skip
 LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "lamps")
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
-KINDS = {"edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT}
+REMOVE = ("background", "inpaint", "shadow", "grow")
+GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
+KINDS = {
+    "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "glass": (*REGION, *GLASS),
+    "remove": (*REGION, *REMOVE),
+}  # fmt: skip
 """Kind of step -> what it may say."""
 
 
@@ -109,20 +117,26 @@ def apply(scene: Scene, steps: list[Step]) -> Scene:
         if step.skipped:
             continue
         try:
-            edited = {"edit": _edit, "relight": _relight, "insert": _insert}[step.kind](scene, edited, step)
+            edited = _MAKERS[step.kind](scene, edited, step)
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
 
 
-def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
+def _region(scene: Scene, step: Step):
+    """[H, W] bool of the step's mask, click or box."""
     given = step.options
     where: dict[str, Any] = {
         "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
         "box": _numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": _file(step, "mask") if "mask" in given else None,
     }
-    region = select(scene, method=given.get("with", "grabcut"), **where)
+    return select(scene, method=given.get("with", "grabcut"), **where)
+
+
+def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    region = _region(scene, step)
     options: dict[str, Any] = {
         k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
     }
@@ -162,6 +176,42 @@ def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
     if "up" in given:
         options["up"] = str(given["up"])
     return insert(edited, _file(step, "mesh"), _numbers(given["at"], 2, "at"), **options)
+
+
+def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
+    return without(edited, _region(scene, step), **_removal(step))
+
+
+def _removal(step: Step) -> dict[str, Any]:
+    """What a removal and glass share."""
+    given = step.options
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("shadow", "grow") if k in given}
+    if "background" in given:
+        options["background"] = _file(step, "background")
+    if "inpaint" in given:
+        from materialist.edit.inpaint import inpainter
+
+        options["inpaint"] = inpainter(str(given["inpaint"]))
+    return options
+
+
+def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("ior", "transmission", "roughness") if k in given}
+    if "tint" in given:
+        options["tint"] = _numbers(given["tint"], 3, "tint")
+    if "hollow" in given:
+        options["hollow"] = str(given["hollow"]).lower() in ("true", "yes", "on", "1")
+    if "model" in given:
+        options["model"] = str(given["model"])
+    if "thickness" in given:
+        known = str(given["thickness"]) in METHODS
+        options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
+    return glass(edited, _region(scene, step), **options, **_removal(step))
+
+
+_MAKERS = {"edit": _edit, "relight": _relight, "insert": _insert, "glass": _glass, "remove": _remove}
+"""Kind of step -> (original scene, scene so far, step) -> scene."""
 
 
 def read_texture(path: str | Path):

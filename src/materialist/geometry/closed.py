@@ -7,6 +7,7 @@ reflections inside, total internal reflection, shadows and caustics then come by
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -199,10 +200,9 @@ def _closed(view: _View, front: Array, squared: Array, camera: Camera) -> Shell:
     known = view.inside
     edge = silhouette_field(view.inside)  # [h, w] pixels
     maps = np.log(np.maximum(membrane(front, known), 1e-9)), _steady(squared, edge, known), edge
-    large = lambda v: cv2.resize(
-        v.astype(np.float32), (width * factor, height * factor), interpolation=cv2.INTER_LINEAR
-    )  # noqa: E731
-    found = region(_ended(large(edge - COLLAR)))
+    size = (width * factor, height * factor)
+    field = cv2.resize((edge - COLLAR).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    found = region(_ended(field))
     if not len(found.faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
     place = (found.points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
@@ -265,7 +265,7 @@ def _assembled(found: Region, place: Array, front: Array, thick: Array, view: _V
     vertices, uv = _in_space(all_place, all_front, depth_in, view, camera)
     # Rings in order, from the front's own vertices to the back's.
     rings = [rim, *(2 * count + k * len(rim) + np.arange(len(rim)) for k in range(len(turns))), rim + count]
-    strips = [_strip(one, two, edges) for one, two in zip(rings[:-1], rings[1:])]
+    strips = [_strip(one, two, edges) for one, two in pairwise(rings)]
     faces = np.concatenate([found.faces, found.faces[:, ::-1] + count, *strips])
     return Shell(vertices.astype(np.float32), faces.astype(np.int32), vertex_normals(vertices, faces), uv)
 

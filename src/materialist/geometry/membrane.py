@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.types import Array
 
-SWEEPS = 24
+SWEEPS = 14
 """Relaxations at each size; the coarser sizes have done the rest."""
 
 

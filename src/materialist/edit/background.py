@@ -1,0 +1,301 @@
+"""The scene without one of its objects (paper, Background Inpainting): what was behind it, in maps, depth and photo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.edit.behind import Behind, behind
+from materialist.edit.exemplar import Plan, exemplar_plan
+from materialist.edit.material import noted
+from materialist.edit.region import checked_region
+from materialist.errors import InputError
+from materialist.geometry.membrane import membrane
+from materialist.types import Array, Materials, Photo, Scene
+
+GROW = 0.006
+"""Part of the picture's longer side by which a hole is larger than the object: pixels at a silhouette show both."""
+MOST = 0.9
+"""Share of the picture's surfaces beyond which nothing is left to tell what stood behind."""
+UPWARD = 0.5
+"""Least Y of the normal of what a thing can stand on."""
+
+Inpaint = Callable[[Array, Array], Array]
+"""inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """What is taken away, at working size."""
+
+    object: Array
+    """[H, W] bool: the object itself."""
+    gone: Array
+    """[H, W] bool: the object and a rim of mixed pixels; depth and normals end here."""
+    painted: Array
+    """[H, W] bool: where materials and photo are filled: `gone`, and its contact shadow if that is wanted."""
+
+
+def without(
+    scene: Scene, mask: Array, *, background: Array | str | Path | None = None, inpaint: Inpaint | None = None,
+    grow: float = GROW, shadow: float = 0.0, seed: int = 0,
+) -> Scene:  # fmt: skip
+    """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
+
+    In the result `photo` and `rerender` are filled alike, from the same places: their difference is what the fit
+    misses of the surroundings, and `revealed.revealed` puts it on top of a rendering.
+
+    Args:
+        mask: [H, W] bool, or weights in [0, 1], at working size.
+        background: the true background, [h, w, 3] linear at working or native size, or a file of that aspect; it
+            takes the place of inpainting, and its albedo is what makes the re-rendering equal to it.
+        inpaint: another inpainter of the photo, used like a background (see `inpaint.diffusion`).
+        grow: rim around the mask that is filled as well, as a part of the picture's longer side, in [0, 0.2].
+        shadow: the same for the surface it stands on, as a part of the object's size, in [0, 2]: a contact shadow or a
+            reflection that the albedo has kept goes with the object.
+        seed: of the patch search.
+
+    Raises:
+        InputError: a mask that is empty, of another size, all sky, or (nearly) all of the photo; a background of
+            another aspect.
+    """
+    hole = make_hole(scene, mask, grow=grow, shadow=shadow)
+    label = scene.geometry.plane_label.astype(np.int64)
+    front = np.where(hole.object, scene.depth, 0)
+    found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
+    plan = _plan(scene, found, hole, seed)
+    shown = _denoised(scene)
+    picture = _given(scene, background, inpaint, hole)
+    if picture is None:
+        materials, photo, rerender = _continued(scene, plan, hole, shown)
+    else:
+        materials, photo, rerender = _painted(scene, plan, hole, shown, picture, found.label)
+    how = "background" if background is not None else ("inpainter" if inpaint else "patches")
+    removed = replace(
+        scene, materials=materials, depth=found.depth, normal=found.normal, geometry=_geometry(scene, found),
+        photo=photo, rerender=rerender,
+    )  # fmt: skip
+    what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": shadow}
+    if picture is not None:
+        removed = _matched(removed, hole, picture)
+    return noted(removed, "remove", what)
+
+
+def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float = 0.0) -> Hole:
+    """The pixels that a removal concerns; arguments and errors as for `without`."""
+    for name, value, most in (("rim", grow, 0.2), ("shadow", shadow, 2.0)):
+        if not (np.isfinite(value) and 0 <= value <= most):
+            raise InputError(f"The {name} is {value:g}; it must lie in [0, {most:g}].")
+    own = checked_region(scene, mask) > 0.5
+    if not own.any():
+        raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
+    height, width = own.shape
+    gone = _grown(own, round(grow * max(height, width)))
+    surface = scene.depth > 0
+    if (gone & surface).sum() > MOST * surface.sum() or (gone | ~surface).all():
+        raise InputError(
+            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
+            "what stands behind; mark one object only."
+        )
+    painted = gone
+    if shadow > 0:
+        supports = (scene.geometry.plane_label >= 0) & (scene.normal[..., 1] > UPWARD)
+        painted = gone | (supports & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
+    return Hole(own, gone, painted)
+
+
+def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
+    """Where the hole is filled from: albedo and photo must look alike, on the same surface."""
+    features = np.concatenate([linear_to_srgb(scene.materials.albedo), linear_to_srgb(scene.photo.linear)], -1)
+    anywhere = np.ones(hole.painted.shape, bool)
+    return exemplar_plan(features, hole.painted, anywhere, found.label, seed=seed)
+
+
+def _filled(plan: Plan | None, maps: Array, hole: Array) -> Array:
+    """[H, W, C] with the hole filled, by patches, or as a membrane where there are none."""
+    return plan.fill(maps) if plan is not None else membrane(maps, ~hole)
+
+
+def _materials(scene: Scene, plan: Plan | None, hole: Array) -> Materials:
+    old = scene.materials
+    stack = np.concatenate([old.albedo, old.roughness[..., None], old.metallic[..., None]], -1)
+    new = np.clip(_filled(plan, stack, hole), 0, 1)
+    return Materials(*(np.ascontiguousarray(part) for part in (new[..., :3], new[..., 3], new[..., 4])))
+
+
+def _continued(scene: Scene, plan: Plan | None, hole: Hole, shown: Array) -> tuple[Materials, Photo, Array]:
+    """Materials, photo and re-rendering filled with patches.
+
+    What the fit misses has two parts: detail, which comes with the patches, and a slow one, which must be that of the
+    hole's surroundings, or its outline would be seen.
+    """
+    import cv2
+
+    rest = scene.photo.linear - shown  # [H, W, 3]
+    known = ~hole.painted
+    sigma = max(2.0, 0.01 * max(rest.shape[:2]))
+    blur = lambda v: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), sigma)  # noqa: E731
+    slow = blur(np.where(known[..., None], rest, 0)) / np.maximum(blur(known)[..., None], 1e-3)
+    detail = _filled(plan, np.where(known[..., None], rest - slow, 0), hole.painted)
+    rerender = _filled(plan, shown, hole.painted)
+    linear = np.maximum(rerender + membrane(slow, known) + detail, 0)
+    photo = _with_hole(scene.photo, np.where(known[..., None], scene.photo.linear, linear), hole.painted, plan)
+    return _materials(scene, plan, hole.painted), photo, rerender.astype(np.float32)
+
+
+def _painted(
+    scene: Scene, plan: Plan | None, hole: Hole, shown: Array, picture: Array, label: Array
+) -> tuple[Materials, Photo, Array]:
+    """Materials, photo and re-rendering with a given picture [h, w, 3] in the hole.
+
+    The light on the hidden surface is taken from the surroundings on the same surface: radiance over albedo.
+    """
+    inside = hole.painted[..., None]
+    small = resized(picture, hole.painted.shape)
+    materials = _materials(scene, plan, hole.painted)
+    light = (shown.mean(-1) + 0.01) / (scene.materials.albedo.mean(-1) + 0.01)
+    falling = np.zeros(light.shape, np.float32)
+    for k in np.unique(label[hole.painted]):
+        near = ~hole.painted & (label == k)
+        falling = np.where(
+            label == k, membrane(np.clip(light, 0.02, 50), near if near.any() else ~hole.painted), falling
+        )
+    albedo = np.where(inside, np.clip(small / np.maximum(falling, 0.02)[..., None], 0, 1), scene.materials.albedo)
+    # A picture says nothing about shine: what it shows is taken as matt.
+    rough = np.where(hole.painted, np.maximum(materials.roughness, 0.6), materials.roughness)
+    metal = np.where(hole.painted, 0, materials.metallic).astype(np.float32)
+    native = scene.photo.original.shape[:2]
+    linear = np.where(inside, small, scene.photo.linear).astype(np.float32)
+    outline = _enlarged_mask(hole.painted, native)[..., None]
+    original = np.where(outline, resized(picture, native), scene.photo.original).astype(np.float32)
+    photo = replace(scene.photo, linear=linear, original=original)
+    return Materials(albedo.astype(np.float32), rough.astype(np.float32), metal), photo, linear
+
+
+def _matched(removed: Scene, hole: Hole, picture: Array, *, spp: int = 24) -> Scene:
+    """The scene with the albedo in the hole that makes it look like `picture` under the fitted light.
+
+    One rendering says how far the guess was off; for a matt surface the radiance goes with the albedo.
+    """
+    from materialist.edit.layers import denoised
+    from materialist.edit.lights import Studio
+
+    studio = Studio(removed)
+    guides = (removed.materials.albedo, removed.materials.albedo, removed.normal)
+    wanted = resized(picture, hole.painted.shape)
+    for _ in range(2):
+        render, _ = studio.twins(removed)
+        seen = render(spp, 1)
+        seen, _ = denoised(seen, seen, guides)
+        factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.2, 5)
+        albedo = np.where(hole.painted[..., None], removed.materials.albedo * factor, removed.materials.albedo)
+        albedo = np.clip(albedo, 0, 1).astype(np.float32)
+        removed = replace(removed, materials=replace(removed.materials, albedo=albedo))
+        studio = Studio(removed)
+    return removed
+
+
+def _with_hole(photo: Photo, linear: Array, hole: Array, plan: Plan | None) -> Photo:
+    """The photo with the hole filled at working size [H, W, 3], and at native size with the detail of its sources."""
+    native = photo.original.shape[:2]
+    if native == hole.shape:
+        original = np.where(hole[..., None], linear, photo.original).astype(np.float32)
+        return replace(photo, linear=linear.astype(np.float32), original=original)
+    outline = _enlarged_mask(hole, native)
+    large = resized(linear.astype(np.float32), native)
+    if plan is not None:
+        detail = photo.original - resized(photo.linear, native)
+        rows, columns = np.nonzero(outline)
+        y, x = _native_sources(plan, hole, rows, columns, native)
+        large[rows, columns] += detail[y, x]
+    original = np.where(outline[..., None], np.maximum(large, 0), photo.original).astype(np.float32)
+    return replace(photo, linear=linear.astype(np.float32), original=original)
+
+
+def _native_sources(plan: Plan, hole: Array, rows: Array, columns: Array, native: tuple[int, int]):
+    """Native row and column that native pixels (rows, columns) take their detail from."""
+    height, width = hole.shape
+    shift = np.zeros((height, width, 2))
+    shift[plan.rows, plan.columns, 0] = plan.source // width - plan.rows
+    shift[plan.rows, plan.columns, 1] = plan.source % width - plan.columns
+    scale = np.array([native[0] / height, native[1] / width])
+    here = shift[
+        np.minimum((rows / scale[0]).astype(int), height - 1), np.minimum((columns / scale[1]).astype(int), width - 1)
+    ]
+    moved = np.round(here * scale).astype(int)
+    return np.clip(rows + moved[:, 0], 0, native[0] - 1), np.clip(columns + moved[:, 1], 0, native[1] - 1)
+
+
+def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Array | None:
+    """[h, w, 3] linear picture of what is behind, if there is one."""
+    if background is None and inpaint is None:
+        return None
+    if background is not None and inpaint is not None:
+        raise InputError("Give a background or an inpainter, not both.")
+    if inpaint is not None:
+        return np.asarray(inpaint(scene.photo.linear, hole.painted), np.float32)
+    if isinstance(background, str | Path):
+        from materialist.io.photo import decode_photo
+
+        background = decode_photo(Path(background)).linear
+    picture = np.asarray(background, np.float32)
+    shape = hole.painted.shape
+    if (
+        picture.ndim != 3
+        or picture.shape[2] != 3
+        or abs(picture.shape[1] / picture.shape[0] - shape[1] / shape[0]) > 1.5 * shape[1] / shape[0] / min(shape)
+    ):
+        raise InputError(
+            f"The background is {' x '.join(map(str, picture.shape[1::-1]))} pixels, the photo {shape[1]} x {shape[0]} "
+            "at working size; give the same view at the same proportions."
+        )
+    if not (np.isfinite(picture).all() and picture.min() >= 0):
+        raise InputError("The background has negative or infinite values; give a linear or sRGB picture.")
+    return picture
+
+
+def _geometry(scene: Scene, found: Behind):
+    from materialist.geometry.build import build_geometry
+
+    options = scene.provenance
+    completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
+    return build_geometry(
+        found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)), completion=completion,
+        seed=int(options.get("seed", 0) or 0),
+    )  # fmt: skip
+
+
+def _denoised(scene: Scene) -> Array:
+    """[H, W, 3] the re-rendering without its noise, where the denoiser is installed."""
+    from materialist.edit.layers import denoised
+
+    guides = (scene.materials.albedo, scene.materials.albedo, scene.normal)
+    return denoised(scene.rerender, scene.rerender, guides)[0]
+
+
+def _grown(mask: Array, pixels: int) -> Array:
+    import cv2
+
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(pixels, 1) + 1,) * 2)
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0 if pixels > 0 else mask
+
+
+def _enlarged_mask(mask: Array, native: tuple[int, int]) -> Array:
+    import cv2
+
+    return cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST) > 0
+
+
+def resized(picture: Array, shape: tuple[int, ...]) -> Array:
+    """[h, w] or [h, w, C] at another size (rows, columns, ...), averaged when it shrinks."""
+    import cv2
+
+    if picture.shape[:2] == shape[:2]:
+        return picture.copy()
+    smaller = picture.shape[0] > shape[0]
+    how = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(np.ascontiguousarray(picture, np.float32), shape[1::-1], interpolation=how))

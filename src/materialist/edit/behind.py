@@ -1,0 +1,152 @@
+"""Depth and normals of what an object hides: planes go on, everything else is spanned from its surroundings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.geometry.membrane import membrane
+from materialist.types import Array, Camera
+
+SKY, LOOSE = -2, -1
+"""Labels of what has no surface, and of surfaces that lie on no plane; planes are 0, 1, ..."""
+LEAST = 0.01
+"""A surface hides behind the object only if it has this share of the pixels around it."""
+FIRM = 0.1
+"""If planes and sky hold this share of the pixels around, the hidden ones are theirs alone: things end, they go on."""
+AROUND = 0.15
+"""Surroundings that are looked at, as a part of the hole's extent."""
+STRAIGHT = 0.9
+"""Planes part along straight lines if such lines sort this share of the pixels around rightly."""
+CLEAR = 1e-3
+"""What was hidden lies at least this part of the depth behind what hid it."""
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What stands behind an object, at working size; outside the hole it is the scene's own."""
+
+    depth: Array
+    """[H, W] float32 planar, scene units; 0 for sky."""
+    normal: Array
+    """[H, W, 3] float32 unit."""
+    label: Array
+    """[H, W] int: SKY, LOOSE, or the plane."""
+
+
+def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera) -> Behind:
+    """Continue the surfaces around a hole into it.
+
+    Args:
+        depth: [H, W] planar, scene units, 0 = sky. normal: [H, W, 3] unit. plane: [H, W] int: plane of a pixel, -1 for
+            none; none of the three is read in the hole.
+        hole: [H, W] bool. There must be something around it.
+        front: [H, W] depth of what is taken away, 0 where nothing is: the result never comes before it.
+
+    Planes part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the
+    surface whose share, spanned over the hole as a membrane, is largest. On a plane inverse depth goes on linearly,
+    corrected by a membrane to meet the depth around.
+    """
+    rays = pixel_rays(camera).astype(np.float64)
+    box = _surroundings(hole)
+    part = _behind(depth[box], normal[box], plane[box], hole[box], front[box], rays[box])
+    out = Behind(depth.astype(np.float32), normal.astype(np.float32), np.where(depth > 0, plane, SKY).astype(np.int64))
+    for whole, piece in ((out.depth, part.depth), (out.normal, part.normal), (out.label, part.label)):
+        whole[box] = piece
+    return out
+
+
+def _surroundings(hole: Array) -> tuple[slice, slice]:
+    """The window around a hole that tells what is in it."""
+    rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
+    margin = max(8, round(AROUND * max(np.ptp(rows), np.ptp(columns))))
+    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
+    return np.s_[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
+
+
+def _behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array, rays: Array) -> Behind:
+    """`behind` of a window."""
+    known_label = np.where(depth > 0, plane, SKY).astype(np.int64)
+    label = _labels(known_label, hole)
+    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)
+    new_depth, new_normal = depth.astype(np.float32).copy(), normal.astype(np.float32).copy()
+    surface = ~hole & (depth > 0)
+    general = membrane(inverse, surface) if surface.any() else inverse
+    for k in np.unique(label[hole]):
+        here = hole & (label == k)
+        if k == SKY:
+            new_depth[here] = 0
+            continue
+        own = ~hole & (known_label == k)
+        spanned = _on_plane(inverse, own, rays) if k >= 0 else membrane(inverse, own)
+        spanned = np.where(spanned > 0, spanned, general)[here]
+        limit = np.where(front[here] > 0, (1 - CLEAR) / np.maximum(front[here], 1e-12), np.inf)
+        new_depth[here] = 1 / np.clip(np.minimum(spanned, limit), 1e-9, None)
+        turned = membrane(normal, own)[here]
+        new_normal[here] = turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-6)
+    return Behind(new_depth, new_normal, label)
+
+
+def _labels(known: Array, hole: Array) -> Array:
+    """[H, W] int: the labels of the pixels around, carried into the hole."""
+    kinds, count = np.unique(known[~hole], return_counts=True)
+    ring = _ring(hole)
+    shares = np.array([np.mean(known[ring] == k) if ring.any() else 0.0 for k in kinds])
+    kept = kinds[shares >= LEAST] if (shares >= LEAST).any() else kinds[count.argmax()][None]
+    firm = kept[kept != LOOSE]
+    if len(firm) and shares[np.isin(kinds, firm)].sum() >= FIRM:
+        kept = firm
+    indicator = np.stack([known == k for k in kept], -1).astype(np.float32)
+    spanned = membrane(indicator, ~hole & np.isin(known, kept))
+    chosen = kept[spanned.argmax(-1)]
+    if len(firm) > 1:
+        straight = _straight(known, ring & np.isin(known, firm), firm)
+        chosen = chosen if straight is None or LOOSE in kept else straight
+    return np.where(hole, chosen, known)
+
+
+def _straight(known: Array, ring: Array, kinds: Array) -> Array | None:
+    """[H, W] labels parted by straight lines: a linear classifier (softmax) of the places of the pixels around.
+
+    None where lines do not sort them well.
+    """
+    rows, columns = np.nonzero(ring)
+    stride = max(1, len(rows) // 4000)
+    rows, columns = rows[::stride], columns[::stride]
+    middle, scale = np.array([rows.mean(), columns.mean()]), max(rows.std() + columns.std(), 1.0)
+    at = lambda y, x: np.stack([np.ones_like(y, float), (y - middle[0]) / scale, (x - middle[1]) / scale], -1)  # noqa: E731
+    basis = at(rows.astype(float), columns.astype(float))
+    wanted = known[rows, columns][:, None] == kinds  # [N, K]
+    balance = 1 / np.maximum(wanted.sum(0), 1)[wanted.argmax(1)]
+    balance = balance / balance.sum()
+    weights = np.zeros((3, len(kinds)))
+    for _ in range(400):
+        score = basis @ weights
+        chance = np.exp(score - score.max(-1, keepdims=True))
+        chance /= chance.sum(-1, keepdims=True)
+        weights -= 4.0 * (basis.T @ ((chance - wanted) * balance[:, None]) + 1e-4 * weights)
+    right = (basis @ weights).argmax(-1) == wanted.argmax(-1)
+    if right.mean() < STRAIGHT:
+        return None
+    y, x = np.mgrid[: known.shape[0], : known.shape[1]].astype(float)
+    return kinds[(at(y, x) @ weights).argmax(-1)]
+
+
+def _ring(hole: Array) -> Array:
+    """[H, W] bool: known pixels near the hole, within a tenth of its size."""
+    import cv2
+
+    reach = max(2, round(0.1 * np.sqrt(hole.sum())))
+    return (cv2.dilate(hole.astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0) & ~hole
+
+
+def _on_plane(inverse: Array, own: Array, rays: Array) -> Array:
+    """[H, W] inverse depth of the plane through the pixels `own` [H, W] bool, bent to meet them at the hole."""
+    scaled = rays[own] / np.maximum(inverse[own], 1e-12)[:, None]  # weighted by depth: the relative error counts
+    coefficients = np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
+    flat = rays @ coefficients
+    sound = flat > 0.2 * np.median(inverse[own])
+    bend = membrane(np.where(sound, inverse / np.where(sound, flat, 1), 1), own & sound)
+    return np.where(sound, flat * bend, 0)

@@ -1,0 +1,131 @@
+"""An object of the photo turned to glass (paper, Material Transparency Editing)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from materialist.edit.background import GROW, Inpaint, without
+from materialist.edit.material import noted
+from materialist.edit.region import checked_region
+from materialist.edit.thickness import ObjectThickness, object_thickness
+from materialist.errors import InputError
+from materialist.geometry.closed import Shell, closed_proxy
+from materialist.types import Array, Body, Scene, Surface
+
+MODELS = ("closed", "two-interface")
+IOR = (1.0, 3.0)
+
+
+def glass(
+    scene: Scene, mask: Array, *, ior: float = 1.5, transmission: float = 1.0,
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, hollow: bool = False,
+    model: str = "closed", thickness: str | Array | Path = "auto", background: Array | str | Path | None = None,
+    inpaint: Inpaint | None = None, grow: float = GROW, shadow: float = 0.0, smooth: float = 0.01, seed: int = 0,
+) -> Scene:  # fmt: skip
+    """The scene with the object under a mask of glass, before what it hid.
+
+    Args:
+        mask: [H, W] bool, or weights in [0, 1], at working size: one object, or several.
+        ior: index of refraction, in [1, 3]: water 1.33, glass 1.5, diamond 2.4. 1 bends nothing.
+        transmission: share T of light that meets glass, in [0, 1]; the rest meets the object's own material. The
+            default is clear; the paper's pictures have 0.9.
+        tint: colour of white light after a way in and a way out, linear, in [0, 1].
+        roughness: perceptual, in [0, 1]; below 0.03 the glass is smooth.
+        hollow: a wall around air, as thick as RefractionNet says (else 5 % of the object's size).
+        model: `closed` path-traces a closed object (`geometry.closed`); `two-interface` is the paper's: every camera
+            ray is bent twice and looks up the background, and there are no shadows.
+        thickness: see `thickness.object_thickness`.
+        background, inpaint, grow, shadow: see `background.without`.
+        smooth: see `geometry.closed.closed_proxy`.
+
+    Raises:
+        InputError: an option out of its range, or a mask that cannot be used. WeightsError: a network without weights.
+    """
+    _check(ior, transmission, tint, roughness, model)
+    own = checked_region(scene, mask) > 0.5
+    found = object_thickness(scene, own, thickness) if own.any() else None
+    removed = without(
+        scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed
+    )  # fmt: skip
+    assert found is not None  # an empty mask has been refused by `without`
+    if model == "two-interface":
+        edited = _two_interface(scene, removed, own, found, ior, transmission, tint, roughness)
+    else:
+        shell = _shell(scene, removed, own, found, hollow, smooth)
+        surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
+        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, "glass")
+        edited = replace(removed, bodies=(*removed.bodies, body))
+    what = {
+        "ior": ior, "transmission": transmission, "tint": list(tint), "roughness": roughness, "hollow": hollow,
+        "model": model, "thickness": found.method, "pixels": int(own.sum()),
+    }  # fmt: skip
+    return noted(edited, "glass", what)
+
+
+def glass_surface(
+    scene: Scene, *, ior: float, transmission: float, tint: tuple[float, float, float], roughness: float
+) -> Surface:
+    """The material: glass, and (1 - T) of what the object was; values as for `glass`."""
+    clear = transmission >= 1
+    shape = (1, 1) if clear else scene.depth.shape
+    albedo = np.ones((1, 1, 3), np.float32) if clear else scene.materials.albedo
+    metallic = np.zeros((1, 1), np.float32) if clear else scene.materials.metallic
+    rough = np.full(shape, roughness, np.float32)
+    r, g, b = (float(c) for c in tint)
+    return Surface(albedo, rough, metallic, float(transmission), float(ior), (r, g, b))
+
+
+def _shell(scene: Scene, removed: Scene, own: Array, found: ObjectThickness, hollow: bool, smooth: float) -> Shell:
+    """The closed object in front of what is behind it now."""
+    return closed_proxy(
+        scene.depth, scene.normal, own, found.solid, scene.camera, smooth=smooth,
+        wall=found.wall if hollow else None, behind=removed.depth,
+    )  # fmt: skip
+
+
+def _two_interface(
+    scene: Scene, removed: Scene, own: Array, found: ObjectThickness, ior: float, transmission: float,
+    tint: tuple[float, float, float], roughness: float,
+) -> Scene:  # fmt: skip
+    """The removed scene with the paper's picture of the glass in its photo."""
+    from materialist.edit.background import resized
+    from materialist.edit.two_interface import two_interface
+
+    picture = two_interface(
+        scene.camera, scene.normal, scene.depth, own, found.solid, removed.depth, removed.photo.linear, scene.envmap,
+        ior=ior, transmission=transmission, tint=tint, roughness=roughness,
+    )  # fmt: skip
+    photo = removed.photo
+    if transmission < 1:
+        picture = picture + (1 - transmission) * scene.photo.linear * own[..., None]
+    linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
+    native = photo.original.shape[:2]
+    share = np.clip(resized(own.astype(np.float32), native), 0, 1)[..., None]
+    near = resized(_beyond(picture, own), native)
+    original = (share * near + (1 - share) * photo.original).astype(np.float32)
+    return replace(removed, photo=replace(photo, linear=linear, original=original))
+
+
+def _beyond(picture: Array, own: Array) -> Array:
+    """[H, W, 3] the picture with its nearest values outside the mask, so that enlarging mixes in nothing else."""
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = distance_transform_edt(~own, return_distances=False, return_indices=True)
+    return picture[rows, columns]
+
+
+def _check(ior: float, transmission: float, tint, roughness: float, model: str) -> None:
+    if not (np.isfinite(ior) and IOR[0] <= ior <= IOR[1]):
+        raise InputError(
+            f"The index of refraction is {ior:g}; it must lie in [1, 3] (water 1.33, glass 1.5, diamond 2.4)."
+        )
+    for name, value in (("transmission", transmission), ("roughness", roughness)):
+        if not (np.isfinite(value) and 0 <= value <= 1):
+            raise InputError(f"The {name} is {value:g}; it must lie in [0, 1].")
+    if len(tint) != 3 or not all(np.isfinite(c) and 0 <= c <= 1 for c in tint):
+        raise InputError(f"The tint is {tint}; it must be three numbers in [0, 1]: linear R, G, B.")
+    if model not in MODELS:
+        raise InputError(f"The model is '{model}'; choose one of {', '.join(MODELS)}.")

@@ -1,0 +1,80 @@
+"""Inpainting by a diffusion model (paper, Background Inpainting), where its weights are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edit.background import Inpaint
+from materialist.errors import InputError, WeightsError
+from materialist.types import Array
+
+DEFAULT = "stable-diffusion-v1-5/stable-diffusion-inpainting"
+PROMPT = "empty background, nothing there"
+LONGEST = 768
+"""Longer side at which the model works; it was trained at 512."""
+
+
+def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30) -> Inpaint:
+    """The inpainter that an option names: `sd:FOLDER` or `sd:owner/name`, or `sd` for the usual model.
+
+    Raises InputError for any other name; SetupError or WeightsError when the library or the model is not there.
+    """
+    kind, _, where = text.partition(":")
+    if kind != "sd":
+        raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
+    from materialist.predict import hub
+
+    folder, _ = hub.locate(where, DEFAULT)
+    pipeline = _pipeline(folder, hub.on_gpu(device))
+    return lambda photo, hole: diffused(pipeline, photo, hole, seed=seed, steps=steps)
+
+
+def diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int) -> Array:
+    """[H, W, 3] linear: a photo [H, W, 3] with the hole [H, W] bool filled by an inpainting pipeline of diffusers."""
+    import cv2
+    import torch
+    from PIL import Image
+
+    height, width = hole.shape
+    unit = 8 * max(1, getattr(pipeline, "vae_scale_factor", 8) // 8)
+    scale = min(1.0, LONGEST / max(height, width))
+    w, h = (max(unit, round(n * scale / unit) * unit) for n in (width, height))
+    picture = np.round(linear_to_srgb(photo) * 255).astype(np.uint8)
+    image = Image.fromarray(picture).resize((w, h), Image.Resampling.LANCZOS)
+    mask = Image.fromarray(hole.astype(np.uint8) * 255).resize((w, h), Image.Resampling.NEAREST)
+    out = pipeline(
+        prompt=PROMPT, image=image, mask_image=mask, height=h, width=w, num_inference_steps=steps,
+        generator=torch.Generator("cpu").manual_seed(seed), output_type="np",
+    ).images[0]  # fmt: skip
+    large = cv2.resize(np.asarray(out, np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
+    return np.where(hole[..., None], srgb_to_linear(np.clip(large, 0, 1)), photo).astype(np.float32)
+
+
+def _pipeline(folder: Path, gpu: bool) -> Any:
+    """Stable Diffusion's inpainting pipeline, every component whole."""
+    import torch
+
+    from materialist.predict import hub
+
+    diffusers, transformers = hub.library("diffusers"), hub.library("transformers")
+    components = {}
+    for name, cls in (
+        ("unet", diffusers.UNet2DConditionModel),
+        ("vae", diffusers.AutoencoderKL),
+        ("text_encoder", transformers.CLIPTextModel),
+    ):
+        variant = {"variant": "fp16"} if any((folder / name).glob("*.fp16.*")) else {}
+        components[name] = hub.load(cls, folder, name, **variant).to(torch.float16 if gpu else torch.float32)
+    try:
+        pipeline = diffusers.StableDiffusionInpaintPipeline.from_pretrained(
+            folder, local_files_only=True, safety_checker=None, requires_safety_checker=False, **components
+        )
+    except Exception as error:  # whatever its readers raise on a damaged configuration
+        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+        raise WeightsError(f"{folder} does not hold a whole inpainting pipeline ({reason}); fetch it again.") from error
+    pipeline.set_progress_bar_config(disable=True)
+    return pipeline.to("cuda" if gpu else "cpu")
