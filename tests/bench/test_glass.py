@@ -45,12 +45,13 @@ def test_without_refraction_both_models_show_the_background(scene, mitsuba):
     room = scene.render(envmap, "room", spp=64)
     behind = models.true_background(scene, room)
     mask = scene.mask
-    for picture in (
-        models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6),
-        models.closed_proxy(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-4, spp=16),
-    ):
-        assert np.abs(picture - room)[mask].mean() < 0.03 * room[mask].mean()
-        assert (picture[~mask] == 0).all()
+    bent = models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6)
+    traced = models.closed_proxy(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-4, spp=16)
+    assert np.abs(bent - room)[mask].mean() < 0.02 * room[mask].mean()
+    # Sampled at random places of a pixel, a fine pattern is another one, but no brighter or darker.
+    assert np.abs(traced - room)[mask].mean() < 0.12 * room[mask].mean()
+    assert traced[mask].mean() == pytest.approx(room[mask].mean(), rel=0.04)
+    assert (bent[~mask] == 0).all() and (traced[~mask] == 0).all()
 
 
 def test_the_hole_is_filled_and_its_surroundings_stay(scene):

@@ -38,8 +38,8 @@ NOTE = (
     "dielectric. True depth and normals of the visible side, true light. `d` says where the thickness comes from, its "
     "error is mean absolute over mean true thickness; `noise` multiplies the predicted d by 1 + e, e uniform in "
     "[-0.5, 0.5], one e a draw. `background alone` shows the background without any refraction. The inpainted "
-    "background is Telea's, in the continued planes of the visible room. LPIPS only where the package and its weights "
-    "are installed."
+    "background is that of `materialist glass`: patches of the photo, on the continued planes of floor and wall. LPIPS "
+    "only where the package and its weights are installed."
 )
 NOISE = 0.5
 """Largest relative error of the thickness in the sensitivity test (paper, eq. ablation_d)."""
@@ -122,7 +122,7 @@ def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tup
     seen = np.clip(case.photo * case.gain, 0, 1)
     behind = {
         "true": models.true_background(scene, room),
-        "inpainted": models.inpainted_background(scene, case.photo),
+        "inpainted": models.inpainted_background(scene, case.photo, case.gain),
     }
     d = models.thicknesses(scene, seen)
     best = "predicted" if "predicted" in d else "symmetry"

@@ -28,48 +28,37 @@ def true_background(scene: GlassScene, room: Array) -> Background:
     return Background(room, scene.behind.depth, scene.behind.normal)
 
 
-def inpainted_background(scene: GlassScene, photo: Array) -> Background:
-    """What the photo [H, W, 3] linear shows around the object, continued behind it.
+def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> Background:
+    """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
 
-    The picture by Telea's method, inverse depth by the plane through what surrounds the object below and beside it,
-    whichever of floor and wall is nearer.
+    Surfaces go on as planes, the picture by patches of its own; `gain` is the photo's exposure.
     """
-    import cv2
-
-    from materialist.color import linear_to_srgb, srgb_to_linear
-
-    hole = cv2.dilate(scene.mask.astype(np.uint8), np.ones((3, 3), np.uint8))
-    scale = max(float(photo.max()), 1e-6)
-    encoded = np.round(linear_to_srgb(photo / scale) * 255).astype(np.uint8)
-    filled = srgb_to_linear(cv2.inpaint(encoded, hole, 5, cv2.INPAINT_TELEA).astype(np.float32) / 255) * scale
-    picture = np.where(hole[..., None] > 0, filled, photo).astype(np.float32)
-    depth, normal = _continued(scene, hole > 0)
-    return Background(picture, depth, normal)
-
-
-def _continued(scene: GlassScene, hole: Array) -> tuple[Array, Array]:
-    """Depth [H, W] and normals [H, W, 3] of the visible background, its planes continued into the hole."""
-    from materialist.camera import pixel_rays
+    from materialist.color import linear_to_srgb
+    from materialist.edit.behind import SKY, behind
+    from materialist.edit.exemplar import exemplar_plan
+    from materialist.geometry.membrane import membrane
     from materialist.geometry.planes import find_planes
 
-    seen = np.where(hole, 0, scene.behind.depth)
-    if not seen.any():
-        return seen, scene.behind.normal
-    rays = pixel_rays(scene.camera).astype(np.float64)
-    best = np.full(hole.shape, np.inf)
+    hole = _grown(scene.mask)
+    depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
-    for plane in find_planes(seen, normal, scene.camera):
-        rows, columns = np.nonzero(plane.mask)
-        points = (rays[rows, columns] * seen[rows, columns, None]).astype(np.float64)
-        centre = points.mean(0)
-        n = np.linalg.svd(points[:: max(1, len(points) // 2000)] - centre, full_matrices=False)[2][2]
-        n = n if n @ centre < 0 else -n
-        along = rays @ n
-        depth = np.where(along < -1e-6, (n @ centre) / np.minimum(along, -1e-6), np.inf)
-        nearer = hole & (depth > 0) & (depth < best)
-        best[nearer], normal[nearer] = depth[nearer], n
-    filled = np.where(hole, np.where(np.isfinite(best), best, 0), seen)
-    return filled.astype(np.float32), normal
+    label = np.full(hole.shape, SKY)
+    if depth.any():
+        plane = np.full(hole.shape, -1, np.int8)
+        for k, found in enumerate(find_planes(depth, normal, scene.camera)):
+            plane[found.mask] = k
+        continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
+        depth, normal, label = continued.depth, continued.normal, continued.label
+    plan = exemplar_plan(linear_to_srgb(photo * gain), hole, np.ones_like(hole), label)
+    picture = membrane(photo, ~hole) if plan is None else plan.fill(photo)
+    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal)
+
+
+def _grown(mask: Array) -> Array:
+    """The mask and a rim of mixed pixels."""
+    from scipy.ndimage import binary_dilation
+
+    return binary_dilation(mask, np.ones((3, 3), bool))
 
 
 def two_interface(
@@ -96,7 +85,7 @@ def closed_proxy(
     from materialist.geometry.closed import closed_proxy as close
 
     mi, front = scene._mi, scene.front
-    shell = close(front.depth, front.normal, scene.mask, thickness, scene.camera)
+    shell = close(front.depth, front.normal, scene.mask, thickness, scene.camera, behind=behind.depth)
     description: dict[str, Any] = {"type": "scene", **_light(mi, envmap), **_backdrop(scene, behind)}
     description["object"] = _mesh(mi, shell, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
     picture = path_traced(

@@ -90,29 +90,38 @@ def _turned(index: int, seed: int) -> Thing:
     if kind == 1:
         y = np.linspace(0, 1, 60)
         radius = 0.17 + 0.07 * np.sin(rng.uniform(4, 8) * y + rng.uniform(0, 6)) + 0.05 * rng.uniform(-1, 1) * y
-        radius = radius * np.sqrt(np.clip(y / 0.12, 0, 1) * np.clip((1 - y) / 0.12, 0, 1)) + 1e-4
+        radius = radius * np.sqrt(np.clip(y / 0.12, 0, 1) * np.clip((1 - y) / 0.12, 0, 1))
         return Thing(f"baluster {index}", "symmetric", shapes.lathe(np.stack([radius, 0.7 * y], -1)))
     if kind == 2:
         return Thing(f"capsule {index}", "symmetric", shapes.capsule(rng.uniform(0.13, 0.2), rng.uniform(0.2, 0.35)))
     extent = rng.uniform(0.4, 0.65, 3)
     return Thing(
-        f"cushion {index}", "symmetric", shapes.superquadric(extent, rng.uniform(0.4, 0.8), rng.uniform(0.5, 1))
+        f"cushion {index}", "symmetric", shapes.superquadric(extent, rng.uniform(0.5, 0.8), rng.uniform(0.5, 1))
     )
 
 
 def _free(index: int, seed: int) -> Thing:
     """A lumpy or twisted body."""
     from materialist.train.data import solids
-    from materialist.train.refraction.glassware import centred, twisted
+    from materialist.train.refraction.glassware import centred
 
     rng = np.random.default_rng([seed, 8, index])
     if index % 2:
-        body = centred(twisted(rng))
+        turn, bend = rng.choice([-1, 1]) * rng.uniform(1, 3), rng.uniform(-0.4, 0.4)
+        column = shapes.superquadric(np.array([0.5, 1, rng.uniform(0.25, 0.5)]), 0.6, rng.uniform(0.5, 1))
+        body = centred(solids.warped(column, lambda p: _twist(p, turn, bend)))
         name = f"twisted {index}"
     else:
         body = centred(solids.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
         name = f"blob {index}"
     return Thing(name, "asymmetric", solids.grounded(shapes.placed(body, scale=0.65)))
+
+
+def _twist(points: Array, turn: float, bend: float) -> Array:
+    """[V, 3] turned about Y in proportion to their height, and bent aside."""
+    angle = turn * points[:, 1]
+    x = points[:, 0] * np.cos(angle) - points[:, 2] * np.sin(angle) + bend * points[:, 1] ** 2
+    return np.stack([x, points[:, 1], points[:, 0] * np.sin(angle) + points[:, 2] * np.cos(angle)], -1)
 
 
 class GlassScene:
