@@ -18,11 +18,12 @@ from materialist import __version__
 from materialist.errors import OutputError
 from materialist.export.parts import Part
 from materialist.export.textures import base_color, metallic_roughness, png
-from materialist.types import Array, Camera, Scene
+from materialist.types import Array, Camera, Scene, Surface
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
 _NEAREST, _NEAREST_MIPMAP_LINEAR, _CLAMP = 9728, 9986, 33071
+_LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
 
 
 def write_glb(path: Path, scene: Scene, parts: list[Part]) -> None:
@@ -47,6 +48,8 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
         "buffers": [{"byteLength": len(document.data)}],
         "extras": {"photo": {"width": camera.width, "height": camera.height, "horizontal_fov_degrees": camera.fov}},
     }
+    if document.extensions:
+        content["extensionsUsed"] = sorted(document.extensions)
     text = json.dumps(content, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
@@ -69,10 +72,12 @@ class _Document:
 
     def __init__(self) -> None:
         self.data = bytearray()
+        self.extensions: set[str] = set()
         self.content: dict[str, list] = {
             "meshes": [], "materials": [], "textures": [], "images": [], "accessors": [], "bufferViews": [],
             "samplers": [
-                {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP}
+                {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP},
+                {"magFilter": _LINEAR, "minFilter": _LINEAR_MIPMAP_LINEAR, "wrapS": _REPEAT, "wrapT": _REPEAT},
             ],
         }  # fmt: skip
 
@@ -96,15 +101,33 @@ class _Document:
             pbr["roughnessFactor"] = float(part.materials.roughness[0, 0])
             pbr["metallicFactor"] = float(part.materials.metallic[0, 0])
         else:
-            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(part.materials))}
+            sampler = 0 if part.surface is None else 1
+            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(part.materials), sampler)}
             packed = metallic_roughness(part.materials)
-            pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed)}
-        return self._add("materials", {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr})
+            pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
+        material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
+        if part.surface is not None and part.surface.transmission > 0:
+            material |= self._glass(part.surface, pbr)
+        return self._add("materials", material)
 
-    def _texture(self, name: str, pixels: Array) -> int:
+    def _glass(self, surface: Surface, pbr: dict) -> dict:
+        """KHR_materials_transmission and KHR_materials_ior; the base colour tints what passes."""
+        tint = [float(c) for c in surface.tint]
+        if surface.transmission >= 1:
+            pbr["baseColorFactor"] = [*tint, 1.0]
+            pbr.pop("baseColorTexture", None)
+        self.extensions |= {"KHR_materials_transmission", "KHR_materials_ior"}
+        return {
+            "extensions": {
+                "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
+                "KHR_materials_ior": {"ior": float(surface.ior)},
+            }
+        }
+
+    def _texture(self, name: str, pixels: Array, sampler: int) -> int:
         view = self._view(png(pixels))
         image = self._add("images", {"name": name, "mimeType": "image/png", "bufferView": view})
-        return self._add("textures", {"sampler": 0, "source": image})
+        return self._add("textures", {"sampler": sampler, "source": image})
 
     def _accessor(self, values: Array, kind: str, *, bounds: bool = False, indices: bool = False) -> int:
         """Index of an accessor of values [N, components] or [N]."""

@@ -13,9 +13,10 @@ import numpy as np
 
 from materialist.export.parts import Part
 from materialist.io.exr import write_exr
+from materialist.render.bodies import SMOOTH
 from materialist.render.envmap import on_mitsuba_grid
-from materialist.render.scene import MAX_DEPTH
-from materialist.types import Array, Camera, Materials, Mesh, Scene
+from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
+from materialist.types import Array, Camera, Materials, Mesh, Scene, Surface
 
 DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH), "bsdf": "principled"}
 """Parameters of the file and their values: `mi.load_file(path, spp=256)` sets another."""
@@ -24,7 +25,8 @@ DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH), "bsdf": "principled"}
 def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
     """Fill an empty folder with `scene.xml` and what it refers to, all by relative names."""
     root = ET.Element("scene", version="3.0.0")
-    for name, value in DEFAULTS.items():
+    clear = any(part.surface is not None and part.surface.transmission > 0 for part in parts)
+    for name, value in (DEFAULTS | ({"max_depth": str(GLASS_DEPTH)} if clear else {})).items():
         ET.SubElement(root, "default", name=name, value=value)
     _value(root, "boolean", "embree_use_robust_intersections", "true")
     _value(_node(root, "integrator", "path"), "integer", "max_depth", "$max_depth")
@@ -61,7 +63,19 @@ def _sensor(root: ET.Element, camera: Camera) -> None:
 
 def _material(folder: Path, shape: ET.Element, part: Part) -> None:
     """Both sides shade alike; the three textures have the same names in `principled` and in `materialist_disney`."""
-    bsdf = _node(_node(shape, "bsdf", "twosided"), "bsdf", "$bsdf")
+    surface = part.surface
+    if surface is None or surface.transmission <= 0:
+        _opaque(folder, _node(_node(shape, "bsdf", "twosided"), "bsdf", "$bsdf"), part)
+    elif surface.transmission >= 1:
+        _glass(shape, surface)
+    else:
+        mixed = _node(shape, "bsdf", "blendbsdf")
+        _value(mixed, "float", "weight", repr(float(surface.transmission)))
+        _opaque(folder, _node(mixed, "bsdf", "$bsdf"), part)
+        _glass(mixed, surface)
+
+
+def _opaque(folder: Path, bsdf: ET.Element, part: Part) -> None:
     names = {"base_color": "albedo", "roughness": "roughness", "metallic": "metallic"}
     for name, key in names.items():
         file = f"{part.name}_{key}.exr"
@@ -69,14 +83,28 @@ def _material(folder: Path, shape: ET.Element, part: Part) -> None:
         texture = _node(bsdf, "texture", "bitmap", name=name)
         _value(texture, "string", "filename", file)
         _value(texture, "boolean", "raw", "true")
-        _value(texture, "string", "filter_type", "nearest")
-        _value(texture, "string", "wrap_mode", "clamp")
+        _value(texture, "string", "filter_type", "nearest" if part.surface is None else "bilinear")
+        _value(texture, "string", "wrap_mode", "clamp" if part.surface is None else "repeat")
+
+
+def _glass(parent: ET.Element, surface: Surface) -> None:
+    """As `render.bodies` has it: each interface the root of the tint, smooth below the least roughness."""
+    roughness = float(np.mean(surface.roughness))
+    bsdf = _node(parent, "bsdf", "dielectric" if roughness < SMOOTH else "roughdielectric")
+    _value(bsdf, "float", "int_ior", repr(max(float(surface.ior), 1.0001)))
+    _value(bsdf, "float", "ext_ior", "1.0")
+    _value(bsdf, "rgb", "specular_transmittance", ", ".join(repr(float(np.sqrt(c))) for c in surface.tint))
+    if roughness >= SMOOTH:
+        _value(bsdf, "string", "distribution", "ggx")
+        _value(bsdf, "float", "alpha", repr(roughness**2))
 
 
 def _at_least_2x2(materials: Materials, key: str) -> Array:
-    """A map [H, W] or [H, W, 3]; a constant is repeated, since Mitsuba takes no texture below 2 x 2."""
+    """A map [H, W] or [H, W, 3]; a single row or column is repeated, since Mitsuba takes no texture below 2 x 2."""
     values = getattr(materials, key)
-    return np.repeat(np.repeat(values, 2, 0), 2, 1) if values.shape[:2] == (1, 1) else values
+    for axis in (0, 1):
+        values = np.repeat(values, 2, axis) if values.shape[axis] == 1 else values
+    return values
 
 
 def _ply(mesh: Mesh) -> bytes:

@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.render.scene import part
-from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene
+from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene, Surface
 
 FEWEST = 100
 """Triangles below which a reduced mesh would no longer show the scene."""
@@ -18,7 +18,7 @@ _NEUTRAL = (0.5, 0.5, 0.0)
 
 @dataclass(frozen=True)
 class Part:
-    """A mesh and its material: the depth surface with the maps, or a continued plane with their mean."""
+    """A mesh and its material: the depth surface with the maps, a continued plane with their mean, or a body."""
 
     name: str
     """`surface`, `plane0`, `plane1`, ..."""
@@ -26,6 +26,8 @@ class Part:
     """Faces of this part alone; uv as everywhere: u right, v DOWN."""
     materials: Materials
     """Maps [H, W], looked up by uv without filtering; [1, 1] for a constant."""
+    surface: Surface | None = None
+    """For a body: its own material, whose maps repeat and are filtered (see `body_parts`)."""
 
     @property
     def constant(self) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from materialist.errors import InputError
+from materialist.export.body_parts import TEXTURED, body_parts, plain, simplified
 from materialist.export.parts import Part, scene_parts
 from materialist.types import Scene
 
@@ -63,14 +64,20 @@ def export(
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and max_triangles is None:
         max_triangles = PAGE_TRIANGLES
-    parts = scene_parts(scene, max_triangles)
+    bodies = body_parts(scene)
+    note: tuple[str, ...] = ()
+    if to not in TEXTURED and simplified(bodies):
+        note = (f"{to} shows inserted bodies without textures and glass; glb and mitsuba have both.",)
+    parts = [*scene_parts(scene, max_triangles), *(bodies if to in TEXTURED else map(plain, bodies))]
     if to != "blend":
-        return _writer(to)(path, scene, parts, force)
+        made = _writer(to)(path, scene, parts, force)
+        return replace(made, notes=(*made.notes, *note))
     from materialist.export.blender import export_blend
 
     chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
     options = [option for option, wanted in chosen.items() if wanted]
-    return export_blend(path, scene, parts, force, blender=blender, options=options)
+    made = export_blend(path, scene, parts, force, blender=blender, options=options)
+    return replace(made, notes=(*made.notes, *note))
 
 
 def check_format(path: Path, to: str | None) -> str:

@@ -1,0 +1,86 @@
+"""`bench edit`: its truths are those of its edits, and its rows are what they say."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from materialist import bench, metrics
+from materialist.bench.edit import _scores
+from materialist.bench.edits import edits, true_scene
+from materialist.bench.synthetic import make_sample
+from materialist.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def cases(mitsuba):
+    sample = make_sample(0, 0, 0, size=40, spp=64)
+    return sample, {edit.kind: edit for edit in edits(sample, sample.envmap[:, ::-1], ("hue", "metal", "insert"))}
+
+
+def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
+    sample, found = cases
+    before = sample.render(sample.envmap, spp=64, seed=3)
+    for kind in ("hue", "metal"):
+        edit = found[kind]
+        after = edit.render(edit.envmap, spp=64, seed=3)
+        inside = edit.region(before, after)
+        np.testing.assert_array_equal(inside, edit.mask)
+        assert metrics.psnr(before, after, mask=inside) + 6 < metrics.psnr(before, after, mask=~inside)
+
+
+def test_the_true_cup_stands_where_the_scene_has_it(cases):
+    sample, found = cases
+    edit = found["insert"]
+    scene = true_scene(sample)
+    (body,) = edit.change(scene).bodies
+    from materialist.camera import project
+
+    place, _ = project(body.vertices.astype(np.float64), scene.camera)
+    rows, columns = np.nonzero(edit.mask)
+    assert columns.min() >= np.floor(place[:, 0].min()) and columns.max() <= np.ceil(place[:, 0].max())
+    assert rows.min() >= np.floor(place[:, 1].min()) - 1 and rows.max() <= np.ceil(place[:, 1].max())
+    assert edit.mask.sum() > 20
+
+
+def test_a_material_edit_of_the_scene_is_the_true_one(cases):
+    sample, found = cases
+    scene = true_scene(sample)
+    stage = found["metal"].render.__self__
+    edited = found["metal"].change(scene)
+    inside = found["metal"].mask
+    np.testing.assert_allclose(edited.materials.albedo[inside], stage.truth.materials.albedo[inside], atol=1e-5)
+    np.testing.assert_allclose(edited.materials.roughness[inside], stage.truth.materials.roughness[inside], atol=1e-6)
+    np.testing.assert_array_equal(edited.materials.albedo[~inside], scene.materials.albedo[~inside])
+
+
+def test_scores_are_inside_and_outside():
+    truth = np.full((4, 4, 3), 0.5, np.float32)
+    inside = np.zeros((4, 4), bool)
+    inside[:2] = True
+    worse = np.where(inside[..., None], 0.6, truth).astype(np.float32)
+    found = _scores(worse, truth, inside)
+    assert np.isinf(found["outside"]) and found["inside"] < found["overall"] < np.inf
+    assert np.isnan(_scores(worse, truth, np.ones((4, 4), bool))["outside"])
+
+
+def test_a_run_writes_rows_with_their_ceilings(mitsuba, monkeypatch, tmp_path):
+    from materialist import pipeline
+
+    sample = make_sample(0, 0, 0, size=32)
+    monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
+    out = bench.run(
+        "edit", output=tmp_path / "out", scenes=1, size=32, spp=8, truth_spp=16, latency=0, kinds="hue", device="cpu"
+    )
+    rows = json.loads((out / "report.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["hue: untouched", "ceiling hue", "ceiling hue, composite", "hue: edit"]
+    scored = [row["inside"] for row in rows]
+    assert scored[0] < min(scored[1:]) and rows[3]["inside"] == pytest.approx(rows[2]["inside"])  # a fit without error
+    assert (out / "plot.png").stat().st_size > 1000
+
+
+def test_options_that_make_no_sense(tmp_path):
+    for options in ({"kinds": "repaint"}, {"size": 8}, {"spp": 1}, {"latency": 3}):
+        with pytest.raises(InputError):
+            bench.run("edit", output=tmp_path / "x", **options)

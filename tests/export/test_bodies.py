@@ -1,0 +1,101 @@
+"""Inserted bodies in exports: their textures, their glass, and the picture that Mitsuba makes of them."""
+
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from export_scenes import room
+
+from materialist.edit.mesh_material import constant
+from materialist.export import body_parts
+from materialist.export.glb import glb_bytes
+from materialist.export.parts import scene_parts
+from materialist.export.run import export
+from materialist.types import Body, Scene, Surface
+
+
+def with_bodies(*surfaces: Surface) -> Scene:
+    """The room with a square plate before the box for each surface, facing the camera."""
+    made = []
+    for k, surface in enumerate(surfaces):
+        x = -0.9 + 0.9 * k
+        corners = np.array([[x, -0.4, -2], [x + 0.8, -0.4, -2], [x + 0.8, 0.4, -2], [x, 0.4, -2]], np.float32)
+        uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+        normals = np.tile(np.float32([0, 0, 1]), (4, 1))
+        made.append(Body(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, uv, surface, f"plate{k}"))
+    return replace(room(), bodies=tuple(made))
+
+
+CHECKS = Surface(
+    np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32), np.full((1, 1), 0.4, np.float32),
+    np.zeros((1, 1), np.float32),
+)  # fmt: skip
+GLASS = constant(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
+
+
+def document(scene):
+    data = glb_bytes(scene, [*scene_parts(scene), *body_parts.body_parts(scene)])
+    (size,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size])
+
+
+def test_glb_has_textures_that_repeat_and_glass():
+    content = document(with_bodies(CHECKS, GLASS))
+    names = [node["name"] for node in content["nodes"]]
+    assert names[-3:] == ["body0", "body1", "camera"]
+    checks, glass = content["materials"][-2:]
+    texture = content["textures"][checks["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
+    assert content["samplers"][texture["sampler"]]["wrapS"] == 10497
+    assert glass["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 1
+    np.testing.assert_allclose(glass["extensions"]["KHR_materials_ior"]["ior"], 1.4)
+    np.testing.assert_allclose(glass["pbrMetallicRoughness"]["baseColorFactor"][:3], [0.9, 0.5, 0.4])
+    assert content["extensionsUsed"] == ["KHR_materials_ior", "KHR_materials_transmission"]
+    assert "extensionsUsed" not in document(room())
+
+
+def test_trimesh_reads_the_bodies_back(tmp_path):
+    import trimesh
+
+    scene = with_bodies(CHECKS)
+    export(scene, tmp_path / "a.glb")
+    read = trimesh.load_scene(tmp_path / "a.glb", process=False).geometry
+    plate = next(mesh for name, mesh in read.items() if "body0" in name)
+    np.testing.assert_allclose(plate.vertices, scene.bodies[0].vertices, atol=1e-6)
+    picture = np.asarray(plate.visual.material.baseColorTexture.convert("RGB"))
+    np.testing.assert_array_equal(picture, CHECKS.albedo * 255)
+
+
+@pytest.mark.parametrize("surface", [CHECKS, GLASS], ids=["texture", "glass"])
+def test_mitsuba_renders_the_same_picture(tmp_path, surface):
+    from materialist.render.scene import GLASS_DEPTH, RenderScene
+
+    scene = with_bodies(surface)
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    expected = target.render_path(spp=64, seed=1, max_depth=GLASS_DEPTH)
+    done = export(scene, tmp_path / "scene", to="mitsuba")
+    loaded = target.mi.load_file(str(done.path), bsdf="materialist_disney", spp=64, max_depth=GLASS_DEPTH)
+    picture = np.array(target.mi.render(loaded, seed=2))[..., :3]
+    plate = np.s_[16:24, 14:26]
+    np.testing.assert_allclose(picture[plate].mean((0, 1)), expected[plate].mean((0, 1)), rtol=0.05, atol=0.01)
+    np.testing.assert_allclose(picture.mean((0, 1)), expected.mean((0, 1)), rtol=0.03)
+
+
+def test_formats_without_textures_say_so(tmp_path):
+    done = export(with_bodies(CHECKS), tmp_path / "folder", to="blend")
+    assert any("without textures" in note for note in done.notes)
+    facts = json.loads((tmp_path / "folder" / "scene.json").read_text())
+    np.testing.assert_allclose(facts["parts"]["body0"]["albedo"], CHECKS.albedo.mean((0, 1)), atol=1e-6)
+    done = export(with_bodies(constant(0.2, 0.5, 0.0)), tmp_path / "plain", to="blend")
+    assert not any("without textures" in note for note in done.notes)
+
+
+def test_maps_of_several_sizes_are_brought_to_one():
+    surface = Surface(CHECKS.albedo, np.linspace(0, 1, 4, dtype=np.float32).reshape(4, 1), CHECKS.metallic)
+    (part,) = body_parts.body_parts(with_bodies(surface))
+    assert part.materials.albedo.shape == (4, 2, 3) and part.materials.roughness.shape == (4, 2)
+    np.testing.assert_allclose(part.materials.roughness[:, 1], [0, 1 / 3, 2 / 3, 1], atol=1e-6)
+    np.testing.assert_allclose(part.materials.albedo[::2], CHECKS.albedo)
