@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 from materialist.edit.recipe import Step, apply
+from materialist.studio.ghost import with_bodies
 from materialist.types import Array, Scene
 
 _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live")
@@ -53,7 +54,8 @@ class Live:
             return self.scene.photo.linear
         preview = self._preview.result()
         edited = self.edited(steps)
-        return _THREAD.submit(preview.picture, edited, quick=True).result()
+        picture = _THREAD.submit(preview.picture, edited, quick=True).result()
+        return with_bodies(picture, edited) if edited.bodies else picture
 
     def close(self) -> None:
         """Give the memory back."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import gradio as gr
 
-from materialist.studio import tab_light, tab_look, tab_material, tab_open, tab_take
+from materialist.studio import tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
 from materialist.studio.context import Context, steps
 from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
@@ -40,10 +40,11 @@ def build(hub: Hub) -> Any:
                 tab_open.layout(context)
                 tab_material.layout(context)
                 tab_light.layout(context)
+                tab_object.layout(context)
                 tab_look.layout(context)
                 tab_take.layout(context)
         _wire(context)
-        for tab in (tab_material, tab_light, tab_look, tab_take):
+        for tab in (tab_material, tab_light, tab_object, tab_look, tab_take):
             tab.wire(context)
         tab_open.wire(context, page)
         page.unload(_leaver(hub))
@@ -67,7 +68,13 @@ def _left(parts: dict[str, Any]) -> None:
         js_on_load=asset("stage.js"), elem_id="stage",
     )  # fmt: skip
     with gr.Row(elem_id="tools"):
-        tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
+        tools = [
+            ("Click", "click"),
+            ("Box", "box"),
+            ("Brush", "brush"),
+            ("Place a lamp", "lamp"),
+            ("Place an object", "place"),
+        ]
         parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
@@ -94,6 +101,8 @@ def _wire(context: Context) -> None:
         session, wanted = context.session(request), read_pick(event._data)
         if wanted["tool"] == "lamp":
             tab_light.place_lamp(session, *wanted["at"])
+        elif wanted["tool"] == "place":
+            session.place(*wanted["at"])
         else:
             session.pick(wanted)
         return context.everything(session)

@@ -53,6 +53,8 @@ class Session:
         self.project: Project | None = None
         self.live: Live | None = None
         self.selection = Selection()
+        self.thing: dict[str, str] = {}
+        """Options of the next object."""
         self.lamp = (2700.0, 1.0, 0.75)
         """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.stack = Stack()
@@ -110,7 +112,7 @@ class Session:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
             self._remember("select")
             self._select(after)
-            step = self._current("edit")
+            step = self._current("edit") or self._current("glass")
             if after.mask is None or mode not in (ADD, REMOVE) or step is None or self.stack.current is None:
                 self.stack = self.stack.chosen(None)
             else:  # the edit in hand grows or shrinks with its region
@@ -124,19 +126,19 @@ class Session:
 
     # The stack of edits
 
-    def material(self, name: str, value: str | None) -> None:
-        """Set or clear (None) an option of the edit in hand; a new edit begins where there is none."""
+    def material(self, name: str, value: str | None, kind: str = "edit") -> None:
+        """Set or clear (None) an option of the edit (or glass) in hand; a new one begins where there is none."""
         with self.lock:
             scene = self.scene
             mask = self.selection.mask
-            step = self._current("edit")
+            step = self._current(kind)
             if step is None:
                 if mask is None:
                     raise InputError("Click the object that you want to change first.")
                 if not (mask & (scene.depth > 0)).any():
                     raise InputError("The selection covers only sky; select a surface.")
                 self._remember("begin")
-                self.stack = self.stack.add(Step("edit", {"mask": self._write_mask(mask)}, self.desk))
+                self.stack = self.stack.add(Step(kind, {"mask": self._write_mask(mask)}, self.desk))
                 step = self.stack.steps[-1]
             else:
                 self._remember(f"{name} of {self.stack.current}")
@@ -160,6 +162,33 @@ class Session:
             self._remember("add")
             self.stack = self.stack.add(replace(step, folder=self.desk))
             self._save()
+
+    def place(self, x: float, y: float) -> None:
+        """Stand the object in hand at a pixel: the one of the list that is chosen, else a new one of the library."""
+        with self.lock:
+            _ = self.scene
+            at = [f"{x:.0f}", f"{y:.0f}"]
+            step = self._current("insert")
+            self._remember("place" if step is None else f"at of {self.stack.current}")
+            if step is None:
+                if "mesh" not in self.thing:
+                    raise InputError("Choose an object from the list, or upload one, first.")
+                step = Step("insert", {**self.thing, "at": at}, self.desk)
+            before, trial = self.stack, replace(step, options={**step.options, "at": at})
+            self.stack = self.stack.add(trial) if before.current is None or step.kind != self._kind() else before
+            self._check_or(before, trial)
+
+    def thing_option(self, name: str, value: str | None) -> None:
+        """Set an option of the object in hand, or of the next one."""
+        with self.lock:
+            if name == "mesh":  # another object is a new one
+                self.stack = self.stack.chosen(None)
+            step = self._current("insert")
+            self.thing = {k: v for k, v in {**self.thing, name: value}.items() if v is not None}
+            if step is not None:
+                self._remember(f"{name} of {self.stack.current}")
+                merged = {k: v for k, v in {**step.options, name: value}.items() if v is not None}
+                self._check_or(self.stack, replace(step, options=merged))
 
     def act(self, what: str, index: int) -> None:
         """One of the buttons of the list: toggle, up, down, remove, choose."""
@@ -194,7 +223,11 @@ class Session:
         """Put the steps of an uploaded edits.yaml in place of the stack. Raises InputError, and changes nothing."""
         with self.lock:
             scene, desk = self.scene, self.desk
-            steps = tuple(_confined(step, desk) for step in read_recipe(file))
+            try:
+                read = read_recipe(file)
+            except InputError as error:
+                raise InputError(str(error).replace(str(file), "the file")) from error
+            steps = tuple(_confined(step, desk) for step in read)
             if self.live is not None and scene is not None:
                 self.live.edited(tuple(step for step in steps if not step.skipped))
             self._remember("load")
@@ -237,6 +270,22 @@ class Session:
         return self.desk / f"{stem}-{self._number(stem)}{suffix}"
 
     # Within
+
+    def _kind(self) -> str | None:
+        k = self.stack.current
+        return self.stack.steps[k].kind if k is not None else None
+
+    def _check_or(self, before: Stack, step: Step) -> None:
+        """Put a step in hand; where it cannot be applied the stack is as before, and the error goes on."""
+        assert self.stack.current is not None and self.live is not None
+        self.stack = self.stack.put(self.stack.current, step)
+        try:
+            self.live.edited(self.stack.active)
+        except InputError:
+            self.stack = before
+            self._past = self._past[:-1]
+            raise
+        self._save()
 
     def _current(self, kind: str) -> Step | None:
         k = self.stack.current

@@ -92,12 +92,16 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
 
 
 def do_mesh(progress: Progress, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
-    """A light GLB for the viewer."""
-    from materialist.export.run import export
+    """A light GLB of the depth surface for the viewer, without the planes that continue it."""
+    from materialist.export.glb import write_glb
+    from materialist.export.parts import scene_parts
+    from materialist.export.target import whole_files
     from materialist.io.package import load_scene
 
     progress("export", 0, 1)
-    export(load_scene(scene), output, force=True, max_triangles=triangles)
+    loaded = load_scene(scene)
+    with whole_files([Path(output)], True) as (file,):
+        write_glb(file, loaded, scene_parts(loaded, triangles)[:1])
     return {"file": output}
 
 

@@ -1,0 +1,159 @@
+"""The tab for things that are put into the photo, and for glass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gradio as gr
+
+from materialist.edit.recipe import KINDS
+from materialist.studio import uploads
+from materialist.studio.context import Context
+from materialist.studio.guard import guarded
+from materialist.studio.session import Session
+
+LIBRARY = ("Ball", "Cube", "Cylinder", "Cone", "Ring", "Slab")
+_MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
+_GLASS = {
+    "ior": (1.0, 2.5, 1.5, 0.01, "Index of refraction"),
+    "transmission": (0.0, 1.0, 0.9, 0.01, "How much light goes through"),
+}
+
+
+def layout(context: Context) -> None:
+    """The components."""
+    parts = context.parts
+    with gr.Tab("Objects", id="object"):
+        if "insert" in KINDS:
+            gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
+            parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
+            parts["own_mesh"] = gr.File(
+                label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=110,
+                file_types=[".glb", ".ply", ".obj", ".stl"],
+            )  # fmt: skip
+            parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
+            parts["turn"] = gr.Slider(-180, 180, 0, step=1, label="Turn, degrees", buttons=[])
+            with gr.Row():
+                parts["made_of"] = gr.Dropdown(list(_MATERIALS), value="as-is", label="Material", min_width=120)
+                parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
+            gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
+        if "glass" in KINDS:
+            with gr.Accordion("Turn the selection to glass", open=False):
+                for name, (low, high, start, step, label) in _GLASS.items():
+                    parts[f"glass_{name}"] = gr.Slider(low, high, start, step=step, label=label, buttons=[])
+                parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
+                parts["glass"] = gr.Button("Make it glass", elem_id="glass")
+
+
+def wire(context: Context) -> None:
+    """The events."""
+    parts = context.parts
+    live: dict[str, Any] = {
+        "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
+    }  # fmt: skip
+    if "insert" in KINDS:
+        _wire_things(context, live)
+    if "glass" in KINDS:
+        _wire_glass(context, live)
+    del parts
+
+
+def _wire_things(context: Context, live: dict[str, Any]) -> None:
+    parts = context.parts
+
+    @guarded
+    def choose(name: str | None, request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        if name in LIBRARY:
+            session.thing_option("mesh", library_file(session, str(name)))
+        return {**context.picture(session), parts["tool"]: "place"}
+
+    @guarded
+    def uploaded(file: str | None, request: gr.Request) -> dict[Any, Any]:
+        session = context.session(request)
+        if file is None:
+            return {}
+        from materialist.edit.meshes import read_model
+
+        suffix = uploads.checked_mesh(Path(file), Path(file).name)
+        kept = session.keep(Path(file), "mesh", suffix)
+        try:
+            read_model(session.desk / kept)
+        except Exception:
+            (session.desk / kept).unlink(missing_ok=True)
+            raise
+        session.thing_option("mesh", kept)
+        return {**context.picture(session), parts["tool"]: "place"}
+
+    def setter(name: str, text: Callable[[Any], str | None]) -> Any:
+        @guarded
+        def moved(value: Any, request: gr.Request) -> dict[Any, Any]:
+            session = context.session(request)
+            session.thing_option(name, text(value))
+            return context.picture(session)
+
+        return moved
+
+    @guarded
+    def made(kind: str, colour: str, request: gr.Request) -> dict[Any, Any]:
+        from materialist.studio.tab_material import hex_colour
+
+        session = context.session(request)
+        session.thing_option("material", hex_colour(colour) if kind == "colour" else kind)
+        return context.picture(session)
+
+    outputs = [*context.picture_parts, parts["tool"]]
+    parts["thing"].input(choose, parts["thing"], outputs, **live)
+    parts["own_mesh"].upload(uploaded, parts["own_mesh"], outputs, **live)
+    parts["scale"].input(setter("scale", lambda v: f"{float(v):.4g}"), parts["scale"], context.picture_parts, **live)
+    parts["turn"].input(setter("turn", lambda v: f"{float(v):.4g}"), parts["turn"], context.picture_parts, **live)
+    for part in (parts["made_of"], parts["thing_colour"]):
+        part.input(made, [parts["made_of"], parts["thing_colour"]], context.picture_parts, **live)
+
+
+def _wire_glass(context: Context, live: dict[str, Any]) -> None:
+    parts = context.parts
+
+    @guarded
+    def glass(ior: float, transmission: float, tint: str, request: gr.Request) -> dict[Any, Any]:
+        from materialist.edit.material import parse_colour
+        from materialist.studio.tab_material import hex_colour
+
+        session = context.session(request)
+        session.material("ior", f"{float(ior):.4g}", "glass")
+        session.material("transmission", f"{float(transmission):.4g}", "glass")
+        linear = parse_colour(hex_colour(tint))
+        session.material("tint", None if linear.min() >= 1 else ",".join(f"{v:.4g}" for v in linear), "glass")
+        return context.picture(session)
+
+    values = [parts["glass_ior"], parts["glass_transmission"], parts["glass_tint"]]
+    parts["glass"].click(glass, values, context.picture_parts, **live)
+
+
+def library_file(session: Session, name: str) -> str:
+    """A computed mesh as a file on the desk, +Y up."""
+    file = session.desk / f"thing-{name.lower()}.ply"
+    if not file.is_file():
+        shape(name).export(file)
+    return file.name
+
+
+def shape(name: str) -> Any:
+    """One of the library as a trimesh, +Y up, longest side 1."""
+    import numpy as np
+    from trimesh import creation, transformations
+
+    made: dict[str, Callable[[], Any]] = {
+        "Ball": lambda: creation.icosphere(subdivisions=4, radius=0.5),
+        "Cube": lambda: creation.box((1, 1, 1)),
+        "Cylinder": lambda: creation.cylinder(0.3, 1, sections=96),
+        "Cone": lambda: creation.cone(0.4, 1, sections=96),
+        "Ring": lambda: creation.torus(0.35, 0.15, major_sections=96, minor_sections=48),
+        "Slab": lambda: creation.box((1, 1, 0.12)),
+    }
+    mesh = made[name]()
+    # trimesh builds along +Z; a ring lies flat as it is.
+    mesh.apply_transform(transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
+    return mesh

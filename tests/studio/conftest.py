@@ -1,0 +1,44 @@
+"""A running studio on a small scene, and a browser; both are skipped, with the reason, where they cannot be."""
+
+import shutil
+
+import pytest
+from studio_scenes import package
+from studio_server import start
+
+
+@pytest.fixture(scope="session")
+def running(tmp_path_factory):
+    """(address, work folder) of a studio that was started on the small scene."""
+    pytest.importorskip("gradio", reason="needs gradio")
+    folder = tmp_path_factory.mktemp("browser")
+    process, address = start(folder / "work", str(package(folder)))
+    yield address, folder / "work"
+    process.terminate()
+    process.wait(20)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("needs chromium")
+    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=chromium, args=options)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser):
+    """A fresh page (a new person's browser) that notes its requests and the errors in it."""
+    context = browser.new_context(viewport={"width": 1280, "height": 1000}, accept_downloads=True)
+    made = context.new_page()
+    made.requested, made.errors = [], []
+    made.on("request", lambda request: made.requested.append(request.url))
+    made.on("pageerror", lambda error: made.errors.append(str(error)))
+    made.set_default_timeout(40_000)
+    yield made
+    context.close()

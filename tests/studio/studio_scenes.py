@@ -1,0 +1,55 @@
+"""Small scenes for the studio: `edit_scenes` again, with a field of view and a warning, as packages on disk."""
+
+import struct
+import zlib
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from materialist.geometry.build import build_geometry
+from materialist.io.package import save_scene
+from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
+
+HEIGHT, WIDTH = 48, 64
+
+
+def block() -> np.ndarray:
+    """[H, W] bool of the red block."""
+    mask = np.zeros((HEIGHT, WIDTH), bool)
+    mask[16:32, 16:34] = True
+    return mask
+
+
+@lru_cache(maxsize=1)
+def room() -> Scene:
+    """A red block before a grey wall; the top rows are sky."""
+    camera = Camera(WIDTH, HEIGHT, 40.0)
+    mask = block()
+    depth = np.where(mask, 2.0, 3.0).astype(np.float32)
+    depth[:4] = 0
+    normal = np.zeros((HEIGHT, WIDTH, 3), np.float32)
+    normal[..., 2] = 1
+    albedo = np.where(mask[..., None], [0.6, 0.12, 0.08], [0.5, 0.5, 0.45]).astype(np.float32)
+    materials = Materials(albedo, np.full((HEIGHT, WIDTH), 0.5, np.float32), np.zeros((HEIGHT, WIDTH), np.float32))
+    photo = Photo(albedo, camera, albedo, fov_source="exif", path="room <b>.png")
+    geometry = build_geometry(depth, normal, camera, completion="none")
+    prior = Prediction(materials, normal, depth, "made")
+    report = FitReport(metrics={"rerender_psnr_path": 31.5}, warnings=("It is too dark.",))
+    envmap = np.ones((8, 16, 3), np.float32)
+    return Scene(camera, photo, prior, materials, normal, depth, geometry, envmap, photo.linear, report)
+
+
+def package(folder: Path) -> Path:
+    """The room as a scene package."""
+    path = folder / "room.scene"
+    save_scene(replace(room()), path)
+    return path
+
+
+def png_header(width: int, height: int) -> bytes:
+    """A PNG that claims a size and holds next to nothing."""
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))  # noqa: E731
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")

@@ -1,0 +1,105 @@
+"""Who a page belongs to, and what the server refuses."""
+
+import socket
+
+import pytest
+
+from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
+from materialist.errors import InputError
+from materialist.studio.hub import ALONE, Hub
+from materialist.studio.jobs import Jobs
+from materialist.studio.server import check_host, check_port, first_project, new_hub
+from materialist.studio.work import WorkFolder
+
+
+@pytest.fixture
+def shared(tmp_path):
+    hub = Hub(WorkFolder(tmp_path), Jobs(1), alone=False)
+    yield hub
+    hub.jobs.close()
+
+
+def test_people_are_kept_apart(shared):
+    anna, bert = "a" * 16, "b" * 16
+    project = shared.work.new("Anna's", anna)
+    (project.scene).mkdir()
+    session = shared.session("page", shared.person(bert))
+    with pytest.raises(InputError, match="no longer"):
+        shared.open(session, project.name)
+    with pytest.raises(InputError, match="reload"):
+        shared.session("unknown page")
+    with pytest.raises(InputError, match="reload"):
+        shared.session(None)
+    assert shared.session("page") is session
+    shared.leave("page")
+    shared.leave("page")
+    assert shared.open_pages == 0
+
+
+@pytest.mark.parametrize("token", [None, "", "../../x", "A" * 20, "a" * 40, 5])
+def test_tokens_are_checked(shared, token):
+    with pytest.raises(InputError):
+        shared.person(token)
+
+
+def test_alone_everyone_is_me(tmp_path):
+    hub = Hub(WorkFolder(tmp_path), Jobs(1))
+    assert hub.person("whatever") == ALONE
+    hub.jobs.close()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.8.8.8"])
+def test_this_machine_needs_no_password(host):
+    assert check_host(host, None, False)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "example.org", "::"])
+def test_others_need_leave(host):
+    with pytest.raises(InputError, match="--password"):
+        check_host(host, None, False)
+    assert not check_host(host, "word", False) and not check_host(host, None, True)
+
+
+def test_a_port_in_use_is_one_sentence(tmp_path, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"Port {port}"):
+            check_port("127.0.0.1", port)
+        assert run_to_exit_code(app, ["studio", "--port", str(port), "--work", str(tmp_path / "w")]) == 2
+    assert f"Port {port}" in capsys.readouterr().err
+    assert not (tmp_path / "w").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--host", "0.0.0.0"], ["--port", "0"], ["--port", "99999"], ["--work", "/proc/nowhere"], ["--workers", "0"],
+     ["/no/such/scene"]],
+)  # fmt: skip
+def test_bad_options_end_with_2(arguments, tmp_path, capsys):
+    work = [] if "--work" in arguments else ["--work", str(tmp_path)]
+    port = [] if "--port" in arguments else ["--port", "47391"]
+    assert run_to_exit_code(app, ["studio", *arguments, *work, *port]) == 2
+    assert capsys.readouterr().err.startswith("Error: ")
+
+
+def test_a_scene_elsewhere_is_known_again(tmp_path):
+    scene = tmp_path / "kitchen.scene"
+    scene.mkdir()
+    (scene / "scene.json").write_text("{}")
+    hub = new_hub(tmp_path / "work", alone=True)
+    first = first_project(hub.work, str(scene))
+    assert first.scene == scene and first == first_project(hub.work, str(scene))
+    assert first_project(hub.work, None) is None
+    hub.jobs.close()
+
+
+def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
+    hub = new_hub(tmp_path / "work", alone=True)
+    file = hub.work.root / "result.png"
+    file.write_bytes(b"x")
+    first, second = hub.handed(file), hub.handed(file)
+    assert first != second and first.startswith(str(hub.work.cache)) and len(first.split("/")[-2]) == 32
+    hub.jobs.close()

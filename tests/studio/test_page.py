@@ -1,0 +1,283 @@
+"""The studio in a real browser."""
+
+import io
+import json
+import re
+import subprocess
+import urllib.error
+import urllib.parse
+import urllib.request
+
+import numpy as np
+import pytest
+from PIL import Image
+from studio_scenes import png_header
+from studio_server import start
+
+READY = "text=Ready: click an object"
+PICTURE = "document.querySelector('#stage .photo').src"
+
+
+def opened(page, address):
+    page.goto(address)
+    page.wait_for_selector("#stage .photo[src]")
+    page.wait_for_selector(READY)
+
+
+def click_photo(page, x, y, modifiers=()):
+    """A click at a share of the stage's width and height."""
+    box = page.locator("#stage .view").bounding_box()
+    page.locator("#stage .view").click(
+        position={"x": x * box["width"], "y": y * box["height"]}, modifiers=list(modifiers)
+    )
+
+
+def slide(page, name, value):
+    """Move a slider, and wait for the next picture."""
+    before = page.evaluate(PICTURE)
+    script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
+        r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
+    page.evaluate(script, [name, value])
+    page.wait_for_function("(old) => document.querySelector('#stage .photo').src !== old", arg=before)
+
+
+def pixels(page):
+    """[H, W, 3] uint8 of the picture on the stage."""
+    url = page.evaluate(PICTURE)
+    return np.asarray(Image.open(io.BytesIO(urllib.request.urlopen(url).read())).convert("RGB"))
+
+
+def test_select_edit_undo(page, running):
+    opened(page, running[0])
+    first = pixels(page)
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    slide(page, "hue", 120)
+    green = pixels(page)
+    assert green[24, 25, 1] > green[24, 25, 0] + 40 and first[24, 25, 0] > first[24, 25, 1] + 40
+    assert np.abs(green[40, 55].astype(int) - first[40, 55]).max() < 6
+    assert "Material: hue 120" in page.inner_text("#steps")
+    page.locator("#steps input").uncheck()
+    page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Photo'")
+    page.locator("#steps input").check()
+    page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Live preview'")
+    page.get_by_role("tab", name="Light").click()
+    page.locator("#lights button").nth(5).click()
+    page.wait_for_selector("#steps >> text=light-sunset")
+    page.get_by_role("button", name="Undo").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 1")
+    page.reload()
+    page.wait_for_selector("#steps >> text=hue 120")  # nothing is lost
+    page.wait_for_selector(READY)
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+    assert not page.errors
+
+
+def test_nothing_is_asked_of_anyone_else(page, running):
+    opened(page, running[0])
+    for name in ("Open", "Light", "Objects", "Take away", "Look"):
+        page.get_by_role("tab", name=name).click()
+    page.wait_for_selector("#report >> text=close to the photo")
+    outside = [u for u in page.requested if not u.startswith((running[0], "data:", "blob:"))]
+    assert not outside and len(page.requested) > 20
+
+
+def test_by_keyboard_alone(page, running):
+    opened(page, running[0])
+    page.locator("#stage .view").focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    page.locator("#hue input[type=range]").focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_selector("#steps >> text=/hue [1-3]/")
+    page.locator("#steps [data-key=remove-0]").focus()
+    page.keyboard.press("Enter")
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+
+
+def test_on_a_phone(browser, running):
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    page = context.new_page()
+    opened(page, running[0])
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    page.locator("#stage .view").tap(position={"x": 0.39 * 300, "y": 0.5 * 225})
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    page.locator("#metallic").scroll_into_view_if_needed()
+    box = page.locator("#stage .view").bounding_box()
+    assert box["y"] + box["height"] > 60, "the picture is out of sight while its sliders move"
+    for name in ("Open", "Light"):
+        page.get_by_role("tab", name=name).click()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    context.close()
+
+
+CONTRAST = """() => {
+  const lum = (c) => { const f = (v) => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; };
+    return .2126 * f(c[0]) + .7152 * f(c[1]) + .0722 * f(c[2]); };
+  const rgba = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
+  const low = [];
+  for (const n of document.querySelectorAll('button, label, span, p, h1, h2, li, summary, input')) {
+    const text = [...n.childNodes].some((c) => c.nodeType === 3 && c.textContent.trim());
+    if (!text || n.disabled || n.closest(':disabled') ) continue;
+    if (!n.checkVisibility({visibilityProperty: true, opacityProperty: true})) continue;
+    if (n.closest('#stage, .sr-only')) continue;
+    const style = getComputedStyle(n), ink = rgba(style.color);
+    let paper = null;
+    for (let p = n; p && !paper; p = p.parentElement) {
+      const b = rgba(getComputedStyle(p).backgroundColor); if (b[3] > .99) paper = b; }
+    const [a, b] = [lum(ink), lum(paper || [255, 255, 255])].sort((x, y) => y - x);
+    const ratio = (a + .05) / (b + .05);
+    const large = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.5 && +style.fontWeight >= 700);
+    if (ratio < (large ? 3 : 4.5))
+      low.push([n.tagName, n.textContent.trim().slice(0, 40), style.color, ratio.toFixed(2)]);
+  }
+  return low; }"""
+
+
+def test_text_is_readable_and_things_have_names(page, running):
+    opened(page, running[0])
+    for name in ("Open", "Material", "Light", "Objects", "Look", "Take away"):
+        page.get_by_role("tab", name=name).click()
+        page.wait_for_timeout(300)
+        assert page.evaluate(CONTRAST) == [], name
+        unnamed = """() => [...document.querySelectorAll('button, input, [role=application]')]
+            .filter((n) => n.checkVisibility() && !n.innerText && !n.ariaLabel && !n.title
+                    && !(n.labels && n.labels.length) && !n.closest('label') && n.type !== 'file')
+            .map((n) => n.outerHTML.slice(0, 160))"""
+        assert page.evaluate(unnamed) == [], name
+
+
+@pytest.mark.slow
+def test_bad_uploads_are_sentences(page, running, tmp_path):
+    opened(page, running[0])
+    page.get_by_role("tab", name="Open").click()
+    for name, content, message in (
+        ("no.png", b"not an image", "not an image"),
+        ("bomb.png", png_header(65_000, 65_000), "megapixels"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        page.set_input_files("#file input[type=file]", str(tmp_path / name))
+        page.wait_for_selector(f"text=/{message}/")
+        page.locator("#file button[aria-label=Clear], #file button[aria-label='Remove this file']").first.click()
+    (tmp_path / "no.zip").write_bytes(b"PK\x03\x04")
+    page.set_input_files("#file input[type=file]", str(tmp_path / "no.zip"))
+    page.wait_for_selector("text=will be opened as a scene")
+    page.click("#start")
+    page.wait_for_selector("text=/not a readable zip/")
+
+
+def test_files_outside_the_cache_are_not_served(running):
+    address, work = running
+    for path in (
+        "/etc/passwd",
+        str(work / "photo-001" / "project.json"),
+        str(work),
+        "../pyproject.toml",
+        "pyproject.toml",
+    ):
+        quoted = urllib.parse.quote(path)
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(f"{address}/gradio_api/file={quoted}")
+        assert refused.value.code in (403, 404), path
+    served = json.load(urllib.request.urlopen(f"{address}/gradio_api/info"))
+    assert not served["named_endpoints"]
+
+
+@pytest.mark.slow
+def test_a_password_closes_the_door(tmp_path):
+    pytest.importorskip("gradio", reason="needs gradio")
+    process, address = start(tmp_path / "work", "--password", "open sesame")
+    try:
+
+        def enter(word):
+            data = urllib.parse.urlencode({"username": "anna", "password": word}).encode()
+            return urllib.request.urlopen(f"{address}/login", data).status
+
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            enter("wrong")
+        assert refused.value.code in (400, 401)
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(f"{address}/config")
+        assert refused.value.code == 401
+        assert enter("open sesame") == 200
+    finally:
+        process.send_signal(2)
+        assert process.wait(20) in (0, 130)
+
+
+@pytest.mark.slow
+def test_two_people_at_once(browser, running):
+    address = running[0]
+    contexts = [browser.new_context() for _ in range(2)]
+    pages = [context.new_page() for context in contexts]
+    for page in pages:
+        opened(page, address)
+    for page in pages:
+        click_photo(page, 0.39, 0.5)
+    for page in pages:
+        page.wait_for_selector("#stage .view[data-selected=yes]")
+    slide(pages[0], "hue", 120)
+    slide(pages[1], "hue", -120)
+    green, blue = pixels(pages[0])[24, 25], pixels(pages[1])[24, 25]
+    assert green.argmax() == 1 and blue.argmax() == 2
+    assert "hue 120" in pages[0].inner_text("#steps") and "hue -120" in pages[1].inner_text("#steps")
+    for page in pages:
+        page.locator("#steps [data-key=remove-0]").click()
+        page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+    for context in contexts:
+        context.close()
+
+
+@pytest.mark.slow
+def test_the_whole_story(page, running, tmp_path):
+    """A dropped photo, cancelled and begun again, reloaded in the middle, edited, traced, taken away."""
+    from materialist.io.examples import example_path
+
+    address, _ = running
+    page.set_default_timeout(300_000)
+    opened(page, address)
+    page.get_by_role("tab", name="Open").click()
+    page.set_input_files("#file input[type=file]", str(example_path("coffee")))
+    page.wait_for_selector("#facts >> text=35.0°")
+    page.get_by_label("Working size").click()
+    page.get_by_role("option", name="256").click()
+    page.click("#start")
+    page.wait_for_selector("#fit .bar")
+    page.wait_for_timeout(4000)
+    page.click("#cancel")
+    page.wait_for_selector("#fit >> text=Stopped")
+    page.wait_for_selector("#cancel", state="hidden")
+    page.click("#start")
+    page.wait_for_selector("#cancel", state="visible")
+    page.wait_for_timeout(6000)
+    page.reload()
+    page.wait_for_selector("#fit .bar")  # the work goes on
+    page.wait_for_selector(READY)
+    click_photo(page, 0.3, 0.8)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    slide(page, "hue", 100)
+    page.get_by_role("button", name="Quick look").click()
+    page.wait_for_selector("#stage .badge >> text=Path traced, 16")
+    page.get_by_role("tab", name="Look").click()
+    page.get_by_role("button", name="Show the mesh").click()
+    page.wait_for_selector("#mesh canvas")
+    page.get_by_role("tab", name="Take away").click()
+    page.get_by_label(re.compile("edits.yaml with")).check()
+    page.click("#make")
+    with page.expect_download() as download:
+        page.click("#download")
+    file = tmp_path / "edits.zip"
+    download.value.save_as(file)
+    assert subprocess.run(["unzip", "-tq", str(file)], capture_output=True).returncode == 0
+    page.get_by_label("Picture, PNG").check()
+    page.click("#make")
+    page.wait_for_selector("#download >> text=.png")
+    with page.expect_download() as download:
+        page.click("#download")
+    download.value.save_as(tmp_path / "a.png")
+    picture = np.asarray(Image.open(tmp_path / "a.png"))
+    assert picture.shape[:2] == (400, 600)

@@ -1,0 +1,57 @@
+"""Clicks, boxes and strokes."""
+
+import numpy as np
+import pytest
+from studio_scenes import block, room
+
+from materialist.errors import InputError
+from materialist.studio.selection import Selection, read_pick
+
+
+def overlap(mask: np.ndarray, truth: np.ndarray) -> float:
+    return float((mask & truth).sum() / (mask | truth).sum())
+
+
+def test_click_add_and_remove():
+    scene = room()
+    one = Selection().click(scene, 25, 24, "new")
+    assert one.mask is not None and overlap(one.mask, block()) > 0.9
+    two = one.click(scene, 50, 40, "add")
+    assert two.mask is not None and two.mask[40, 50] and two.mask[24, 25]
+    assert two.click(scene, 25, 24, "add").mask[24, 25] == False  # noqa: E712 - on what is selected: taken away
+    assert one.click(scene, 25, 24, "new").mask is None
+    assert one.click(scene, 50, 40, "remove") is one
+
+
+def test_box_and_brush():
+    scene = room()
+    boxed = Selection().box(scene, [12, 12, 40, 36], "new")
+    assert boxed.mask is not None and overlap(boxed.mask, block()) > 0.8
+    rubbed = boxed.box(scene, [0, 0, 64, 24], "remove")
+    assert rubbed.mask is not None and not rubbed.mask[:24].any() and rubbed.mask[26].any()
+    painted = Selection().brush(scene, [[10, 40], [30, 40]], 3, "add")
+    assert painted.mask is not None and painted.mask[40, 10:31].all() and not painted.mask[34].any()
+    assert painted.brush(scene, [[0, 40], [63, 40]], 8, "remove").mask is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [None, {}, {"tool": "click"}, {"tool": "click", "at": [1]}, {"tool": "rm", "at": []},
+     {"tool": "click", "at": ["a", 1]}, {"tool": "click", "at": [float("nan"), 1]},
+     {"tool": "click", "at": [1, 2], "mode": "x"},
+     {"tool": "brush", "points": [[1]]}, {"tool": "box", "at": [1, 2, 3]}],
+)  # fmt: skip
+def test_nonsense_from_the_page(data):
+    with pytest.raises(InputError):
+        read_pick(data)
+
+
+def test_a_pick_is_read():
+    pick = read_pick({"tool": "brush", "mode": "add", "points": [[1, 2], [3, 4]], "radius": 5})
+    assert pick["points"] == [[1, 2], [3, 4]] and pick["radius"] == 5
+    with pytest.raises(InputError, match="stroke"):
+        Selection().brush(room(), [], 5, "add")
+    with pytest.raises(InputError, match="sky"):
+        Selection().click(room(), 3, 1, "new")
+    with pytest.raises(InputError, match="outside"):
+        Selection().click(room(), 300, 1, "new")

@@ -1,0 +1,211 @@
+"""A page's session, on a small scene with a real preview."""
+
+import numpy as np
+import pytest
+from studio_scenes import block, package, room
+
+from materialist.edit.recipe import Step, apply, read_recipe
+from materialist.errors import InputError
+from materialist.studio.context import light_values, material_values
+from materialist.studio.hub import Hub
+from materialist.studio.jobs import Jobs
+from materialist.studio.selection import Selection, read_pick
+from materialist.studio.stack import Stack
+from materialist.studio.tab_light import place_lamp
+from materialist.studio.tab_object import LIBRARY, library_file, shape
+from materialist.studio.tab_take import commands
+from materialist.studio.work import WorkFolder
+
+
+@pytest.fixture(scope="module")
+def hub(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studio")
+    work = WorkFolder(folder / "work")
+    made = Hub(work, Jobs(1))
+    made.start = work.new("Room", "me", scene=package(folder))
+    yield made
+    made.jobs.close()
+
+
+@pytest.fixture(scope="module")
+def opened(hub):
+    session = hub.session("page", "me")
+    hub.open(session, hub.start.name)
+    session.live.wait()
+    return session
+
+
+@pytest.fixture
+def session(opened):
+    """The open session without edits."""
+    opened.stack, opened.thing = Stack(), {}
+    opened.deselect()
+    opened._past = []
+    opened._save()
+    return opened
+
+
+def click(session, x=25, y=24, mode="new"):
+    session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))
+
+
+def test_an_edit_from_click_to_recipe(session):
+    with pytest.raises(InputError, match="Click the object"):
+        session.material("hue", "30")
+    click(session)
+    session.material("hue", "120")
+    session.material("roughness", "0.2")
+    steps = read_recipe(session.desk / "edits.yaml")
+    assert len(steps) == 1 and steps[0].options == {"mask": steps[0].options["mask"], "hue": "120", "roughness": "0.2"}
+    edited = apply(room(), steps)
+    changed = (edited.materials.albedo != room().materials.albedo).any(-1)
+    assert changed[block()].mean() > 0.9 and not changed[~block()].any()
+    session.material("hue", None)
+    session.material("roughness", None)
+    assert apply(room(), read_recipe(session.desk / "edits.yaml")).materials.roughness.min() == 0.5
+
+
+def test_the_picture_follows(session):
+    before = session.stage()
+    assert before["badge"] == "Photo" and before["picture"].startswith("data:image/jpeg")
+    click(session)
+    session.material("hue", "120")
+    after = session.stage()
+    assert after["badge"] == "Live preview" and after["picture"] != before["picture"] and after["fill"]
+    session.act("toggle", 0)
+    assert session.stage()["picture"] == before["picture"]
+    session.act("toggle", 0)
+    assert session.stage()["picture"] == after["picture"]
+    assert session.undo() and session.undo() and session.undo()
+    assert session.stage()["picture"] == before["picture"]
+
+
+def test_quick_pictures_agree_with_slow_ones(session):
+    click(session)
+    session.material("hue", "120")
+    session.material("metallic", "1")
+    edited = session.live.edited(session.stack.active)
+    preview = session.live._preview.result()
+    whole = preview._image(preview._shaded(edited.materials, preview._tables), preview._sky(edited.envmap))
+    np.testing.assert_allclose(preview.render(edited), whole, atol=2e-6)
+    quick, slow = preview.picture(edited, quick=True), preview.picture(edited)
+    outside = ~session.selection.mask
+    assert np.array_equal(quick[outside], room().photo.linear[outside])
+    import cv2
+
+    inner = cv2.erode(block().astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    np.testing.assert_allclose(quick[inner], slow[inner], atol=0.02)
+
+
+def test_undo_takes_a_whole_drag_back(session):
+    click(session)
+    for hue in range(10, 100, 10):
+        session.material("hue", str(hue))
+    session.undo()
+    assert session.stack.steps[0].options.get("hue") in (None, "10")
+    while session.undo():
+        pass
+    assert session.stack.steps == () and not (session.desk / "edits.yaml").exists()
+
+
+def test_a_selection_that_grows_takes_its_edit_along(session):
+    click(session)
+    session.material("hue", "90")
+    first = session.stack.steps[0].options["mask"]
+    click(session, 50, 40, "add")
+    assert session.stack.current == 0 and session.stack.steps[0].options["mask"] != first
+    click(session, 25, 24, "new")  # inside the mask: taken away, so nothing of it is left in hand
+    click(session, 25, 24, "new")
+    session.material("value", "0.5")
+    assert len(session.stack.steps) == 2
+
+
+def test_choosing_a_step_brings_its_region_and_values_back(session):
+    click(session)
+    session.material("hue", "90")
+    session.light(rotate="30", ambient="0.5", sun=["10", "20"])
+    assert session.stack.current == 1 and len(session.stack.steps) == 2
+    session.deselect()
+    session.act("choose", 0)
+    assert (session.selection.mask & block()).sum() > 0.9 * block().sum()
+    assert material_values(session)["hue"] == 90 and material_values(session)["roughness"] == 0.5
+    values = light_values(session)
+    assert (values["rotate"], values["ambient"], values["sun_on"], values["elevation"]) == (30, 0.5, True, 20)
+    session.act("up", 1)
+    assert [s.kind for s in session.stack.steps] == ["relight", "edit"]
+    with pytest.raises(InputError, match="no longer"):
+        session.act("remove", 7)
+    with pytest.raises(InputError, match="not known"):
+        session.act("rm -rf", 0)
+
+
+def test_light_and_lamps(session):
+    place_lamp(session, 40, 40)
+    place_lamp(session, 10, 40)
+    assert len(session.stack.steps) == 1 and len(apply(room(), list(session.stack.steps)).lamps) == 2
+    assert session.stage()["lamps"] == [[40, 40], [10, 40]]
+    with pytest.raises(InputError, match="no surface"):
+        place_lamp(session, 5, 1)
+    session.light(lamps=None)
+    assert session.stack.steps == ()
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_things_are_closed_and_stand_up(name):
+    mesh = shape(name)
+    assert mesh.is_watertight and mesh.volume > 0 and 0.8 < mesh.extents.max() <= 1.001
+    if name in ("Cylinder", "Cone"):
+        assert mesh.extents.argmax() == 1
+    if name in ("Ring", "Slab"):
+        assert mesh.extents.argmin() == 1
+
+
+def test_an_object_is_placed_moved_and_seen(session):
+    with pytest.raises(InputError, match="Choose an object"):
+        session.place(45, 40)
+    session.thing_option("mesh", library_file(session, "Cube"))
+    session.place(50, 40)
+    before = session.stage()["picture"]
+    session.place(15, 40)
+    session.thing_option("scale", "1.5")
+    assert len(session.stack.steps) == 1 and session.stack.steps[0].options["at"] == ["15", "40"]
+    assert session.stage()["picture"] != before
+    steps = session.stack.steps
+    with pytest.raises(InputError):
+        session.thing_option("scale", "1e9")
+    assert session.stack.steps == steps
+    assert len(apply(room(), read_recipe(session.desk / "edits.yaml")).bodies) == 1
+
+
+def test_uploaded_recipes_stay_on_the_desk(session, tmp_path):
+    secret = tmp_path / "secret.png"
+    secret.write_bytes(b"x")
+    for text, message in (
+        (f"- edit: {{mask: {secret}, hue: 3}}", "plain file name"), ("- edit: {mask: ../x.png}", "plain file name"),
+        ("- edit: {mask: nothere.png}", "not here"), ("- edit: {colour: red}", "says 'colour'"),
+        ("- explode: {}", "must be one of"), ("!!python/object/apply:os.system ['true']", "must be one of"),
+        ("- relight: {envmap: /etc/hostname}", "plain file name"),
+    ):  # fmt: skip
+        file = tmp_path / "edits.yaml"
+        file.write_text(text)
+        with pytest.raises(InputError, match=message):
+            session.read_edits(file)
+    assert session.stack.steps == ()
+    file.write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n- relight: {rotate: 20, skip: true}\n")
+    session.read_edits(file)
+    assert len(session.stack.steps) == 2 and len(session.stack.active) == 1
+
+
+def test_reopened_where_it_was_left(hub, session):
+    click(session)
+    session.material("hue", "77")
+    other = hub.session("another page", "me")
+    hub.open(other, hub.start.name)
+    assert other.stack.steps[0].options["hue"] == "77" and other.selection == Selection()
+    assert "materialist apply" in commands(other) and "edits-me/edits.yaml" in commands(other)
+    other.add(Step("relight", {"rotate": "5"}))
+    assert len(session.stack.steps) == 1  # in memory they are apart
+    hub.leave("another page")
+    assert other.live is None and session.live is not None
+    with pytest.raises(InputError, match="Open a photo"):
+        other.material("hue", "1")

@@ -1,0 +1,42 @@
+"""The stack of edits."""
+
+from materialist.edit.recipe import Step, read_recipe, write_recipe
+from materialist.studio.stack import Stack, summary
+
+A, B, C = (
+    Step("edit", {"mask": "mask-1.png", "hue": "20"}),
+    Step("relight", {"rotate": "90"}),
+    Step("edit", {"hue": "1"}),
+)
+
+
+def test_add_move_toggle_remove():
+    stack = Stack().add(A).add(B).add(C)
+    assert stack.current == 2 and stack.steps == (A, B, C)
+    assert stack.moved(2, -1).steps == (A, C, B) and stack.moved(2, -1).current == 1
+    assert stack.moved(0, -1) is stack and stack.moved(2, 1) is stack
+    off = stack.toggled(1)
+    assert off.active == (A, C) and off.steps[1].skipped and off.toggled(1).steps == stack.steps
+    assert stack.without(0).steps == (B, C) and stack.without(0).current is None
+    assert stack.last("edit") == 2 and stack.last("insert") is None
+
+
+def test_the_stack_is_edits_yaml(tmp_path):
+    stack = (
+        Stack().add(A).add(B).toggled(0).add(Step("edit", {"mask": "m.png", "roughness": "+0.3", "albedo": "#c02010"}))
+    )
+    lamps = Step("relight", {"lamps": [["5", "6", "1.5", "2700", "1"]], "sun": ["45", "-3.5"]})
+    stack = stack.add(lamps)
+    write_recipe(tmp_path / "edits.yaml", list(stack.steps))
+    back = read_recipe(tmp_path / "edits.yaml")
+    assert [s.kind for s in back] == [s.kind for s in stack.steps]
+    assert [s.options for s in back] == [s.options for s in stack.steps]
+    assert back[0].skipped and not back[1].skipped
+
+
+def test_summaries_are_short():
+    assert summary(A) == "Material: hue 20"
+    assert summary(Step("relight", {"envmap": "light-sunset.exr", "lamps": [["1"], ["2"]]})) == (
+        "Light: envmap light-sunset, lamps (2)"
+    )
+    assert summary(Step("edit", {"mask": "a.png"})) == "Material: as it is"

@@ -1,0 +1,108 @@
+"""What strangers send."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from studio_scenes import package, png_header
+
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+from materialist.io.image import write_png_bytes
+from materialist.io.package import load_scene
+from materialist.studio import uploads
+
+
+def test_a_photo_keeps_the_ending_alone(tmp_path):
+    file = tmp_path / "x"
+    write_png_bytes(file, np.zeros((20, 30, 3), np.uint8))
+    assert uploads.checked_picture(file, "../../My Photo.PNG") == ".png"
+    assert uploads.header_size(file, "x") == (30, 20)
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [((30_000, 30_000), "megapixels"), ((30_000, 2_500), "75 megapixels"), ((30_000, 100), "longer than"),
+     ((4, 4), "at least")],
+)  # fmt: skip
+def test_bombs_are_refused_by_their_header(tmp_path, size, message):
+    file = tmp_path / "bomb.png"
+    file.write_bytes(png_header(*size))
+    assert file.stat().st_size < 200
+    with pytest.raises(InputError, match=message):
+        uploads.checked_picture(file, "bomb.png")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.exe", b"MZ", "not a photo"), ("a.svg", b"<svg/>", "not a photo"), ("a.png", b"hello", "not an image"),
+        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "not a readable EXR"),
+        ("a.hdr", b"#?RADIANCE\n\n", "no size"), ("noending", b"x", "not a photo"),
+    ],
+)  # fmt: skip
+def test_no_picture(tmp_path, name, content, message):
+    file = tmp_path / "upload"
+    file.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        uploads.checked_picture(file, name)
+
+
+def test_sizes_of_other_headers(tmp_path):
+    write_exr(tmp_path / "a.exr", np.zeros((12, 40, 3), np.float32))
+    assert uploads.header_size(tmp_path / "a.exr", "a") == (40, 12)
+    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 50000\n")
+    with pytest.raises(InputError, match="2000 megapixels"):
+        uploads.checked_picture(tmp_path / "a.hdr", "a.hdr")
+
+
+def test_too_many_bytes(tmp_path, monkeypatch):
+    monkeypatch.setattr(uploads, "MAX_MEGABYTES", 0.001)
+    file = tmp_path / "a.png"
+    file.write_bytes(b"x" * 2000)
+    with pytest.raises(InputError, match="takes up to"):
+        uploads.checked_picture(file, "a.png")
+
+
+@pytest.mark.parametrize("root", ["", "room.scene/"])
+def test_a_zipped_scene_comes_back(tmp_path, root):
+    scene = package(tmp_path)
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
+        for file in scene.rglob("*"):
+            pack.write(file, f"{root}{file.relative_to(scene)}")
+        pack.writestr(f"{root}../evil.txt", "x")
+        pack.writestr("/abs.txt", "x")
+        pack.writestr(f"{root}maps/extra.py", "x")
+    uploads.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+    assert load_scene(tmp_path / "target").camera.width == 64
+    assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
+
+
+def test_zips_that_are_none(tmp_path, monkeypatch):
+    (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
+    with pytest.raises(InputError, match="not a readable zip"):
+        uploads.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+    with zipfile.ZipFile(tmp_path / "b.zip", "w") as pack:
+        pack.writestr("readme.txt", "x")
+    with pytest.raises(InputError, match="no scene package"):
+        uploads.unpack_scene(tmp_path / "b.zip", tmp_path / "target", "b.zip")
+    with zipfile.ZipFile(tmp_path / "c.zip", "w", zipfile.ZIP_DEFLATED) as pack:
+        pack.writestr("scene.json", "{}")
+        pack.writestr("mesh.ply", b"\0" * 5_000_000)
+    monkeypatch.setattr(uploads, "MAX_UNPACKED", 1_000_000)
+    with pytest.raises(InputError, match="unpacks to"):
+        uploads.unpack_scene(tmp_path / "c.zip", tmp_path / "target", "c.zip")
+    assert not (tmp_path / "target").exists()
+
+
+def test_meshes_name_no_other_files(tmp_path):
+    obj = tmp_path / "a.obj"
+    obj.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    assert uploads.checked_mesh(obj, "a.obj") == ".obj"
+    assert "secret" not in obj.read_text() and "f 1 2 3" in obj.read_text()
+    glb = tmp_path / "a.glb"
+    glb.write_bytes(b'glTF....{"images":[{"uri":"../../secret.png"}]}')
+    with pytest.raises(InputError, match="other files"):
+        uploads.checked_mesh(glb, "a.glb")
+    with pytest.raises(InputError, match="not a mesh"):
+        uploads.checked_mesh(glb, "a.gltf")

@@ -1,0 +1,101 @@
+"""Pictures and words for the page, lights, and the tasks of the worker."""
+
+import base64
+
+import cv2
+import numpy as np
+import pytest
+from studio_scenes import block, package, room
+
+from materialist.edit.relight import checked_envmap
+from materialist.errors import InputError
+from materialist.io.examples import example_path
+from materialist.studio import lights, tasks, views
+from materialist.studio.tab_material import hex_colour
+
+
+def decoded(url: str) -> np.ndarray:
+    data = np.frombuffer(base64.b64decode(url.split(",", 1)[1]), np.uint8)
+    return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+
+
+def test_the_stage_shows_the_photo_and_the_mask():
+    picture = decoded(views.jpeg_url(room().photo.linear))[..., ::-1]
+    assert picture.shape == (48, 64, 3) and picture[24, 25, 0] > 180 > picture[24, 25, 1]
+    urls = views.mask_urls(block())
+    assert np.array_equal(decoded(urls["fill"])[..., 3] > 0, block())
+    outline = decoded(urls["outline"])[..., 3] > 0
+    assert outline.any() and not outline[24, 25]
+    assert views.mask_urls(None) == {"fill": "", "outline": ""}
+
+
+def test_the_report_is_plain_and_harmless():
+    text = views.report(room())
+    assert "close to the photo" in text and "31.5 dB" in text and "too dark" in text and "40.0°" in text
+    assert views._safe("<img src=x> [a](b)") == "&lt;img src=x> &#91;a](b)"
+    assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in views.maps(room())) and len(views.maps(room())) == 8
+
+
+@pytest.mark.parametrize("name", lights.names())
+def test_lights_are_environment_maps(name):
+    light = lights.light(name, 64)
+    assert checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20
+    if name == "Window":  # on the right: columns to the right turn towards +X
+        assert light[:, 64:].sum() > 1.3 * light[:, :64].sum()
+    if name in ("Noon", "Overcast"):  # from above
+        assert light[:32].sum() > 2 * light[32:].sum()
+
+
+def test_the_overcast_sky_is_the_cie_standard():
+    light = lights.light("Overcast", 256)
+    assert light[0, 0, 1] / light[127, 0, 1] == pytest.approx(3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "colour"), [("#C02010", "#c02010"), ("rgba(192, 32, 16, 1)", "#c02010"), ("?", "#808080")]
+)
+def test_colours_of_the_picker(text, colour):
+    assert hex_colour(text) == colour
+
+
+class Told:
+    def __init__(self):
+        self.stages, self.pictures = [], []
+
+    def __call__(self, stage, done, total):
+        self.stages.append(stage)
+
+    def found(self, name, file):
+        self.pictures.append((name, file))
+
+
+def test_the_photo_task(tmp_path):
+    facts = tasks.do_photo(Told(), str(example_path("coffee")), str(tmp_path / "small.jpg"))
+    assert (facts["width"], facts["height"], facts["fov"], facts["fov_source"]) == (600, 400, 35.0, "default")
+    assert cv2.imread(str(tmp_path / "small.jpg")).shape == (341, 512, 3)
+    (tmp_path / "broken.png").write_bytes(example_path("coffee").read_bytes()[:5000])
+    with pytest.raises(InputError, match="damaged"):
+        tasks.do_photo(Told(), str(tmp_path / "broken.png"), str(tmp_path / "small.jpg"))
+
+
+def test_what_was_found_is_shown(tmp_path):
+    told = Told()
+    for name, value in (("prior", room().prior), ("light", room().envmap), ("materials", room().materials)):
+        tasks._show(told, tmp_path, name, value)
+    names = [name for name, _ in told.pictures]
+    assert names[:2] == ["first depth", "first normals"] and "light" in names and names[-1] == "metallic"
+    assert all(file.is_file() for _, file in told.pictures)
+
+
+def test_taking_away(tmp_path):
+    scene = package(tmp_path)
+    (tmp_path / "edits.yaml").write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n")
+    tasks.do_take(Told(), str(scene), str(tmp_path / "edits.yaml"), str(tmp_path / "a.zip"), "glb")
+    tasks.do_take(Told(), str(scene), "", str(tmp_path / "a.html"), "html")
+    tasks.do_mesh(Told(), str(scene), str(tmp_path / "a.glb"))
+    import zipfile
+
+    names = zipfile.ZipFile(tmp_path / "a.zip").namelist()
+    assert "a/scene.glb" in names and "a/scene.hdr" in names
+    assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
+    assert not list(tmp_path.glob(".partial*"))

@@ -1,0 +1,91 @@
+"""The work folder: names of ours, people apart, nothing lost."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from materialist.errors import InputError, OutputError
+from materialist.studio.work import CARD, WorkFolder, default_root
+
+
+def test_a_project_survives_a_restart(tmp_path):
+    work = WorkFolder(tmp_path / "work")
+    first = work.new("Kitchen.JPG", "me")
+    again = WorkFolder(tmp_path / "work").project(first.name)
+    assert again == first and again.folder.name == "photo-001" and again.title == "Kitchen.JPG"
+    assert not again.ready
+    again.scene.mkdir()
+    (again.scene / "scene.json").write_text("{}")
+    assert again.ready
+
+
+@pytest.mark.parametrize("title", ["../../etc/passwd", "/abs", "a\0b\n\n<script>", "CON", "x" * 500, ""])
+def test_a_title_is_never_a_path(tmp_path, title):
+    work = WorkFolder(tmp_path / "work")
+    project = work.new(title, "me")
+    assert project.folder.parent == work.root and project.folder.name == "photo-001"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["work"]
+    shown = work.projects()[0].title
+    assert shown and len(shown) <= 60 and not set("<>\n\0") & set(shown)
+
+
+def test_people_see_their_own(tmp_path):
+    work = WorkFolder(tmp_path)
+    mine, other = work.new("a", "anna"), work.new("b", "bert")
+    assert [p.name for p in work.projects("anna")] == [mine.name]
+    assert len(work.projects()) == 2
+    with pytest.raises(InputError, match="no longer"):
+        work.project(other.name, "anna")
+
+
+@pytest.mark.parametrize("name", ["../x", "photo-001/../..", "", "photo-1", ".cache"])
+def test_a_name_from_the_page_must_be_in_the_list(tmp_path, name):
+    work = WorkFolder(tmp_path)
+    work.new("a", "me")
+    with pytest.raises(InputError):
+        work.project(name)
+
+
+@pytest.mark.parametrize("person", ["", "a", "../up", "A B", "x" * 40])
+def test_a_desk_needs_a_plain_name(tmp_path, person):
+    with pytest.raises(InputError):
+        WorkFolder(tmp_path).new("a", "me").desk(person)
+
+
+def test_the_last_used_comes_first(tmp_path):
+    work = WorkFolder(tmp_path)
+    first, second = work.new("a", "me"), work.new("b", "me")
+    import os
+
+    os.utime(second.folder / CARD, (1, 1))
+    work.touch(first)
+    assert [p.name for p in work.projects()] == [first.name, second.name]
+
+
+def test_a_damaged_card_hides_its_project_alone(tmp_path):
+    work = WorkFolder(tmp_path)
+    broken, good = work.new("a", "me"), work.new("b", "me")
+    (broken.folder / CARD).write_text("{")
+    assert [p.name for p in work.projects()] == [good.name]
+
+
+def test_a_card_cannot_lead_the_photo_elsewhere(tmp_path):
+    work = WorkFolder(tmp_path)
+    project = work.new("a", "me")
+    card = json.loads((project.folder / CARD).read_text())
+    (project.folder / CARD).write_text(json.dumps({**card, "photo": "../../secret.png"}))
+    assert work.projects()[0].photo == project.folder / "secret.png"
+
+
+def test_a_file_in_the_way_is_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OutputError, match="cannot be made"):
+        WorkFolder(tmp_path / "file" / "work")
+
+
+def test_the_default_is_below_the_current_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert default_root() == tmp_path / "materialist-studio"
+    monkeypatch.setattr("os.access", lambda *_: False)
+    assert default_root().parent == Path(__import__("tempfile").gettempdir())
