@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from materialist.edit.lights import Studio
 from materialist.edit.portrait import Portrait
 from materialist.edit.revealed import revealed
 from materialist.edit.upsample import GuidedUpsample, matte, strips
+from materialist.errors import InputError
 from materialist.types import Array, Photo, Scene
 
+Upscale = Callable[[Array, tuple[int, int]], Array]
+"""upscale(picture [H, W, 3] linear, (H0, W0)) -> [H0, W0, 3] linear."""
 FLOOR = 0.02
 """Radiance added to both sides of edited / base: below it a ratio says nothing."""
 MOST = 1.0
@@ -31,6 +34,7 @@ def composite(
     seed: int = 0,
     full_render: bool = False,
     denoise: bool = True,
+    upscale: Upscale | None = None,
     device: str = "auto",
     progress=None,
 ) -> Array:
@@ -42,14 +46,23 @@ def composite(
         spp: paths per pixel, of each of the two renderings.
         full_render: the plain rendering of the edited scene at working size, as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
+        upscale: with `full_render`, a super-resolution of yours that brings the rendering to the photo's native size
+            (paper, appendix Post-Processing with Super-Resolution). The composite has the photo's own detail instead.
 
     Returns:
         [H0, W0, 3] float32 linear, at the photo's native size; bit for bit the photo's own values where the edit does
-        not reach, everywhere if it changes nothing. HDR photos stay HDR. With `full_render` [H, W, 3].
+        not reach, everywhere if it changes nothing. HDR photos stay HDR. With `full_render` [H, W, 3], or [H0, W0, 3]
+        with `upscale` as well.
+
+    Raises:
+        InputError: `upscale` without `full_render`, or a result of it that is not a picture of native size.
     """
+    if upscale is not None and not full_render:
+        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     studio = Studio(scene, device=device)
     if full_render:
-        return plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+        picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+        return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
     layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
     return into_photo(*revealed(scene, edited, layers))
 
@@ -76,6 +89,14 @@ def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bo
     picture = studio.twins(edited)[1](spp, seed)
     guides = (studio.scene.materials.albedo, edited.materials.albedo, edited.normal)
     return denoised(picture, picture, guides)[1] if denoise else picture
+
+
+def _upscaled(picture: Array, shape: tuple[int, ...], upscale: Upscale) -> Array:
+    """[H0, W0, 3] what the caller's function makes of a picture."""
+    large = np.asarray(upscale(picture, (shape[0], shape[1])), np.float32)
+    if large.shape != shape or not np.isfinite(large).all():
+        raise InputError(f"upscale gave {large.shape}, not {shape} (finite, linear); resize what it returns.")
+    return np.maximum(large, 0)
 
 
 def into_photo(photo: Photo, layers: Layers) -> Array:
