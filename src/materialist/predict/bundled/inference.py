@@ -11,11 +11,16 @@ import torch
 from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
+from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.types import Array, Camera, Materials, Prediction
 
 NETWORK_SIDE = 768
 """Longest side that the network sees; larger photos are brought down and the maps up again, guided by the photo."""
+EDGE_SIDE = 768
+"""Longest side at which edges of depth and normals are sought in the photo."""
+EDGE_REACH = 0.047
+"""How far the network's edges may be off, as a part of the longest side."""
 MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
 DEPTH_SPAN = 50.0
@@ -51,10 +56,27 @@ def infer(
     if small != size:
         guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
         albedo, roughness, metallic = (guided(m, guide, fine) for m in (albedo, roughness, metallic))
-        depth, normal = resample.depth(depth, size), resample.normals(normal, size)
+    depth, normal = with_edges(depth, normal, linear)
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
     return Prediction(materials, normal, depth)
+
+
+def with_edges(depth: Array, normal: Array, linear: Array) -> tuple[Array, Array]:
+    """Depth [h, w] and normals [h, w, 3] brought to the size of the photo [H, W, 3], with its edges."""
+    size = linear.shape[:2]
+    middle = _network_size(size, EDGE_SIDE)
+    photo = linear_to_srgb(resample.values(linear, middle))
+    guide = Guide(photo, radius=max(2, round(EDGE_REACH * max(middle))))
+    depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
+    known = depth > 0
+    logarithm = np.log(np.where(known, depth, 1)).astype(np.float32)
+    depth = np.where(known, np.exp(weighted_median(logarithm, guide, known=known)), 0).astype(np.float32)
+    planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
+    normal = np.stack(planes, -1)
+    if middle != size:
+        depth, normal = resample.depth(depth, size), resample.normals(normal, size)
+    return depth, normal
 
 
 def rays_of(camera: Camera) -> Array:

@@ -1,0 +1,73 @@
+"""Edges of maps put where the photo has them: weighted medians with the weights of a guided filter.
+
+A small network knows that an object stands before a wall, but blurs its outline over many pixels; a mesh of that is a
+tent. A median takes sides instead of mixing, and the photo's colours say with whom (Ma et al. 2013, "Constant Time
+Weighted Median Filtering for Stereo Matching and Beyond"; He et al. 2013, "Guided Image Filtering").
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from materialist.types import Array
+
+
+class Guide:
+    """The photo as a guide: weights W_ij = mean over windows k of 1 + (I_i - m_k)^T (S_k + eps)^-1 (I_j - m_k).
+
+    m_k and S_k are mean and covariance of colours in the window, so that pixels on one side of an edge count for each
+    other, and those across it do not.
+
+    Args:
+        photo: [H, W, 3] float32 sRGB-encoded.
+        radius: of the windows, pixels.
+        eps: variance of colour that is not yet an edge.
+    """
+
+    def __init__(self, photo: Array, *, radius: int, eps: float = 1e-3):
+        self.window = (2 * radius + 1, 2 * radius + 1)
+        self.planes = [np.ascontiguousarray(c, np.float32) for c in np.moveaxis(photo, -1, 0)]
+        self.mean = [self._box(c) for c in self.planes]
+        covariance = np.empty((*photo.shape[:2], 3, 3), np.float64)
+        for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
+            entry = self._box(self.planes[i] * self.planes[j]) - self.mean[i] * self.mean[j]
+            covariance[..., i, j] = covariance[..., j, i] = entry
+        inverse = np.linalg.inv(covariance + eps * np.eye(3))
+        self.inverse = [[np.ascontiguousarray(inverse[..., i, j], np.float32) for j in range(3)] for i in range(3)]
+
+    def share(self, members: Array) -> Array:
+        """[H, W] weighted share of `members` [H, W] float32 in [0, 1] around each pixel: sum_j W_ij members_j."""
+        level = self._box(members)
+        with_colour = [self._box(c * members) - m * level for c, m in zip(self.planes, self.mean, strict=True)]
+        slopes = [sum(r * c for r, c in zip(row, with_colour, strict=True)) for row in self.inverse]
+        offset = level - sum(s * m for s, m in zip(slopes, self.mean, strict=True))
+        near = sum(self._box(s) * c for s, c in zip(slopes, self.planes, strict=True))
+        return near + self._box(offset)
+
+    def _box(self, plane: Array) -> Array:
+        return cv2.blur(plane, self.window, borderType=cv2.BORDER_REFLECT)
+
+
+def weighted_median(values: Array, guide: Guide, *, known: Array | None = None, bins: int = 32) -> Array:
+    """[H, W] float32: at every pixel the median of the values around it, weighted by `guide`.
+
+    Values between their 0.5 and 99.5 percentiles are told apart by `bins` steps and by linear interpolation within.
+
+    Args:
+        known: [H, W] bool: pixels whose values count; the others keep theirs.
+    """
+    known = np.ones(values.shape, bool) if known is None else known
+    low, high = np.percentile(values[known], [0.5, 99.5]) if known.any() else (0.0, 0.0)
+    if not high > low:
+        return values.astype(np.float32)
+    place = np.where(known, np.clip((values - low) / (high - low) * (bins - 1), 0, bins - 1), -1).astype(np.float32)
+    shares = np.stack([np.maximum(guide.share(np.maximum(1 - np.abs(place - k), 0)), 0) for k in range(bins)])
+    total = np.cumsum(shares, axis=0)  # [bins, H, W]
+    half = total[-1] / 2
+    index = np.argmax(total >= half, axis=0)
+    upto, own = (np.take_along_axis(each, index[None], 0)[0] for each in (total, shares))
+    # Within a step the weight is spread evenly over it, from half a step before to half a step after.
+    found = index + 0.5 - (upto - half) / np.maximum(own, 1e-9)
+    median = low + np.clip(found, 0, bins - 1) / (bins - 1) * (high - low)
+    return np.where(known & (half > 0), median, values).astype(np.float32)
