@@ -228,3 +228,18 @@ def test_targets_of_the_bundled_network():
     depth = torch.tensor([1.0, 2.0, 4.0, 0.0]).view(1, 1, 2, 2)
     found = relative_log_depth(depth, (depth > 0).float()).flatten()
     np.testing.assert_allclose(found, [-np.log(2), 0, np.log(2), 0], atol=1e-6)
+
+
+def test_crops_grow_with_the_run(data, tmp_path):
+    assert [recipe("bundled").size_at(p) for p in (0, 0.59, 0.6, 0.79, 0.8, 1)] == [128, 128, 192, 192, 256, 256]
+    assert recipe("bundled", size=96).size_at(0) == 96
+    trainer = made_runs.trainer(data, tmp_path / "run", steps=6, size=64, growth=((0.5, 32),))
+    step, sides = trainer._step, []
+
+    def noted(batch):
+        sides.append(batch["image"].shape[-1])
+        return step(batch)
+
+    trainer._step = noted
+    trainer.run()
+    assert sides[:3] == [32] * 3 and sides[-1] == 64

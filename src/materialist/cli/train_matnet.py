@@ -34,7 +34,9 @@ def matnet(
     steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None,
     minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None,
     batch: Annotated[int | None, typer.Option(help="Pictures a step, on each device; default: the recipe's.")] = None,
-    size: Annotated[int | None, typer.Option(help="Side of the crops, pixels; default: the recipe's.")] = None,
+    size: Annotated[
+        int | None, typer.Option(help="Side of all crops, pixels; default: the recipe's, small ones first.")
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None,
     init: Annotated[
         Path | None, typer.Option(help="paper: a Depth Anything or DINOv2 checkpoint to begin from.")

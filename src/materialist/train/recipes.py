@@ -16,7 +16,7 @@ class Recipe:
     task: str
     """Which network and losses: 'bundled' or 'paper'."""
     size: int
-    """Side of the training crops, pixels."""
+    """Side of the training crops, pixels; at the end, where `growth` has smaller ones before."""
     batch: int
     """Pictures a step, on each device."""
     rate: float
@@ -35,6 +35,12 @@ class Recipe:
     network: dict[str, Any]
     """Options of the network's architecture."""
     betas: tuple[float, float] = (0.9, 0.999)
+    growth: tuple[tuple[float, int], ...] = ()
+    """(part of the run, side of the crops up to there), in order: small pictures first, of which several cost one."""
+
+    def size_at(self, progress: float) -> int:
+        """Side of the crops when `progress` of the run, in [0, 1], is done."""
+        return next((size for end, size in self.growth if progress < end), self.size)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -56,6 +62,7 @@ RECIPES = {
         bfloat16=True,
         network={},
         betas=(0.9, 0.98),
+        growth=((0.6, 128), (0.8, 192)),
     ),
     # Paper, Implementation Details: AdamW, learning rate 1e-5, 512 x 512 crops. What it leaves open (batch, decay of
     # weights and of the rate) is torch's default, or constant.
@@ -80,7 +87,8 @@ def recipe(name: str, **changes: Any) -> Recipe:
     """The named recipe with the changes that are not None; raises InputError for an unknown name or a bad value."""
     if name not in RECIPES:
         raise InputError(f"There is no training recipe '{name}'; choose one of {', '.join(RECIPES)}.")
-    changed = replace(RECIPES[name], **{k: v for k, v in changes.items() if v is not None})
+    given = {k: v for k, v in changes.items() if v is not None}
+    changed = replace(RECIPES[name], **(({"growth": ()} if "size" in given else {}) | given))
     if changed.size < 32 or changed.size % 32:
         raise InputError(f"The size of training crops is {changed.size}; give a multiple of 32.")
     if changed.batch < 1:

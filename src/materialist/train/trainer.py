@@ -136,8 +136,8 @@ class Trainer:
         while True:
             self.epoch += 1
             yield from stream.epoch(
-                self.source, self.task, number=self.epoch, size=self.recipe.size, batch=self.recipe.batch,
-                seed=self.habits.seed, rank=self.processes.rank, world=self.processes.world,
+                self.source, self.task, number=self.epoch, size=self.recipe.size_at(self.clock.progress),
+                batch=self.recipe.batch, seed=self.habits.seed, rank=self.processes.rank, world=self.processes.world,
                 workers=self.habits.workers,
             )  # fmt: skip
 

@@ -40,7 +40,7 @@ class Recipe:
     batch: int = 32
     rate: float = 2e-3
     weight_decay: float = 0.02
-    warm_up: int = 200
+    warm_up: int = 100
     last_rate: float = 0.01
     ema: float = 0.998
     clip: float = 1.0
@@ -49,9 +49,9 @@ class Recipe:
     logarithm: float = 0.3
     """Weight of the difference of logarithms beside that of the lengths."""
     bfloat16: bool = False
-    side: int = 64
+    side: int = 32
     """Pixels on a side of the views at first: smaller ones train faster, and most can be learnt on them."""
-    full_size: float = 0.7
+    full_size: float = 0.75
     """Part of the run after which views have their full SIDE."""
 
     def __post_init__(self) -> None:
