@@ -15,7 +15,7 @@ SKY, LOOSE = -2, -1
 LEAST = 0.01
 """A surface hides behind the object only if it has this share of the pixels around it."""
 FIRM = 0.1
-"""If planes and sky hold this share of the pixels around, the hidden ones are theirs alone: things end, they go on."""
+"""If planes hold this share of the pixels around, no hidden pixel belongs to what is none: things end, planes go on."""
 AROUND = 0.15
 """Surroundings that are looked at, as a part of the hole's extent."""
 STRAIGHT = 0.9
@@ -96,7 +96,7 @@ def _labels(known: Array, hole: Array) -> Array:
     shares = np.array([np.mean(known[ring] == k) if ring.any() else 0.0 for k in kinds])
     kept = kinds[shares >= LEAST] if (shares >= LEAST).any() else kinds[count.argmax()][None]
     firm = kept[kept != LOOSE]
-    if len(firm) and shares[np.isin(kinds, firm)].sum() >= FIRM:
+    if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= FIRM:
         kept = firm
     indicator = np.stack([known == k for k in kept], -1).astype(np.float32)
     spanned = membrane(indicator, ~hole & np.isin(known, kept))

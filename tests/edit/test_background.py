@@ -1,0 +1,130 @@
+"""Objects taken away: maps, depth and photo continue, and the composite shows it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edit.background import make_hole, without
+from materialist.edit.composite import composite
+from materialist.errors import InputError
+from materialist.types import Photo
+
+MASK = block_mask(36, 48)
+
+
+def far_from(mask, pixels):
+    import cv2
+
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, np.uint8)) == 0
+
+
+def test_the_wall_goes_on_behind_the_block():
+    scene = flat_scene()
+    removed = without(scene, MASK)
+    np.testing.assert_allclose(removed.depth[MASK], 3.0, rtol=1e-3)
+    wall = scene.materials.albedo[far_from(MASK, 2)]
+    assert np.abs(removed.materials.albedo[MASK].mean(0) - wall.mean(0)).max() < 0.03
+    assert np.abs(removed.photo.linear[MASK].mean(0) - wall.mean(0)).max() < 0.05
+    outside = far_from(MASK, 2)
+    for old, new in ((scene.depth, removed.depth), (scene.materials.albedo, removed.materials.albedo),
+                     (scene.photo.original, removed.photo.original)):  # fmt: skip
+        np.testing.assert_array_equal(new[outside], old[outside])
+    assert removed.geometry.mesh.vertices[:, 2].max() < -2.9, "the block's surface is gone from the mesh"
+    assert removed.provenance["edits"][-1]["kind"] == "remove"
+
+
+def test_the_native_photo_is_filled_with_native_detail():
+    scene = flat_scene(native=3)
+    removed = without(scene, MASK)
+    native = np.kron(MASK, np.ones((3, 3), bool))
+    filled, wall = removed.photo.original[native], scene.photo.original[np.kron(far_from(MASK, 3), np.ones((3, 3)) > 0)]
+    assert np.abs(filled.mean(0) - wall.mean(0)).max() < 0.05
+    fine = removed.photo.original - np.kron(removed.photo.linear, np.ones((3, 3, 1)))
+    assert fine[native].std() > 0.3 * fine[~native].std()
+
+
+def test_the_composite_shows_the_wall_and_keeps_the_rest():
+    scene = rendered_scene()
+    removed = without(scene, MASK)
+    picture = composite(scene, removed, spp=48, denoise=False)
+    wall = scene.photo.linear[far_from(MASK, 4)].mean(0)
+    assert np.abs(picture[MASK].mean(0) / wall - 1).max() < 0.08
+    far = far_from(MASK, 8)
+    same = (picture == scene.photo.original).all(-1)
+    assert same[far].mean() > 0.5 and np.abs(picture - scene.photo.original)[far].max() < 0.1
+
+
+def test_a_true_background_is_what_is_seen():
+    scene = rendered_scene()
+    y, x = np.mgrid[:36, :48]
+    truth = np.stack([0.2 + 0.2 * (x % 6 < 3), 0.3 + 0.1 * (y % 8 < 4), 0.25 + 0 * x], -1).astype(np.float32)
+    removed = without(scene, MASK, background=truth)
+    np.testing.assert_allclose(removed.photo.linear[MASK], truth[MASK], rtol=1e-5)
+    picture = composite(scene, removed, spp=48, denoise=False)
+    assert np.sqrt(((picture - truth) ** 2)[MASK].mean()) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("mask", "message"),
+    [
+        (np.zeros((36, 48), bool), "empty"),
+        (np.ones((36, 48), bool), "covers 100% of what"),
+        (np.ones((10, 10), bool), "the photo at working size"),
+    ],
+)
+def test_masks_that_cannot_be_removed(mask, message):
+    with pytest.raises(InputError, match=message):
+        without(flat_scene(), mask)
+
+
+def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
+    scene = flat_scene(sky=12)
+    mask = np.zeros((36, 48), bool)
+    mask[8:30, :14] = True
+    mask[16:22, 4:8] = False
+    mask[30:34, 40:46] = True
+    removed = without(scene, mask)
+    assert np.isfinite(removed.depth).all() and np.isfinite(removed.photo.original).all()
+    assert (removed.depth[mask & (np.arange(36)[:, None] > 18)] > 2.5).all()
+    only_sky_behind = replace(scene, depth=np.where(mask, scene.depth, 0))
+    with pytest.raises(InputError, match="nothing tells"):
+        without(only_sky_behind, mask)
+
+
+def test_options_out_of_range_and_backgrounds_of_another_aspect():
+    scene = flat_scene()
+    for options, message in (
+        ({"grow": -1}, "rim is -1"), ({"shadow": np.nan}, "shadow is nan"),
+        ({"background": np.ones((20, 20, 3))}, "same proportions"),
+        ({"background": -np.ones((36, 48, 3))}, "negative"),
+        ({"background": np.ones((36, 48, 3)), "inpaint": lambda photo, hole: photo}, "not both"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            without(scene, MASK, **options)
+
+
+def test_the_shadow_widens_the_hole_on_the_ground_alone():
+    scene = flat_scene()
+    floor = np.zeros((36, 48), np.int8)
+    floor[:24] = -1
+    normal = np.where(floor[..., None] == 0, [0.0, 1, 0], scene.normal).astype(np.float32)
+    scene = replace(scene, normal=normal, geometry=replace(scene.geometry, plane_label=floor))
+    plain, wide = (make_hole(scene, MASK, shadow=shadow) for shadow in (0.0, 0.5))
+    np.testing.assert_array_equal(plain.painted, plain.gone)
+    more = wide.painted & ~wide.gone
+    assert more[24:].any() and not more[:24].any()
+    np.testing.assert_array_equal(wide.gone, plain.gone)
+
+
+def test_an_inpainter_gets_the_photo_and_the_hole():
+    scene, seen = flat_scene(), []
+
+    def paint(photo, hole):
+        seen.append(hole)
+        return np.where(hole[..., None], 0.4, photo)
+
+    removed = without(rendered_scene(), MASK, inpaint=paint)
+    assert isinstance(removed.photo, Photo) and seen[0].shape == scene.depth.shape
+    np.testing.assert_allclose(removed.photo.linear[MASK], 0.4)

@@ -1,0 +1,56 @@
+"""Surfaces behind an object: planes exactly, the sky as sky, never before what hid them."""
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.edit.behind import LOOSE, SKY, behind
+from materialist.types import Camera
+
+CAMERA = Camera(80, 60, 45.0)
+
+
+def room():
+    """Depth, normal and plane of a floor 0.4 below the camera and a wall at depth 4, which meet in a straight line."""
+    rays = pixel_rays(CAMERA).astype(float)
+    floor = np.where(rays[..., 1] < 0, -0.4 / np.minimum(rays[..., 1], -1e-9), np.inf)
+    depth = np.minimum(floor, 4.0)
+    plane = (floor >= 4).astype(int)
+    normal = np.where(plane[..., None] == 1, [0.0, 0, 1], [0.0, 1, 0])
+    return depth, normal, plane
+
+
+def disc(row=38, column=40, radius=13):
+    y, x = np.mgrid[:60, :80]
+    return np.hypot(y - row, x - column) < radius
+
+
+def test_floor_and_wall_go_on_and_meet_in_a_line():
+    depth, normal, plane = room()
+    hole = disc()
+    assert (plane[hole] == 0).any() and (plane[hole] == 1).any()
+    spoiled = np.where(hole, 1.5, depth)
+    found = behind(spoiled, normal, np.where(hole, 0, plane), hole, np.where(hole, 1.5, 0), CAMERA)
+    np.testing.assert_array_equal(found.depth[~hole], depth[~hole].astype(np.float32))
+    wrong = hole & (found.label != plane)
+    assert wrong.sum() < 0.04 * hole.sum()
+    right = hole & ~wrong
+    assert np.abs(found.depth / depth - 1)[right].max() < 0.01
+    assert np.abs(found.normal - normal)[right].max() < 0.02
+
+
+def test_it_never_comes_before_what_hid_it():
+    depth, normal, plane = room()
+    hole = disc()
+    front = np.where(hole, 5.0, 0)
+    found = behind(np.where(hole, 5.0, depth), normal, plane, hole, front, CAMERA)
+    assert (found.depth[hole] > 5.0).all()
+
+
+def test_sky_and_things_that_are_no_planes():
+    depth, normal, plane = np.full((60, 80), 3.0), np.tile([0.0, 0, 1], (60, 80, 1)), np.full((60, 80), LOOSE)
+    depth[:30] = 0
+    hole = disc(30, 40, 9)
+    found = behind(np.where(hole, 1.0, depth), normal, plane, hole, np.where(hole, 1.0, 0), CAMERA)
+    upper, lower = hole & (np.arange(60)[:, None] < 27), hole & (np.arange(60)[:, None] > 33)
+    assert (found.depth[upper] == 0).mean() > 0.9 and (found.label[upper] == SKY).mean() > 0.9
+    np.testing.assert_allclose(found.depth[lower], 3.0, rtol=0.01)

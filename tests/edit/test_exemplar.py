@@ -1,0 +1,59 @@
+"""Filling by patches: what repeats is found again, and other surfaces are left alone."""
+
+import numpy as np
+
+from materialist.edit.exemplar import exemplar_plan
+
+
+def stripes(height=72, width=96, period=8):
+    x = np.arange(width) + 0 * np.arange(height)[:, None]
+    one = ((x // (period // 2)) % 2).astype(np.float32)
+    return np.stack([0.2 + 0.6 * one, 0.5 - 0.3 * one, 0.3 + 0 * one], -1)
+
+
+def hole_in(shape, top=24, left=30, height=20, width=24):
+    hole = np.zeros(shape, bool)
+    hole[top : top + height, left : left + width] = True
+    return hole
+
+
+def test_stripes_go_on_through_the_hole():
+    picture = stripes()
+    hole = hole_in(picture.shape[:2])
+    broken = np.where(hole[..., None], 0.9, picture)
+    everywhere, one = np.ones_like(hole), np.zeros(hole.shape, int)
+    plan = exemplar_plan(broken, hole, everywhere, one, seed=1)
+    found = plan.fill(broken)
+    np.testing.assert_array_equal(found[~hole], broken[~hole].astype(np.float32))
+    assert np.abs(found - picture)[hole].mean() < 0.05  # the mean colour alone is 0.26 off
+    other = plan.fill(np.arange(hole.size, dtype=np.float32).reshape(*hole.shape, 1))
+    assert not np.isin(other[hole], np.flatnonzero(hole)).all(), "other maps come from the same places"
+
+
+def test_nothing_is_copied_from_another_surface():
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0.4, 0.6, (64, 80, 3)).astype(np.float32)
+    label = np.zeros((64, 80), int)
+    label[:, 40:] = 1
+    picture[..., 0] = np.where(label, 0.1, 0.9)
+    hole = hole_in(label.shape, 20, 28, 22, 26)
+    plan = exemplar_plan(np.where(hole[..., None], 0.5, picture), hole, np.ones_like(hole), label)
+    red = plan.fill(picture)[..., 0]
+    deep = hole & (np.abs(np.arange(80) - 39.5) > 3)
+    assert np.abs(red - picture[..., 0])[deep].max() < 0.1
+
+
+def test_the_same_seed_gives_the_same_plan_and_no_source_gives_none():
+    picture, hole = stripes(), hole_in((72, 96))
+    one = np.zeros(hole.shape, int)
+    a, b = (exemplar_plan(picture, hole, np.ones_like(hole), one, seed=3) for _ in range(2))
+    np.testing.assert_array_equal(a.source, b.source)
+    assert exemplar_plan(picture, hole, np.zeros_like(hole), one) is None
+
+
+def test_large_pictures_are_matched_small_and_keep_their_pieces():
+    picture = np.tile(stripes(64, 80, 16), (5, 5, 1))  # above the finest size at which patches are compared
+    hole = hole_in(picture.shape[:2], 120, 150, 60, 70)
+    plan = exemplar_plan(np.where(hole[..., None], 0, picture), hole, np.ones_like(hole), np.zeros(hole.shape, int))
+    found = plan.fill(np.where(hole[..., None], 0, picture))
+    assert np.abs(found - picture)[hole].mean() < 0.1

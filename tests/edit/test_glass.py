@@ -1,0 +1,109 @@
+"""Glass: what must come out whatever the object looks like, and what cannot be used."""
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edit.composite import composite
+from materialist.edit.glass import glass
+from materialist.edit.thickness import object_thickness
+from materialist.errors import InputError
+
+MASK = block_mask(36, 48)
+
+
+def test_glass_is_a_body_before_the_continued_wall():
+    scene = flat_scene()
+    edited = glass(scene, MASK, ior=1.33, tint=(0.9, 1, 0.8), thickness="symmetry")
+    (body,) = edited.bodies
+    assert (body.surface.ior, body.surface.transmission, body.surface.tint) == (1.33, 1.0, (0.9, 1.0, 0.8))
+    np.testing.assert_allclose(edited.depth[MASK], 3, rtol=1e-3)
+    depth = -body.vertices[:, 2]
+    assert depth.min() > 1.9 and depth.max() < 3
+    what = edited.provenance["edits"][-1]
+    assert what["kind"] == "glass" and what["thickness"] == "symmetry"
+    assert not scene.bodies and "edits" not in scene.provenance
+
+
+def test_glass_that_bends_nothing_is_not_there():
+    scene = rendered_scene()
+    edited = glass(scene, MASK, ior=1.0, thickness="symmetry")
+    picture = composite(scene, edited, spp=64, denoise=False)
+    wall = scene.photo.linear[2:8].mean((0, 1))
+    assert np.abs(picture[MASK].mean(0) / wall - 1).max() < 0.08
+
+
+def test_under_even_light_clear_glass_is_as_bright_as_the_wall_and_tint_colours_it():
+    from dataclasses import replace
+
+    scene = rendered_scene()
+    white = np.ones_like(scene.materials.albedo)
+    materials = replace(scene.materials, albedo=0.8 * white)
+    even = replace(scene, envmap=np.ones_like(scene.envmap), materials=materials)
+    clear = glass(even, MASK, ior=1.5, thickness="symmetry")
+    red = glass(even, MASK, ior=1.5, tint=(1, 0.25, 0.25), thickness="symmetry")
+    seen, tinted = (composite(even, edited, spp=64, denoise=False, full_render=True) for edited in (clear, red))
+    inner = np.zeros_like(MASK)
+    inner[15:21, 15:21] = True
+    # The wall is 0.8 of a light of 1, and so is what comes by way of any number of refractions and reflections.
+    assert 0.7 < seen[inner].mean() < 1.02
+    ratio = (tinted / seen)[inner].mean(0)
+    assert ratio[1] < 0.5 and ratio[0] > 0.9, ratio
+
+
+def test_hollow_glass_has_a_cavity_and_the_papers_model_no_body():
+    scene = flat_scene()
+    solid, hollow = (glass(scene, MASK, hollow=h, thickness="symmetry") for h in (False, True))
+    assert len(hollow.bodies[0].faces) > 1.2 * len(solid.bodies[0].faces)
+    paper = glass(scene, MASK, model="two-interface", thickness="symmetry")
+    assert not paper.bodies and (paper.photo.linear[MASK] != scene.photo.linear[MASK]).any()
+    outside = np.s_[:8]
+    np.testing.assert_array_equal(paper.photo.original[outside], scene.photo.original[outside])
+
+
+def test_thickness_is_given_mirrored_or_predicted():
+    scene = flat_scene()
+    given = object_thickness(scene, MASK, np.full(MASK.shape, 0.5, np.float32))
+    assert given.method == "given" and (given.solid[MASK] == 0.5).all() and (given.solid[~MASK] == 0).all()
+    assert object_thickness(scene, MASK, "symmetry").method == "symmetry"
+    assert object_thickness(scene, MASK).method in ("network", "symmetry")
+    for wrong, message in (
+        (np.ones((3, 3)), "thickness map is"), (-np.ones(MASK.shape), "negative"), (np.zeros(MASK.shape), "0 all over"),
+        ("guess", "give a file, or one of"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            object_thickness(scene, MASK, wrong)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"ior": 0.9}, r"refraction is 0.9; it must lie in \[1, 3\]"),
+        ({"ior": 3.5}, "refraction is 3.5"),
+        ({"ior": np.nan}, "refraction is nan"),
+        ({"transmission": 1.2}, "transmission is 1.2"),
+        ({"roughness": -0.1}, "roughness is -0.1"),
+        ({"tint": (1, 2, 1)}, "three numbers"),
+        ({"model": "magic"}, "choose one of closed, two-interface"),
+        ({"thickness": "no.exr"}, "give a file"),
+    ],
+)
+def test_bad_options(options, message):
+    with pytest.raises(InputError, match=message):
+        glass(flat_scene(), MASK, **options)
+
+
+def test_masks_at_the_frame_in_parts_and_over_everything():
+    scene = flat_scene(sky=6)
+    mask = np.zeros((36, 48), bool)
+    mask[3:20, :15] = True  # partly sky, cut by the frame
+    mask[24:34, 30:44] = True
+    mask[27:31, 34:40] = False
+    (body,) = glass(scene, mask, thickness="symmetry").bodies
+    assert np.isfinite(body.vertices).all() and len(body.faces)
+    for bad, message in (
+        (np.ones((36, 48), bool), "nothing tells"), (np.zeros((36, 48), bool), "empty"),
+        (np.arange(36)[:, None] + 0 * np.arange(48) < 6, "only sky"), (0.4 * mask, "above one half"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            glass(scene, bad)
