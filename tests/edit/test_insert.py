@@ -138,3 +138,11 @@ def test_nothing_of_the_background_is_in_a_body(box):
     body = Studio(scene).portrait(edited, spp=16, seed=0, clean=False)
     rim = (body.share > 0.05) & (body.share < 0.95)
     assert rim.any() and np.median(body.picture[rim]) < 0.2  # black but for its gloss; the floor is 1
+
+
+def test_a_native_picture_of_another_shape_is_no_obstacle(box):
+    scene = floor_scene()
+    wide = replace(scene, photo=replace(scene.photo, original=np.full((71, 96, 3), 0.5, np.float32)))
+    edited = insert(wide, box, (24.0, 26.0))
+    body = Studio(wide).portrait(edited, spp=4, seed=0, clean=False)
+    assert body.share.shape == (71, 96) and body.picture[body.share > 0.99].min() > 0

@@ -60,7 +60,11 @@ def edits(sample: SyntheticSample, light: Array, kinds: tuple[str, ...]) -> Iter
             mask = item == chosen
             change, other = _material(kind, stage.items[chosen])
             truth = _with_item(stage, chosen, other)
-            yield Edit(kind, lambda s, c=change, m=mask: c(s, m), truth.render, sample.envmap, mask)
+            yield Edit(kind, _masked(change, mask), truth.render, sample.envmap, mask)
+
+
+def _masked(change: Callable[[Scene, Array], Scene], mask: Array) -> Callable[[Scene], Scene]:
+    return lambda scene: change(scene, mask)
 
 
 def _relit(scene: Scene, light: Array) -> Scene:
@@ -78,7 +82,7 @@ def _material(kind: str, item: Item) -> tuple[Callable[[Scene, Array], Scene], I
         other = replace(item, albedo=shifted_hsv(item.albedo.astype(np.float32), 120.0, 0.0, 0.0))
     else:
         change = {"albedo": COPPER, "metallic": 1.0, "roughness": 0.3}
-        colour = np.broadcast_to(np.float32(COPPER), item.albedo.shape).copy()
+        colour = np.broadcast_to(np.array(COPPER, np.float32), item.albedo.shape).copy()
         other = replace(item, albedo=colour, metallic=1.0, roughness=0.3)
     return lambda scene, mask: edit(scene, mask, **change), other
 

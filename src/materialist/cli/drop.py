@@ -66,12 +66,13 @@ def drop(
     if save is not None:
         ensure_writable(save, force)
     start = time.monotonic()
-    places = [numbers(text, 2, "--at") for text in at]
+    places: Any = [numbers(text, 2, "--at") for text in at]
+    direction: Any = numbers(gravity, 3, "--gravity") if gravity else None
     models = [read_model(path, up=up) for path in meshes]
     loaded = load_scene(scene)
     film = simulate(
         loaded, models, places, frames=frames, fps=fps, height=height, spin=spin, scale=scale, material=material,
-        gravity=numbers(gravity, 3, "--gravity") if gravity else None, metres=metres, seed=seed,
+        gravity=direction, metres=metres, seed=seed,
     )  # fmt: skip
     last: list[Any] = [None]
     with StageProgress(quiet=as_json) as progress:

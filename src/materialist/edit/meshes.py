@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -128,7 +128,8 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
     quiet.setLevel(logging.CRITICAL)  # what it has to say ends in our own sentence
     try:
         return trimesh.load_scene(
-            io.BytesIO(data), file_type=path.suffix[1:].lower(), resolver=folder, process=False, allow_remote=False,
+            io.BytesIO(data), file_type=path.suffix[1:].lower(), resolver=cast(Any, folder), process=False,
+            allow_remote=False,
         )  # fmt: skip
     except Exception as error:
         if folder.refused:

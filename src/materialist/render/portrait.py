@@ -83,12 +83,11 @@ def radiance(target, size: tuple[int, int], box: Box, *, spp: int, seed: int, ma
     """[h, w, 3] float32 linear: a part of the picture of a `RenderScene` at another resolution, path traced."""
     mi, camera = target.mi, target.camera
     top, bottom, left, right = box
-    # The sides of a picture are rounded: stretch upwards by what the two sizes differ in shape.
-    stretch = (camera.height / camera.width) / (size[0] / size[1])
+    # The sides of the working size are rounded, so at the upper and lower rim this may be off by half a pixel of it.
     transform = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
     sensor = mi.load_dict({
         "type": "perspective", "fov": camera.fov, "fov_axis": "x", "near_clip": 1e-4, "far_clip": 1e7,
-        "to_world": mi.ScalarTransform4f().scale([1, stretch, 1]) @ transform,
+        "to_world": transform,
         "film": {
             "type": "hdrfilm", "width": size[1], "height": size[0], "rfilter": {"type": "box"},
             "crop_offset_x": left, "crop_offset_y": top, "crop_width": right - left, "crop_height": bottom - top,
