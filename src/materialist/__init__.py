@@ -31,6 +31,7 @@ _HOME = {
     "remove": "edit.remove",
     "drop": "edit.drop",
     "composite": "edit.composite",
+    "batch": "batch",
     **dict.fromkeys(
         (
             "Body",
@@ -56,6 +57,7 @@ _HOME = {
 __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
+    from materialist.batch.run import batch as batch
     from materialist.edit.composite import composite as composite
     from materialist.edit.drop import drop as drop
     from materialist.edit.glass import glass as glass
