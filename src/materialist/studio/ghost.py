@@ -15,30 +15,21 @@ _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 
 def with_bodies(picture: Array, scene: Scene) -> Array:
     """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
-    import cv2
-
-    colour = np.zeros((*picture.shape[:2], 3), np.float32)
-    depth = np.full(picture.shape[:2], np.inf, np.float32)
     exposure = 2 * float(luminance(scene.photo.linear).mean())
-    clear = 1.0
-    for body in scene.bodies:
-        glass = float(np.mean(body.surface.transmission))
-        clear = min(clear, 1 - 0.7 * glass)
-        _draw(body, scene, colour, depth, exposure)
-    hole = np.isinf(depth)
-    depth[hole] = 0
-    if any(len(body.faces) > _MOST for body in scene.bodies):
-        kernel = np.ones((3, 3), np.uint8)
-        colour, depth = cv2.dilate(colour, kernel), cv2.dilate(depth, kernel)
-    behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
-    share = np.where((depth > 0) & ~behind, clear, 0)[..., None].astype(np.float32)
-    return picture * (1 - share) + colour * share
+    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):  # the farthest first
+        colour, depth = _drawn(body, scene, exposure)
+        behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
+        share = 1 - 0.7 * body.surface.transmission
+        picture = np.where(((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture)
+    return picture.astype(np.float32)
 
 
-def _draw(body: Body, scene: Scene, colour: Array, depth: Array, exposure: float) -> None:
-    """Paint a body into colour [H, W, 3] and depth [H, W], far triangles first."""
+def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
+    """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
     import cv2
 
+    colour = np.zeros((*scene.depth.shape, 3), np.float32)
+    depth = np.zeros(scene.depth.shape, np.float32)
     stride = -(-len(body.faces) // _MOST)
     corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
     pixels, away = project(corners, scene.camera)
@@ -47,10 +38,14 @@ def _draw(body: Body, scene: Scene, colour: Array, depth: Array, exposure: float
     length = np.linalg.norm(normal, axis=1)
     seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
     shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
-    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0)
+    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(body.surface.tint)
     points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
     for face in np.argsort(-middle):
         if seen[face]:
             tone = [float(v) for v in np.minimum(albedo * shade[face] * exposure, 1)]
             cv2.fillConvexPoly(colour, points[face], tone, shift=4)
             cv2.fillConvexPoly(depth, points[face], float(middle[face]), shift=4)
+    if stride > 1:
+        kernel = np.ones((3, 3), np.uint8)
+        return np.asarray(cv2.dilate(colour, kernel)), np.asarray(cv2.dilate(depth, kernel))
+    return colour, depth

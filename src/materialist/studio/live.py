@@ -7,12 +7,16 @@ from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
+
 from materialist.edit.recipe import Step, apply
 from materialist.studio.ghost import with_bodies
 from materialist.types import Array, Scene
 
 _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live")
 """The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
+LIVE = ("edit", "relight")
+"""Kinds of steps that the preview shades; the others are sketched."""
 _KEPT = 24
 """Edited scenes that are kept: moving the last of several steps must not replay those before."""
 
@@ -52,9 +56,14 @@ class Live:
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview."""
         if not steps:
             return self.scene.photo.linear
-        preview = self._preview.result()
-        edited = self.edited(steps)
-        picture = _THREAD.submit(preview.picture, edited, quick=True).result()
+        preview, edited = self._preview.result(), self.edited(steps)
+        shaded = edited
+        if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
+            shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
+        picture = _THREAD.submit(preview.picture, shaded, quick=True).result()
+        if edited.photo is not self.scene.photo:
+            filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
+            picture = np.where(filled, edited.photo.linear, picture)
         return with_bodies(picture, edited) if edited.bodies else picture
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ from materialist.edit.recipe import Step, read_recipe, write_recipe
 from materialist.errors import InputError
 from materialist.studio import views
 from materialist.studio.jobs import Job
-from materialist.studio.live import Live
+from materialist.studio.live import LIVE, Live
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.stack import Stack
 from materialist.studio.work import Project
@@ -24,8 +24,10 @@ from materialist.types import Array, Scene
 EDITS = "edits.yaml"
 _UNDO = 60
 """How many steps back there are."""
-FILES = ("mask", "texture", "envmap", "mesh", "background", "file")
+FILES = ("mask", "texture", "envmap", "mesh", "background")
 """Options that name a file."""
+WORDS = ("thickness", "inpaint")
+"""Options that name a method, or a file."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,21 @@ class Session:
                 self._remember(f"{name} of {self.stack.current}")
             self._put(step, **{name: value})
 
+    def region_step(self, kind: str, **options: str | None) -> None:
+        """Lay a step such as `glass` or `remove` over the selection, or change the one in hand; checked at once."""
+        with self.lock:
+            step, mask = self._current(kind), self.selection.mask
+            if step is None and mask is None:
+                _ = self.scene
+                raise InputError("Click the object that you want to change first.")
+            self._remember(kind)
+            before = self.stack
+            if step is None:
+                step = Step(kind, {"mask": self._write_mask(mask)}, self.desk)  # type: ignore[arg-type]
+                self.stack = before.add(step)
+            merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
+            self._check_or(before, replace(step, options=merged))
+
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light step; it is made when the first is set."""
         with self.lock:
@@ -250,8 +267,7 @@ class Session:
         if final is not None and final.of(steps):
             badge = f"Path traced, {final.spp} paths a pixel"
             return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge}
-        badge = "Live preview" if steps else "Photo"
-        return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": badge}
+        return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": _badge(steps)}
 
     def write_edits(self) -> str:
         """The recipe as a file for other commands; an empty text where no step is on."""
@@ -341,11 +357,22 @@ class Session:
             (self.desk / EDITS).unlink(missing_ok=True)
 
 
+def _badge(steps: tuple[Step, ...]) -> str:
+    """What a picture that is not path traced shows, and what it leaves out."""
+    if not steps:
+        return "Photo"
+    if any(step.kind not in LIVE for step in steps):
+        return "Sketch: path tracing shows the rest"
+    if any("lamps" in step.options for step in steps):
+        return "Live preview: lamps show in path tracing"
+    return "Live preview"
+
+
 def _confined(step: Step, desk: Path) -> Step:
     """The step with its files on the desk. Raises InputError where it names a file elsewhere or one that is missing."""
-    for name in FILES:
+    for name in (*FILES, *WORDS):
         value = step.options.get(name)
-        if value is None:
+        if value is None or (name in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value)):
             continue
         if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
             raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")

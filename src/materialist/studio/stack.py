@@ -8,7 +8,9 @@ from typing import Any
 
 from materialist.edit.recipe import Step
 
-_WORDS = {"edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fall"}
+_WORDS = {"edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "remove": "Removed"}
+_PLAIN = {"remove": "the object", "glass": "clear"}
+"""What to say of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness")
 """Options that a summary leaves out: the picture shows them."""
 
@@ -61,7 +63,7 @@ class Stack:
 def summary(step: Step) -> str:
     """A step in a few words."""
     parts = [f"{name.replace('_', ' ')} {_short(value)}" for name, value in step.options.items() if name not in _SILENT]
-    return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or 'as it is'}"
+    return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or _PLAIN.get(step.kind, 'as it is')}"
 
 
 def _short(value: Any) -> str:

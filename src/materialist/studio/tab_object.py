@@ -8,17 +8,21 @@ from typing import Any
 
 import gradio as gr
 
-from materialist.edit.recipe import KINDS
+from materialist.edit.material import parse_colour
+from materialist.errors import InputError
 from materialist.studio import uploads
 from materialist.studio.context import Context
+from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.session import Session
+from materialist.studio.tab_material import hex_colour
 
 LIBRARY = ("Ball", "Cube", "Cylinder", "Cone", "Ring", "Slab")
 _MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
 _GLASS = {
     "ior": (1.0, 2.5, 1.5, 0.01, "Index of refraction"),
     "transmission": (0.0, 1.0, 0.9, 0.01, "How much light goes through"),
+    "roughness": (0.0, 1.0, 0.0, 0.01, "Roughness: clear to frosted"),
 }
 
 
@@ -26,38 +30,44 @@ def layout(context: Context) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Objects", id="object"):
-        if "insert" in KINDS:
-            gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
-            parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
-            parts["own_mesh"] = gr.File(
-                label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=110,
-                file_types=[".glb", ".ply", ".obj", ".stl"],
-            )  # fmt: skip
-            parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
-            parts["turn"] = gr.Slider(-180, 180, 0, step=1, label="Turn, degrees", buttons=[])
+        gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
+        parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
+        parts["own_mesh"] = gr.File(
+            label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=110,
+            file_types=[".glb", ".ply", ".obj", ".stl"],
+        )  # fmt: skip
+        parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
+        parts["turn"] = gr.Slider(-180, 180, 0, step=1, label="Turn, degrees", buttons=[])
+        with gr.Row():
+            parts["made_of"] = gr.Dropdown(list(_MATERIALS), value="as-is", label="Material", min_width=120)
+            parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
+        gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
+        with gr.Accordion("Turn the selection to glass", open=False):
+            for name, (low, high, start, step, label) in _GLASS.items():
+                parts[f"glass_{name}"] = gr.Slider(low, high, start, step=step, label=label, buttons=[])
+            parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
+            parts["glass_hollow"] = gr.Checkbox(False, label="Hollow: a wall around air")
+            parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
+        with gr.Accordion("Take the selection away", open=False):
+            parts["shadow"] = gr.Slider(0, 2, 0.5, step=0.05, label="How much of its shadow goes along", buttons=[])
+            parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
+        with gr.Accordion("Let it fall: a video", open=False):
+            gr.Markdown("The object of the list falls where it stands. Needs the physics extra.")
+            parts["fall"] = gr.Button("Make the video", size="sm")
             with gr.Row():
-                parts["made_of"] = gr.Dropdown(list(_MATERIALS), value="as-is", label="Material", min_width=120)
-                parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
-            gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
-        if "glass" in KINDS:
-            with gr.Accordion("Turn the selection to glass", open=False):
-                for name, (low, high, start, step, label) in _GLASS.items():
-                    parts[f"glass_{name}"] = gr.Slider(low, high, start, step=step, label=label, buttons=[])
-                parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
-                parts["glass"] = gr.Button("Make it glass", elem_id="glass")
+                parts["fall_progress"] = gr.HTML("", js_on_load=None)
+                parts["fall_stop"] = gr.Button("Stop", variant="stop", size="sm", visible=False, min_width=70)
+            parts["fall_video"] = gr.Video(label="The fall", interactive=False, visible=False, buttons=["download"])
 
 
 def wire(context: Context) -> None:
     """The events."""
-    parts = context.parts
     live: dict[str, Any] = {
         "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
     }  # fmt: skip
-    if "insert" in KINDS:
-        _wire_things(context, live)
-    if "glass" in KINDS:
-        _wire_glass(context, live)
-    del parts
+    _wire_things(context, live)
+    _wire_regions(context, live)
+    _wire_fall(context)
 
 
 def _wire_things(context: Context, live: dict[str, Any]) -> None:
@@ -98,8 +108,6 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
 
     @guarded
     def made(kind: str, colour: str, request: gr.Request) -> dict[Any, Any]:
-        from materialist.studio.tab_material import hex_colour
-
         session = context.session(request)
         session.thing_option("material", hex_colour(colour) if kind == "colour" else kind)
         return context.picture(session)
@@ -113,23 +121,65 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
         part.input(made, [parts["made_of"], parts["thing_colour"]], context.picture_parts, **live)
 
 
-def _wire_glass(context: Context, live: dict[str, Any]) -> None:
+def _wire_regions(context: Context, live: dict[str, Any]) -> None:
+    """Glass, and things that go."""
     parts = context.parts
 
     @guarded
-    def glass(ior: float, transmission: float, tint: str, request: gr.Request) -> dict[Any, Any]:
-        from materialist.edit.material import parse_colour
-        from materialist.studio.tab_material import hex_colour
-
+    def glass(ior: float, transmission: float, roughness: float, tint: str, hollow: bool, request: gr.Request) -> Any:
         session = context.session(request)
-        session.material("ior", f"{float(ior):.4g}", "glass")
-        session.material("transmission", f"{float(transmission):.4g}", "glass")
         linear = parse_colour(hex_colour(tint))
-        session.material("tint", None if linear.min() >= 1 else ",".join(f"{v:.4g}" for v in linear), "glass")
+        session.region_step(
+            "glass", ior=f"{float(ior):.4g}", transmission=f"{float(transmission):.4g}",
+            roughness=f"{float(roughness):.4g}" if roughness else None, hollow="true" if hollow else None,
+            tint=None if linear.min() >= 1 else ",".join(f"{v:.4g}" for v in linear),
+        )  # fmt: skip
         return context.picture(session)
 
-    values = [parts["glass_ior"], parts["glass_transmission"], parts["glass_tint"]]
-    parts["glass"].click(glass, values, context.picture_parts, **live)
+    @guarded
+    def remove(shadow: float, request: gr.Request) -> Any:
+        session = context.session(request)
+        session.region_step("remove", shadow=f"{float(shadow):.4g}" if shadow else None)
+        return context.picture(session)
+
+    values = [parts[f"glass_{name}"] for name in (*_GLASS, "tint", "hollow")]
+    slow = {k: v for k, v in live.items() if k not in ("queue", "trigger_mode")} | {"show_progress": "minimal"}
+    parts["glass"].click(glass, values, context.picture_parts, **slow)
+    parts["remove"].click(remove, parts["shadow"], context.picture_parts, **slow)
+
+
+def _wire_fall(context: Context) -> None:
+    """The video of a falling object."""
+    parts, hub = context.parts, context.hub
+    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+
+    @guarded
+    def fall(request: gr.Request) -> Any:
+        session = context.session(request)
+        scene = str(session.project.scene) if session.scene and session.project else ""
+        place = session.stack.last("insert")
+        if place is None:
+            raise InputError("Place an object first; it falls where it stands.")
+        step, file = session.stack.steps[place], session.new_name("fall", ".mp4")
+        told = {k: step.options[k] for k in ("scale", "material") if k in step.options}
+        job = hub.jobs.submit(
+            "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
+            at=[float(v) for v in step.options["at"]], output=str(file), **told,
+        )  # fmt: skip
+        session.running = job
+        for html in follow(hub.jobs, job):
+            yield {parts["fall_progress"]: html, parts["fall_stop"]: gr.update(visible=not job.over)}
+        if job.state == "done":
+            yield {parts["fall_video"]: gr.update(value=hub.handed(file), visible=True)}
+
+    @guarded
+    def stop(request: gr.Request) -> None:
+        session = context.session(request)
+        if session.running is not None:
+            hub.jobs.stop(session.running)
+
+    parts["fall"].click(fall, None, [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]], **free)
+    parts["fall_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 
 def library_file(session: Session, name: str) -> str:

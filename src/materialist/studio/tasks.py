@@ -115,6 +115,24 @@ def do_take(
     return {"file": output}
 
 
+def do_fall(
+    progress: Progress, scene: str, mesh: str, at: list[float], output: str, scale: str = "1", material: str = "as-is",
+    frames: int = 36, spp: int = 32,
+) -> dict[str, Any]:  # fmt: skip
+    """`materialist drop`: a mesh falls onto the photo, as a video."""
+    from materialist.edit.drop import drop
+    from materialist.edit.film import filmed
+    from materialist.edit.frames import ensure_video_writable, write_frames
+    from materialist.io.package import load_scene
+
+    ensure_video_writable(output, force=True)
+    progress("load", 0, 1)
+    loaded = load_scene(scene)
+    film = drop(loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, scale=float(scale), material=material)
+    write_frames(output, filmed(loaded, film, spp=spp, progress=progress), fps=24, force=True)
+    return {"file": output}
+
+
 def _edited(progress: Progress, scene: str, edits: str) -> tuple[Scene, Scene]:
     """The fitted scene, and the same after the list of edits (if there is one)."""
     from materialist.edit.recipe import apply, read_recipe
