@@ -50,12 +50,12 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
     alone, covered = None, None
     if scene.bodies != edited.bodies:
         alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
-        covered = studio.covered(edited)
+        covered = anything = studio.covered(edited)
         if alone is not None:
-            covered &= alone.inside == 0
+            covered = anything & (alone.inside == 0)
         changed |= covered
-        if clean and covered.any():
-            albedo, normal = studio.body_guides(edited, covered)
+        if clean and anything.any():
+            albedo, normal = studio.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
     return replace(layers, relit=is_relit(scene, edited), portrait=alone, covered=covered)
