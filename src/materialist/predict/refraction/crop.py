@@ -10,7 +10,7 @@ from materialist.color import linear_to_srgb
 from materialist.geometry.symmetry import border_distance, mirrored, object_size, spacing
 from materialist.types import Array
 
-SIDE = 96
+SIDE = 64
 """Pixels on a side of what the network sees."""
 MARGIN = 0.06
 """Room around the object, as a part of its longer side."""

@@ -55,7 +55,8 @@ class RefractionNet(nn.Module):
         self.decoders = nn.ModuleList(_Block(w[k]) for k in range(len(w) - 1))
         self.head = nn.Conv2d(w[0], 8, 3, padding=1)
         nn.init.zeros_(self.head.weight)
-        nn.init.constant_(self.head.bias, 0.0)
+        assert self.head.bias is not None
+        nn.init.zeros_(self.head.bias)
 
     def forward(self, maps: Tensor) -> Tensor:
         """Thickness of a batch of objects.

@@ -161,7 +161,9 @@ def _ring(rng: np.random.Generator) -> tuple[Solid, bool]:
 
 def twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
     """Twisted, bent and tapered prisms."""
-    solid = shapes.superquadric([0.5, 1, rng.uniform(0.2, 0.5)], rng.uniform(0.1, 0.6), rng.uniform(0.2, 1), 40)
+    solid = shapes.superquadric(
+        np.array([0.5, 1, rng.uniform(0.2, 0.5)]), rng.uniform(0.1, 0.6), rng.uniform(0.2, 1), 40
+    )
     twist, bend, taper = rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
 
     def warp(p: Array) -> Array:

@@ -68,7 +68,7 @@ def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str
     files = sorted(folder.rglob("*.ply"))
     if not files:
         raise InputError(f"{folder} holds no .ply meshes; give a folder that does.")
-    found = {}
+    found: dict[str, dict[str, Array]] = {}
     for file in files:
         shape = Shape(centred(shapes.load(file)), False, file.stem, True)
         tracer, rng = Tracer(shape.solid), np.random.default_rng([seed, len(found)])
