@@ -72,3 +72,31 @@ def _tokenizer(folder: Path, cls):
     (files / "vocab.json").write_text(json.dumps(words))
     (files / "merges.txt").write_text("#version: 0.2\n")
     return cls(str(files / "vocab.json"), str(files / "merges.txt"), model_max_length=16)
+
+
+def save_inpainting(folder: Path) -> Path:
+    """A Stable Diffusion inpainting pipeline."""
+    import diffusers
+    from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
+
+    with torch.random.fork_rng():
+        torch.manual_seed(5)
+        unet = diffusers.UNet2DConditionModel(
+            block_out_channels=(8, 16), layers_per_block=1, sample_size=8, in_channels=9, out_channels=4,
+            down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"), norm_num_groups=4, attention_head_dim=4,
+            up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"), cross_attention_dim=8,
+        )  # fmt: skip
+        vae = diffusers.AutoencoderKL(
+            block_out_channels=(8, 8, 8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
+            down_block_types=("DownEncoderBlock2D",) * 4, up_block_types=("UpDecoderBlock2D",) * 4,
+        )  # fmt: skip
+        text = CLIPTextModel(
+            CLIPTextConfig(hidden_size=8, intermediate_size=16, num_attention_heads=2, num_hidden_layers=1,
+                           vocab_size=8, max_position_embeddings=16, bos_token_id=0, eos_token_id=1)
+        )  # fmt: skip
+    diffusers.StableDiffusionInpaintPipeline(
+        unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(steps_offset=1), text_encoder=text,
+        tokenizer=_tokenizer(folder, CLIPTokenizer), safety_checker=None, feature_extractor=None,
+        requires_safety_checker=False,
+    ).save_pretrained(folder)  # fmt: skip
+    return folder

@@ -9,7 +9,8 @@ import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edit.background import Inpaint
-from materialist.errors import InputError, WeightsError
+from materialist.errors import InputError, SetupError, WeightsError
+from materialist.predict.models import INSTEAD
 from materialist.types import Array
 
 DEFAULT = "stable-diffusion-v1-5/stable-diffusion-inpainting"
@@ -28,8 +29,17 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
     from materialist.predict import hub
 
-    folder, _ = hub.locate(where, DEFAULT)
-    pipeline = _pipeline(folder, hub.on_gpu(device))
+    try:
+        folder, _ = hub.locate(where, DEFAULT)
+        pipeline = _pipeline(folder, hub.on_gpu(device))
+    except SetupError as error:
+        raise SetupError(
+            f"Inpainting by diffusion needs diffusers and transformers; install them with: {hub.INSTALL}, or leave "
+            "--inpaint out."
+        ) from error
+    except WeightsError as error:
+        # The hub's own sentence ends with advice about predictors.
+        raise WeightsError(str(error).replace(INSTEAD, "leave --inpaint out")) from error
     return lambda photo, hole: diffused(pipeline, photo, hole, seed=seed, steps=steps)
 
 
