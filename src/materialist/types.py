@@ -130,6 +130,8 @@ class Surface:
     """Index of refraction of the inside, in [1, 3]."""
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Colour of white light after a way in and a way out, linear, in [0, 1]."""
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Radiance that it gives off to the outside by itself, linear, >= 0."""
 
 
 @dataclass(frozen=True, eq=False)

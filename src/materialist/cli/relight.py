@@ -36,6 +36,7 @@ def relight(
         list[str] | None, typer.Option(metavar="X,Y,DEPTH,KELVIN,POWER", help="A lamp at a pixel and depth.")
     ] = None,
     ambient: Annotated[float, typer.Option(help="Factor on the light that was there.")] = 1.0,
+    dim: Annotated[float | None, typer.Option(help="Factor on windows and lamps that the photo shows.")] = None,
     frames: Annotated[
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
@@ -56,8 +57,8 @@ def relight(
     from materialist.edit.relight import relight as change
     from materialist.io.package import load_scene
 
-    if envmap is None and rotate is None and not sun and not lamp and ambient == 1.0 and frames is None:
-        raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp or --ambient.")
+    if envmap is None and rotate is None and not sun and not lamp and (ambient, dim, frames) == (1.0, None, None):
+        raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
     if frames is None:
@@ -65,8 +66,10 @@ def relight(
         if len(suns) > 1:
             raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
     else:
+        if dim is not None:
+            raise InputError("--dim makes one picture; leave out --frames.")
         _check_video(output, save, fps, force)
-    options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient}
+    options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient, "dim": dim}
     if envmap is not None:
         options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}
     loaded = load_scene(scene)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from materialist.edit.glows import explained
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio
 from materialist.edit.portrait import Portrait
@@ -59,6 +60,7 @@ def composite(
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
+    scene = explained(scene, edited)
     studio = Studio(scene, device=device)
     if full_render:
         picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)

@@ -63,7 +63,10 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
 
 def is_relit(scene: Scene, edited: Scene) -> bool:
     """Whether the two scenes have different light."""
-    return scene.lamps != edited.lamps or not np.array_equal(scene.envmap, edited.envmap)
+    glowing = [[body for body in s.bodies if max(body.surface.emission) > 0] for s in (scene, edited)]
+    return (
+        scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
+    )  # fmt: skip
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:

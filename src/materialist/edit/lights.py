@@ -109,13 +109,14 @@ class Studio:
 
 def _path_depth(scene: Scene) -> int:
     """Length of the paths that Mitsuba's tracer must follow; 0 where the splitting tracer does."""
-    from materialist.render.bodies import is_transparent
+    from materialist.render.bodies import is_glowing, is_transparent
     from materialist.render.envmap import is_peaked
     from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
 
     if any(is_transparent(body.surface) for body in scene.bodies):
         return GLASS_DEPTH
-    return MAX_DEPTH if scene.lamps or is_peaked(scene.envmap) else 0
+    glows = any(is_glowing(body.surface) for body in scene.bodies)
+    return MAX_DEPTH if glows or scene.lamps or is_peaked(scene.envmap) else 0
 
 
 def _built(scene: Scene, device: str):

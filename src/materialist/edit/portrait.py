@@ -38,7 +38,9 @@ def free_bodies(scene: Scene, edited: Scene, seen) -> list[str]:
     `seen(names)` gives the [H, W] share of pixels that bodies of the edited scene cover.
     """
     taken = scene.depth != edited.depth
-    names = [f"body{k}" for k, body in enumerate(edited.bodies) if body not in scene.bodies]
+    new = {f"body{k}": body for k, body in enumerate(edited.bodies) if body not in scene.bodies}
+    # What glows in the photo's own surface has its outline in the photo.
+    names = [name for name, body in new.items() if max(body.surface.emission) <= 0]
     if not taken.any():
         return names
     free = []

@@ -20,7 +20,7 @@ REGION = ("mask", "click", "box", "with")
 MATERIAL = (
     "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
 )  # fmt: skip
-LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "lamps")
+LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps")
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
 REMOVE = ("background", "inpaint", "shadow", "grow")
 GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
@@ -152,7 +152,7 @@ def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient") if k in given}
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
     if "envmap" in given:
         options["envmap"] = read_envmap(_file(step, "envmap"))
         gain = given.get("gain", "auto")

@@ -32,6 +32,7 @@ def relight(
     sun_power: float = 1.0,
     ambient: float = 1.0,
     lamps: tuple[Lamp, ...] | list[Lamp] = (),
+    dim: float | None = None,
 ) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of arguments.
 
@@ -43,6 +44,8 @@ def relight(
         sun_power: irradiance of the sun on a surface that faces it, relative to that of the light before.
         ambient: factor on the environment map (not on its new sun), 0 for lamps alone.
         lamps: glowing spheres to add; make them with `lamp`.
+        dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. It does not go with another map,
+            a turn or a sun.
 
     Raises:
         InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
@@ -58,12 +61,20 @@ def relight(
     disc = np.zeros_like(light)
     if sun is not None:
         light, disc = with_sun(light, *sun, power=sun_power)
+    if dim is not None:
+        if envmap is not None or rotate or sun is not None:
+            raise InputError("Dimming starts from the photo's own light; leave out the map, the turn and the sun.")
+        from materialist.edit.glows import dimmed
+
+        scene = dimmed(scene, dim)
+        light = scene.envmap
     light = (light * np.float32(ambient) + disc).astype(np.float32)
     if not light.any() and not (lamps or scene.lamps):
         raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
     what = {
         "envmap": None if envmap is None else list(np.shape(envmap)), "gain": gain if envmap is not None else None,
         "rotate": rotate or None, "sun": sun, "ambient": ambient if ambient != 1 else None, "lamps": len(lamps) or None,
+        "dim": dim,
     }  # fmt: skip
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps), report=_with_warnings(scene))
     return noted(new, "light", {name: value for name, value in what.items() if value is not None})

@@ -27,8 +27,11 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
         for name in ("albedo", "roughness", "metallic"):
             write_exr(folder / FOLDER / f"{k}.{name}.exr", getattr(surface, name))
         entries.append(
-            {"name": body.name, "transmission": surface.transmission, "ior": surface.ior, "tint": list(surface.tint)}
-        )
+            {
+                "name": body.name, "transmission": surface.transmission, "ior": surface.ior,
+                "tint": list(surface.tint), "emission": list(surface.emission),
+            }
+        )  # fmt: skip
     return entries
 
 
@@ -46,6 +49,7 @@ def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
     except InputError as error:
         raise SceneError(f"{error} Save the scene again.") from error
     surface = Surface(
-        albedo, roughness, metallic, float(entry["transmission"]), float(entry["ior"]), tuple(entry["tint"])
-    )
+        albedo, roughness, metallic, float(entry["transmission"]), float(entry["ior"]), tuple(entry["tint"]),
+        tuple(entry.get("emission", (0.0, 0.0, 0.0))),
+    )  # fmt: skip
     return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))

@@ -18,6 +18,18 @@ def is_transparent(surface: Surface) -> bool:
     return surface.transmission > 0
 
 
+def is_glowing(surface: Surface) -> bool:
+    """Whether it gives off light; Mitsuba's path tracer then has to aim at it."""
+    return max(surface.emission) > 0
+
+
+def body_emitter(mi, surface: Surface):
+    """An area emitter of the surface's emission, None where it does not glow."""
+    if not is_glowing(surface):
+        return None
+    return mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": [float(c) for c in surface.emission]}})
+
+
 def body_bsdf(mi, surface: Surface) -> dict:
     """A Mitsuba description: T times a dielectric and (1 - T) times the opaque BRDF, T the transmission.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.render.bodies import body_bsdf
+from materialist.render.bodies import body_bsdf, body_emitter
 from materialist.render.buffers import floats, integers, tensor
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, on_mitsuba_grid
 from materialist.render.variant import setup
@@ -64,7 +64,8 @@ class RenderScene:
         }
         for k in self.planes:
             description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
-        description |= {f"body{k}": _shape(mi, body, body_bsdf(mi, body.surface)) for k, body in enumerate(bodies)}
+        for k, body in enumerate(bodies):
+            description[f"body{k}"] = _shape(mi, body, body_bsdf(mi, body.surface), body_emitter(mi, body.surface))
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
@@ -224,9 +225,11 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     }  # fmt: skip
 
 
-def _shape(mi, mesh: Mesh | Body, bsdf: dict):
+def _shape(mi, mesh: Mesh | Body, bsdf: dict, emitter=None):
     props = mi.Properties()
     props["mesh_bsdf"] = mi.load_dict(bsdf)
+    if emitter is not None:
+        props["mesh_emitter"] = emitter
     shape = mi.Mesh(
         "part", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, has_vertex_texcoords=True, props=props
     )

@@ -1,0 +1,104 @@
+"""Lights that the photo shows: found, estimated, dimmed, and what the room then looks like."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist.camera import pixel_rays
+from materialist.edit.composite import composite
+from materialist.edit.glows import _explained, _patch, dimmed, visible_lights
+from materialist.edit.relight import relight
+from materialist.errors import InputError
+from materialist.geometry.build import build_geometry
+from materialist.io.package import load_scene, save_scene
+from materialist.render.scene import RenderScene
+from materialist.types import Camera, Materials, Photo, Prediction, Scene
+
+LIGHT = np.zeros((30, 40), bool)
+LIGHT[3:12, 8:32] = True
+RADIANCE = 8.0
+
+
+def picture(scene: Scene, seed: int = 0, spp: int = 256) -> np.ndarray:
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    return target.render_path(spp=spp, seed=seed)
+
+
+@cache
+def rooms() -> tuple[Scene, Scene]:
+    """(the room with a window in its back wall, truly lit; a fit of its photo that has no light but the map's)."""
+    camera = Camera(40, 30, 60.0)
+    rays = pixel_rays(camera)
+    floor = np.where(rays[..., 1] < -0.02, 1.0 / np.maximum(-rays[..., 1], 1e-3), 1e6)
+    depth = np.minimum(floor, 3.5).astype(np.float32)
+    normal = np.where((floor < 3.5)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
+    albedo = np.full((30, 40, 3), 0.5, np.float32)
+    materials = Materials(albedo, np.full((30, 40), 0.8, np.float32), np.zeros((30, 40), np.float32))
+    geometry = build_geometry(depth, normal, camera, completion="none")
+    envmap = np.full((8, 16, 3), 0.15, np.float32)
+    dark = Photo(albedo, camera, albedo, fov_source="option")
+    prior = Prediction(materials, normal, depth, "made")
+    bare = Scene(camera, dark, prior, materials, normal, depth, geometry, envmap, albedo)
+    true = replace(bare, bodies=(_patch(bare, LIGHT, RADIANCE, "window"),))
+    linear = np.clip(picture(true), 0, 1)
+    photo = Photo(linear, camera, linear, fov_source="option")
+    rendered = picture(bare)
+    factor = float((linear * rendered)[~LIGHT].sum() / (rendered**2)[~LIGHT].sum())  # what a fit of the map would do
+    brighter = replace(bare, photo=photo, envmap=envmap * np.float32(factor), rerender=rendered * np.float32(factor))
+    return replace(true, photo=photo), brighter
+
+
+def test_the_window_is_found_and_a_speck_is_not():
+    _, fit = rooms()
+    (mask,) = visible_lights(fit)
+    assert (mask & LIGHT).sum() / (mask | LIGHT).sum() > 0.95
+    assert not visible_lights(replace(fit, depth=np.where(LIGHT, 0, fit.depth)))  # the sky is in the map
+    large = np.zeros((60, 80, 3), np.float32)
+    large[3, 3:6] = 1  # a highlight: less than a thousandth
+    depth = np.ones((60, 80), np.float32)
+    assert not visible_lights(replace(fit, photo=replace(fit.photo, linear=large), depth=depth))
+
+
+def test_its_radiance_is_found():
+    _, fit = rooms()
+    ambient, radiance = _explained(fit, visible_lights(fit), 0, "auto")
+    assert 6 <= radiance <= 12
+    np.testing.assert_allclose(ambient * fit.envmap.mean(), 0.15, rtol=0.25)
+
+
+@pytest.mark.parametrize("dim", [0.0, 0.5])
+def test_dimming_is_the_true_room_with_a_dimmer_window(dim):
+    true, fit = rooms()
+    lights = (_patch(true, LIGHT, dim * RADIANCE, "window"),)
+    expected = picture(replace(true, bodies=lights), seed=5)
+    out = composite(fit, relight(fit, dim=dim), spp=64)
+    away = ~LIGHT
+    before = metrics.psnr(fit.photo.linear, expected, mask=away)
+    assert metrics.psnr(out, expected, mask=away) > max(28, before + 3)
+    if dim == 0:
+        assert out[LIGHT].mean() < 0.3
+
+
+def test_as_it_is_stays_nearly_so():
+    _, fit = rooms()
+    assert metrics.psnr(composite(fit, relight(fit, dim=1.0), spp=64), fit.photo.linear) > 26
+
+
+def test_bad_input_and_files(tmp_path):
+    _, fit = rooms()
+    for scene, options, sentence in [
+        (fit, {"dim": -1.0}, "dimming"), (fit, {"dim": np.nan}, "dimming"),
+        (fit, {"dim": 0.2, "rotate": 10}, "own light"), (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
+        (replace(fit, photo=replace(fit.photo, linear=fit.photo.linear * 0.5)), {"dim": 0.2}, "no light"),
+    ]:  # fmt: skip
+        with pytest.raises(InputError, match=sentence):
+            relight(scene, **options)
+    edited = dimmed(fit, 0.5)
+    save_scene(edited, tmp_path / "a.scene")
+    assert load_scene(tmp_path / "a.scene").bodies[0].surface.emission == edited.bodies[0].surface.emission
+    assert min(edited.bodies[0].surface.emission) > 0
