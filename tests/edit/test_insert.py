@@ -146,3 +146,16 @@ def test_a_native_picture_of_another_shape_is_no_obstacle(box):
     edited = insert(wide, box, (24.0, 26.0))
     body = Studio(wide).portrait(edited, spp=4, seed=0, clean=False)
     assert body.share.shape == (71, 96) and body.picture[body.share > 0.99].min() > 0
+
+
+def test_a_body_looks_as_in_the_plain_rendering(box):
+    """Its radiance at native size is that of the scene's own light and surfaces."""
+    scene = floor_scene()
+    red = np.broadcast_to(np.float32([2.0, 0.4, 0.1]), (8, 16, 3)).copy()
+    scene = replace(scene, envmap=red)
+    edited = insert(scene, box, (24.0, 26.0), material="0.5,0.5,0.5")
+    studio = Studio(scene)
+    body = studio.portrait(edited, spp=64, seed=0, clean=False)  # before anything else is rendered
+    plain = studio.twins(edited)[1](256, 3)
+    inside = body.share > 0.999
+    np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)

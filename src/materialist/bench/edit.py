@@ -130,13 +130,13 @@ def _compared(
     best = composite(perfect, truly, full_render=True, **shared)
     yield {"method": f"{CEILING} {edit.kind}", **score(best)}
     yield {"method": f"{CEILING} {edit.kind}, composite", **score(composite(perfect, truly, **shared))}
-    strip = [sample.photo.linear, after, best]
+    strip = [linear_to_srgb(p) for p in (sample.photo.linear, after, best)]
+    strips.append(strip)
     for name, (scene, fit_seconds) in fitted.items():
         clock = _Clock()
         picture = composite(scene, edit.change(scene), **shared)
-        strip.append(picture)
+        strip.append(linear_to_srgb(picture))
         yield {"method": f"{edit.kind}: {name}", **score(picture), "fit_seconds": fit_seconds, **clock.read()}
-    strips.append([linear_to_srgb(p) for p in strip])
 
 
 def _scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:

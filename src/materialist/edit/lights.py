@@ -44,9 +44,7 @@ class Studio:
 
     def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
         """By Mitsuba's path tracer to that depth, by the splitting one for 0."""
-        target = self._target(scene)
-        target.set_materials(scene.materials)
-        target.set_envmap(scene.envmap)
+        target = self._dressed(scene)
         if depth:
             return target.render_path(spp=spp, seed=seed, max_depth=depth)
         return target.render(spp=-(-spp // PATHS_PER_RAY), seed=seed)
@@ -73,7 +71,7 @@ class Studio:
             return None
         depth = _path_depth(edited) or MAX_DEPTH
         return portrait(
-            self._target(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
+            self._dressed(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
         )  # fmt: skip
 
     def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
@@ -97,7 +95,15 @@ class Studio:
 
         return bodies_seen(self._target(scene).mi_scene, scene.camera, names)
 
+    def _dressed(self, scene: Scene):
+        """Its `RenderScene` with its materials and its light."""
+        target = self._target(scene)
+        target.set_materials(scene.materials)
+        target.set_envmap(scene.envmap)
+        return target
+
     def _target(self, scene: Scene):
+        """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of whoever used it last."""
         for other, target in self._built:
             if other.geometry is scene.geometry and (other.lamps, other.bodies) == (scene.lamps, scene.bodies):
                 return target
