@@ -21,7 +21,8 @@ def register(app: typer.Typer) -> None:
 def bench(
     context: typer.Context,
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass, edit.")
+        str,
+        typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass, edit, studio."),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="Folder for the report.")],
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,

@@ -13,7 +13,15 @@ from materialist.edit.recipe import Step, apply
 from materialist.studio.ghost import with_bodies
 from materialist.types import Array, Scene
 
-_THREAD = ThreadPoolExecutor(1, thread_name_prefix="live")
+
+def _calm() -> None:
+    """Arrays of one picture are too small to share out: torch's helpers would mostly wait, and wait busily."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+_THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_calm)
 """The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
 LIVE = ("edit", "relight")
 """Kinds of steps that the preview shades; the others are sketched."""

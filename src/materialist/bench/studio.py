@@ -1,0 +1,209 @@
+"""`bench studio`: what a person at the page waits for, measured in a real browser, and what the server holds."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+
+from materialist.bench.report import Column, Report, write
+from materialist.errors import InputError, MaterialistError, SetupError
+
+READY = "text=Ready: click an object"
+COLUMNS = (
+    Column("load_s", "page load s", "lower", 2),
+    Column("drop_s", "drop to first slider s", "lower", 1),
+    Column("reopen_s", "reopen to slider s", "lower", 1),
+    Column("median_ms", "slider to preview ms", "lower", 0),
+    Column("p95_ms", "p95 ms", "lower", 0),
+    Column("cpu_ms", "processor ms a move", "lower", 0),
+    Column("light_ms", "other light ms", "lower", 0),
+    Column("idle_mb", "idle MB", "lower", 0),
+    Column("scene_mb", "MB more with a scene", "lower", 0),
+    Column("after_mb", "MB more after it was left", "lower", 0),
+)
+NOTE = """A studio in a process of its own, and Chromium through Playwright on the same machine. Page load is the median
+of five fresh pages, from the address to a stage that can be seen. Drop to first slider runs from handing the photo to
+the page to the first live picture of a moved slider: reading, fit, preview, a click that selects, a move. Slider to
+preview is the time in the browser from the event of a slider (hue, saturation, brightness, roughness and metallic in
+turn) to the decoded picture on the page; processor milliseconds are the server's for one move, which other work on the
+machine hardly changes. Memory is the resident set of the server."""
+
+_MOVE = """([name, value]) => new Promise((done, fail) => {
+  const picture = document.querySelector('#stage .photo'), before = picture.src;
+  const slider = document.querySelector(`#${name} input[type=range]`), start = performance.now();
+  slider.value = value; slider.dispatchEvent(new Event('input', {bubbles: true}));
+  const look = () => {
+    if (picture.src !== before && picture.complete) picture.decode().then(() => done(performance.now() - start), fail);
+    else if (performance.now() - start > 60000) fail(new Error('no picture'));
+    else requestAnimationFrame(look);
+  };
+  look();
+})"""
+_RANGES = {"hue": (-180, 180), "saturation": (-1, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
+
+
+def run(
+    *, output: str | Path, data: str | Path | None = None, seed: int = 0, device: str = "auto",
+    photo: str = "example:astronaut", size: int = 512, moves: int = 60, click: str = "0.3,0.8", scene: str = "",
+) -> None:  # fmt: skip
+    """Measure the studio on one photo (a file, or example:NAME), or on a `scene` that is there, without the drop.
+
+    `click` is where in the photo an object is selected, as shares of its width and height. Raises SetupError where
+    Playwright or Chromium are missing. `data` and `device` are not used.
+    """
+    if not 5 <= moves <= 10_000:
+        raise InputError(f"moves is {moves}; give 5 to 10000.")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        _server(Path(folder), scene) as (server, address),
+        _browser() as chromium,
+    ):
+        row = _measured(server, address, chromium, _photo(photo), size, moves, _share(click), bool(scene), seed)
+    settings = {"photo": Path(scene).name if scene else photo, "size": size, "moves": moves, "seed": seed}
+    write(Report("The studio", NOTE, settings, COLUMNS, [{"method": "studio", "sample": photo, **row}]), Path(output))
+
+
+def _measured(
+    server: psutil.Process, address: str, browser: Any, photo: Path, size: int, moves: int, click: tuple[float, float],
+    open_already: bool, seed: int,
+) -> dict[str, float]:  # fmt: skip
+    row = {"idle_mb": _resident(server)}
+    if not open_already:  # else every page would open the scene
+        row["load_s"] = float(np.median([_load(browser, address) for _ in range(5)]))
+        row["idle_mb"] = max(row["idle_mb"], _resident(server))
+    page = browser.new_page(viewport={"width": 1280, "height": 1000})
+    page.set_default_timeout(900_000)
+    start = time.perf_counter()
+    page.goto(address)
+    if not open_already:
+        start = _dropped(page, photo, size)
+    page.wait_for_selector(READY)
+    _select(page, click)
+    page.evaluate(_MOVE, ["hue", 40])
+    row["reopen_s" if open_already else "drop_s"] = time.perf_counter() - start
+    row |= _moved(server, page, moves, seed)
+    row["scene_mb"] = _resident(server) - row["idle_mb"]
+    page.close()
+    time.sleep(5)
+    row["after_mb"] = _resident(server) - row["idle_mb"]
+    return row
+
+
+def _load(browser: Any, address: str) -> float:
+    page = browser.new_page()
+    start = time.perf_counter()
+    page.goto(address)
+    page.wait_for_selector("#stage .view")
+    seconds = time.perf_counter() - start
+    page.close()
+    return seconds
+
+
+def _dropped(page: Any, photo: Path, size: int) -> float:
+    """Hand a photo over and start; returns when that was."""
+    page.wait_for_selector("#start")
+    page.get_by_label("Working size").click()
+    page.get_by_role("option", name=f"{size} pixels").click()
+    start = time.perf_counter()
+    page.set_input_files("#file input[type=file]", str(photo))
+    page.wait_for_selector("#facts img")
+    page.click("#start")
+    return start
+
+
+def _select(page: Any, click: tuple[float, float]) -> None:
+    box = page.locator("#stage .view").bounding_box()
+    page.locator("#stage .view").click(position={"x": click[0] * box["width"], "y": click[1] * box["height"]})
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+
+
+def _moved(server: psutil.Process, page: Any, moves: int, seed: int) -> dict[str, float]:
+    """Times of slider moves in milliseconds, one slider after the other, each to a random value."""
+    rng = np.random.default_rng(seed)
+    before = sum(server.cpu_times()[:2])
+    times = []
+    for k in range(moves):
+        name = list(_RANGES)[k % len(_RANGES)]
+        times.append(page.evaluate(_MOVE, [name, round(float(rng.uniform(*_RANGES[name])), 2)]))
+    spent = sum(server.cpu_times()[:2]) - before
+    page.get_by_role("tab", name="Light").click()
+    light = [page.evaluate(_MOVE, ["rotate", 30 * k]) for k in (1, 2, 3)]
+    return {
+        "median_ms": float(np.median(times)), "p95_ms": float(np.quantile(times, 0.95)), "cpu_ms": 1000 * spent / moves,
+        "light_ms": float(np.median(light)),
+    }  # fmt: skip
+
+
+@contextlib.contextmanager
+def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
+    """A studio, and its address once it answers."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [sys.executable, "-m", "materialist", "studio", *([scene] if scene else []), "--port", str(port)]
+    process = subprocess.Popen([*command, "--work", str(folder / "work")], stdout=subprocess.DEVNULL)
+    address = f"http://127.0.0.1:{port}"
+    try:
+        end = time.monotonic() + 120
+        while not _answers(address):
+            if process.poll() is not None or time.monotonic() > end:
+                raise MaterialistError("The studio did not start; try: materialist studio")
+            time.sleep(0.2)
+        yield psutil.Process(process.pid), address
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def _answers(address: str) -> bool:
+    try:
+        urllib.request.urlopen(address, timeout=10).close()
+    except OSError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _browser() -> Iterator[Any]:
+    """Chromium without a window. Raises SetupError where it is missing."""
+    program = shutil.which("chromium") or shutil.which("google-chrome")
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError as error:
+        raise SetupError(f"This benchmark needs a browser: {sys.executable} -m pip install playwright") from error
+    if program is None:
+        raise SetupError("This benchmark needs Chromium: apt-get install chromium")
+    with sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+def _photo(photo: str) -> Path:
+    from materialist.io.examples import PREFIX, example_path
+
+    return example_path(photo) if photo.startswith(PREFIX) else Path(photo)
+
+
+def _share(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(part) for part in str(text).split(","))
+    except ValueError as error:
+        raise InputError(f"click is {text!r}; give two shares such as 0.3,0.8.") from error
+    return x, y
+
+
+def _resident(process: psutil.Process) -> float:
+    return process.memory_info().rss / 1e6
