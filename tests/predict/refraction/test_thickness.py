@@ -69,10 +69,10 @@ def test_features_do_not_depend_on_place_or_scale():
     a, b = views
     assert a.shape == (CHANNELS, SIDE, SIDE)
     both = (a[MASK] > 0) & (b[MASK] > 0)
-    assert both.mean() > 0.5 and np.mean(a[MASK] != b[MASK]) < 0.03
+    assert both.mean() > 0.5 and np.mean(a[MASK] != b[MASK]) < 0.06
     inner = both & (a[7] > 0.4)
     for channel in range(3, CHANNELS):
-        np.testing.assert_allclose(a[channel][inner].mean(), b[channel][inner].mean(), atol=0.05)
+        np.testing.assert_allclose(a[channel][inner].mean(), b[channel][inner].mean(), atol=0.09)
     assert np.abs(a[3] + a[3][:, ::-1])[both & both[:, ::-1]].mean() < 0.03  # straight ahead: x is odd
 
 

@@ -20,15 +20,13 @@ def test_every_kind_of_shape_is_usable(index):
     assert np.isfinite(vertices).all() and np.ptp(vertices, axis=0).max() == pytest.approx(1)
     np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
     assert made.solid.faces.max() < len(vertices)
-    # A ray straight down through the middle of a body's box meets it from outside, whatever it is.
-    origin = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 24), [2.0], np.linspace(-0.4, 0.4, 24)), -1).reshape(-1, 3)
-    found = Tracer(made.solid).trace(origin, np.broadcast_to([0.0, -1, 0], origin.shape))
+    # Level rays from the front meet it from outside, whatever it is, and run through material behind that.
+    origin = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1).reshape(-1, 3)
+    found = Tracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
     hit = np.isfinite(found.first)
-    assert hit.any()
-    assert (found.material <= found.solid + 1e-3).all()
-    share = found.material[hit].sum() / found.solid[hit].sum()
-    assert share > 0.6 or made.hollow
-    assert not made.hollow or (found.material[hit] < 0.9 * found.solid[hit]).any() or share < 1
+    assert hit.any() and (found.material <= found.solid + 1e-3).all()
+    assert (found.material[hit] > 0).mean() > 0.95
+    assert not made.hollow or found.material[hit].sum() < 0.95 * found.solid[hit].sum()
 
 
 def test_shapes_depend_on_their_numbers_alone():
