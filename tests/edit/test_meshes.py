@@ -121,6 +121,15 @@ def test_missing_textures_are_told_and_a_constant_serves(tmp_path):
         read_model(gltf_file(tmp_path, "gone.bin"))
 
 
+def test_a_damaged_texture_is_told(tmp_path):
+    path = textured_obj(tmp_path)
+    good = (tmp_path / "quad.png").read_bytes()
+    (tmp_path / "quad.png").write_bytes(good[: len(good) * 2 // 3])
+    model = read_model(path)
+    assert any("cannot be read" in note for note in model.warnings)
+    np.testing.assert_allclose(model.parts[0].surface.albedo, 0.5)
+
+
 def write(path, content):
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return path

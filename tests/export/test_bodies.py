@@ -67,7 +67,16 @@ def test_trimesh_reads_the_bodies_back(tmp_path):
     np.testing.assert_array_equal(picture, CHECKS.albedo * 255)
 
 
-@pytest.mark.parametrize("surface", [CHECKS, GLASS], ids=["texture", "glass"])
+GLOW = constant(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
+
+
+def test_glb_has_light_that_is_given_off():
+    material = document(with_bodies(GLOW))["materials"][-1]
+    np.testing.assert_allclose(material["emissiveFactor"], [1, 0.5, 0.25])
+    assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 3
+
+
+@pytest.mark.parametrize("surface", [CHECKS, GLASS, GLOW], ids=["texture", "glass", "glow"])
 def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     from materialist.render.scene import GLASS_DEPTH, RenderScene
 

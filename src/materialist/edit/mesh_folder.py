@@ -18,13 +18,15 @@ class MeshFolder:
     """The files beside a mesh, as trimesh asks for them (its `Resolver` interface).
 
     `refused` are references that lead outside, by a path, a link or an address: they are never opened. `missing` are
-    those inside that are not there. trimesh swallows what a resolver raises, so both are kept for the caller.
+    those inside that are not there. trimesh swallows what a resolver raises, so both are kept for the caller;
+    `damaged` counts the pictures that could not be read.
     """
 
     def __init__(self, folder: Path):
         self.folder = folder.resolve()
         self.refused: list[str] = []
         self.missing: list[str] = []
+        self.damaged = 0
 
     def get(self, name: str) -> bytes:
         """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing one."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import srgb_to_linear
+from materialist.errors import InputError
 from materialist.types import Array, Surface
 
 GREY = 0.5
@@ -27,7 +28,7 @@ def surface_of(material: Any, folder: Any) -> Surface:
     if material is None:
         return constant(GREY, GREY, 0.0)
     if hasattr(material, "metallicFactor"):
-        return _from_gltf(material)
+        return _from_gltf(material, folder)
     return _from_mtl(material, folder)
 
 
@@ -42,17 +43,18 @@ def from_colours(colours: Array) -> tuple[Surface, Array]:
     return Surface(texels.reshape(side, side, 3), plain.roughness, plain.metallic), uv.astype(np.float32)
 
 
-def _from_gltf(material: Any) -> Surface:
+def _from_gltf(material: Any, folder: Any) -> Surface:
     """glTF 2.0, section 3.9: factors times textures; green is roughness, blue metallic; factors default to 1."""
     factor = _rgb(material.baseColorFactor, 1.0)
     albedo = factor.reshape(1, 1, 3)
-    if material.baseColorTexture is not None:
-        albedo = srgb_to_linear(_pixels(material.baseColorTexture)) * factor
+    colour = _pixels(material.baseColorTexture, folder)
+    if colour is not None:
+        albedo = srgb_to_linear(colour) * factor
     rough = 1.0 if material.roughnessFactor is None else float(material.roughnessFactor)
     metal = 1.0 if material.metallicFactor is None else float(material.metallicFactor)
     roughness, metallic = np.full((1, 1), rough, np.float32), np.full((1, 1), metal, np.float32)
-    if material.metallicRoughnessTexture is not None:
-        packed = _pixels(material.metallicRoughnessTexture)
+    packed = _pixels(material.metallicRoughnessTexture, folder)
+    if packed is not None:
         roughness, metallic = packed[..., 1] * np.float32(rough), packed[..., 2] * np.float32(metal)
     return _clipped(albedo, roughness, metallic)
 
@@ -63,10 +65,10 @@ def _from_mtl(material: Any, folder: Any) -> Surface:
     A Phong exponent n is about as wide as GGX with alpha^2 = 2 / (n + 2), and roughness = sqrt(alpha).
     """
     said = {str(k).lower(): v for k, v in (getattr(material, "kwargs", None) or {}).items()}
-    image = getattr(material, "image", None)
+    colour = _pixels(getattr(material, "image", None), folder)
     kd = said.get("kd")
-    if image is not None:
-        albedo = srgb_to_linear(_pixels(image))  # writers leave Kd black, or half, beside a texture
+    if colour is not None:
+        albedo = srgb_to_linear(colour)  # writers leave Kd black, or half, beside a texture
     elif kd is not None:
         albedo = np.asarray(kd, np.float32).reshape(1, 1, -1)[..., :3]
     else:
@@ -85,8 +87,10 @@ def _map(reference: Any, folder: Any, otherwise: Any) -> Array:
 
         try:
             with Image.open(_stream(folder.get(str(reference[-1])))) as image:
-                return _pixels(image)[..., 0]
-        except Exception:  # refused, missing, or no picture: `folder` has noted it, the constant serves
+                pixels = _pixels(image, folder)
+            if pixels is not None:
+                return pixels[..., 0]
+        except (OSError, InputError):  # missing or refused: `folder` has noted it; or no picture
             pass
     return np.full((1, 1), otherwise, np.float32)
 
@@ -97,12 +101,18 @@ def _stream(data: bytes):
     return io.BytesIO(data)
 
 
-def _pixels(image: Any) -> Array:
-    """[h, w, 3] float32 in [0, 1] as stored, of a PIL picture; without its alpha."""
-    if max(image.size) > MAX_TEXTURE:
-        image = image.copy()
-        image.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
-    return np.asarray(image.convert("RGB"), np.float32) / 255
+def _pixels(image: Any, folder: Any) -> Array | None:
+    """[h, w, 3] float32 in [0, 1] as stored, of a PIL picture without its alpha; None for none, or a damaged one."""
+    if image is None:
+        return None
+    try:
+        if max(image.size) > MAX_TEXTURE:
+            image = image.copy()
+            image.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
+        return np.asarray(image.convert("RGB"), np.float32) / 255
+    except (OSError, ValueError, SyntaxError, MemoryError):
+        folder.damaged += 1
+        return None
 
 
 def _clipped(albedo: Array, roughness: Array, metallic: Array) -> Surface:

@@ -157,7 +157,7 @@ def _pieces(scene: Any, folder: MeshFolder) -> Iterator[Body]:
 def _piece(mesh: Any, transform: Array, name: str, folder: MeshFolder) -> Body:
     vertices = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
     faces = np.asarray(mesh.faces, np.int32)
-    given = mesh._cache.cache.get("vertex_normals")  # trimesh would compute them, without creases
+    given = getattr(mesh._cache, "cache", {}).get("vertex_normals")  # trimesh would compute others, without creases
     turn = np.linalg.inv(transform[:3, :3]).T if np.linalg.det(transform[:3, :3]) else np.eye(3)
     if np.linalg.det(transform[:3, :3]) < 0:
         faces = faces[:, ::-1]
@@ -203,6 +203,7 @@ def _checked(model: Model, path: Path, folder: MeshFolder) -> Model:
         raise InputError(f"{path} has no triangles with an area; give a mesh with faces.")
     open_edges, crowded = edge_faults(vertices, faces)
     notes = [f"{path.name}: {name} is missing; a constant takes its place." for name in dict.fromkeys(folder.missing)]
+    notes += [f"{path.name}: a texture cannot be read; a constant takes its place."] * bool(folder.damaged)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
     parts = model.parts

@@ -28,8 +28,9 @@ def plain(part: Part) -> Part:
 
 
 def simplified(parts: list[Part]) -> bool:
-    """Whether `plain` leaves something out: textures, or light that enters."""
-    return any(not part.constant or (part.surface is not None and part.surface.transmission > 0) for part in parts)
+    """Whether `plain` leaves something out: textures, light that enters, light that is given off."""
+    surfaces = [part.surface for part in parts if part.surface is not None]
+    return any(not part.constant for part in parts) or any(s.transmission > 0 or max(s.emission) > 0 for s in surfaces)
 
 
 def _part(name: str, body: Body) -> Part:

@@ -105,7 +105,12 @@ class _Document:
             pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(part.materials), sampler)}
             packed = metallic_roughness(part.materials)
             pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
-        material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
+        material: dict = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
+        if part.surface is not None and max(part.surface.emission) > 0:
+            strength = float(max(part.surface.emission))
+            material["emissiveFactor"] = [float(c) / strength for c in part.surface.emission]
+            material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+            self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
             material |= self._glass(part.surface, pbr)
         return self._add("materials", material)

@@ -41,6 +41,9 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
         shape = _node(root, "shape", "ply")
         _value(shape, "string", "filename", f"{part.name}.ply")
         _material(folder, shape, part)
+        if part.surface is not None and max(part.surface.emission) > 0:
+            glow = ", ".join(repr(float(c)) for c in part.surface.emission)
+            _value(_node(shape, "emitter", "area"), "rgb", "radiance", glow)
     ET.indent(root)
     ET.ElementTree(root).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
 

@@ -11,6 +11,8 @@ from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
+_RAYS = 2**20
+"""Pixels looked at together: bounds the memory."""
 Box = tuple[int, int, int, int]
 """Rows and columns (top, bottom, left, right) of a part of a picture, the ends excluded."""
 
@@ -36,6 +38,18 @@ def look(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], 
         scene: a Mitsuba scene in which the bodies are shapes by these names (`RenderScene.mi_scene`).
         size: (H, W) of the whole picture. box: the part of it that is wanted.
     """
+    top, bottom, left, right = box
+    rows = max(1, _RAYS // max(right - left, 1))
+    strips = [
+        _strip(scene, camera, bodies, size, (first, min(first + rows, bottom), left, right))
+        for first in range(top, bottom, rows)
+    ]
+    whole = lambda name: np.concatenate([getattr(strip, name) for strip in strips])  # noqa: E731
+    return Sight(whole("share"), whole("albedo"), whole("normal"), whole("depth"))
+
+
+def _strip(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> Sight:
+    """A few rows of `look`."""
     import drjit as dr
     import mitsuba as mi
 
