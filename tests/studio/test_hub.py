@@ -9,7 +9,7 @@ from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError
 from materialist.studio.hub import ALONE, Hub
 from materialist.studio.jobs import Jobs
-from materialist.studio.server import check_host, check_port, first_project, new_hub
+from materialist.studio.server import check_host, check_port, first_target, new_hub
 from materialist.studio.work import WorkFolder
 
 
@@ -25,6 +25,9 @@ def test_people_are_kept_apart(shared):
     project = shared.work.new("Anna's", anna)
     (project.scene).mkdir()
     session = shared.session("page", shared.person(bert))
+    assert shared.projects(bert) == [] and shared.projects(anna) == [project]
+    shared.start = shared.work.new("For all", ALONE)
+    assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
     with pytest.raises(InputError, match="no longer"):
         shared.open(session, project.name)
     with pytest.raises(InputError, match="reload"):
@@ -90,9 +93,13 @@ def test_a_scene_elsewhere_is_known_again(tmp_path):
     scene.mkdir()
     (scene / "scene.json").write_text("{}")
     hub = new_hub(tmp_path / "work", alone=True)
-    first = first_project(hub.work, str(scene))
-    assert first.scene == scene and first == first_project(hub.work, str(scene))
-    assert first_project(hub.work, None) is None
+    first = first_target(hub.work, str(scene))
+    assert first.scene == scene and first == first_target(hub.work, str(scene))
+    assert first_target(hub.work, None) is None
+    assert first_target(hub.work, "example:coffee").name == "coffee.png"
+    (tmp_path / "a.txt").write_text("x")
+    with pytest.raises(InputError, match="not a photo"):
+        first_target(hub.work, str(tmp_path / "a.txt"))
     hub.jobs.close()
 
 

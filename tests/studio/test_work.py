@@ -6,13 +6,15 @@ from pathlib import Path
 import pytest
 
 from materialist.errors import InputError, OutputError
+from materialist.studio.hub import Hub
+from materialist.studio.jobs import Jobs
 from materialist.studio.work import CARD, WorkFolder, default_root
 
 
 def test_a_project_survives_a_restart(tmp_path):
     work = WorkFolder(tmp_path / "work")
     first = work.new("Kitchen.JPG", "me")
-    again = WorkFolder(tmp_path / "work").project(first.name)
+    again = WorkFolder(tmp_path / "work").projects()[0]
     assert again == first and again.folder.name == "photo-001" and again.title == "Kitchen.JPG"
     assert not again.ready
     again.scene.mkdir()
@@ -35,16 +37,16 @@ def test_people_see_their_own(tmp_path):
     mine, other = work.new("a", "anna"), work.new("b", "bert")
     assert [p.name for p in work.projects("anna")] == [mine.name]
     assert len(work.projects()) == 2
-    with pytest.raises(InputError, match="no longer"):
-        work.project(other.name, "anna")
+    assert [p.name for p in work.projects("bert")] == [other.name] and work.projects("carl") == []
 
 
 @pytest.mark.parametrize("name", ["../x", "photo-001/../..", "", "photo-1", ".cache"])
 def test_a_name_from_the_page_must_be_in_the_list(tmp_path, name):
-    work = WorkFolder(tmp_path)
-    work.new("a", "me")
+    hub = Hub(WorkFolder(tmp_path), Jobs(1))
+    hub.work.new("a", "me")
     with pytest.raises(InputError):
-        work.project(name)
+        hub.project(name, "me")
+    hub.jobs.close()
 
 
 @pytest.mark.parametrize("person", ["", "a", "../up", "A B", "x" * 40])
@@ -89,3 +91,11 @@ def test_the_default_is_below_the_current_folder(tmp_path, monkeypatch):
     assert default_root() == tmp_path / "materialist-studio"
     monkeypatch.setattr("os.access", lambda *_: False)
     assert default_root().parent == Path(__import__("tempfile").gettempdir())
+
+
+def test_caches_of_dead_studios_go(tmp_path):
+    work = WorkFolder(tmp_path)
+    dead = tmp_path / ".cache" / "999999999"
+    dead.mkdir()
+    again = WorkFolder(tmp_path)
+    assert again.cache == work.cache and not dead.exists() and work.cache.is_dir()

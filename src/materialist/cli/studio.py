@@ -32,13 +32,13 @@ def studio(
     workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
-    from materialist.studio.server import check_host, check_port, first_project, new_hub, serve
+    from materialist.studio.server import check_host, check_port, first_target, new_hub, serve
     from materialist.studio.work import default_root
 
     alone = check_host(host, password, everyone)
     check_port(host, port)
     hub = new_hub(work or default_root(), alone=alone, workers=workers)
-    hub.start = first_project(hub.work, target)
+    hub.start = first_target(hub.work, target)
     typer.echo(f"Scenes and edits are kept in {hub.work.root}")
     serve(
         hub,

@@ -58,11 +58,24 @@ class Hub:
                 known = self._sessions[page] = Session(person or ALONE)
             return known
 
+    def projects(self, person: str) -> list[Project]:
+        """What a person may open: all on one's own machine, else one's own and what the studio was started on."""
+        every = self.work.projects(None if self.alone else person)
+        start = self.start
+        return every if not isinstance(start, Project) or start in every else [*every, start]
+
+    def project(self, name: str, person: str) -> Project:
+        """The one of a name that came from a page. Raises InputError where this person has none of that name."""
+        for project in self.projects(person):
+            if project.name == name:
+                return project
+        raise InputError("This photo is no longer in the work folder; open it again.")
+
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
         import psutil
 
-        project = self.work.project(name, None if self.alone else session.person)
+        project = self.project(name, session.person)
         session.close()
         free()
         if psutil.virtual_memory().available < _LEAST_FREE:

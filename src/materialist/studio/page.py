@@ -126,9 +126,10 @@ def _wire(context: Context) -> None:
         session.deselect()
         return context.everything(session)
 
-    context["stage"].pick(pick, None, context.all_parts, **quick)
-    context["steps"].act(act, None, context.all_parts, **quick)
-    context["undo"].click(undo, None, context.all_parts, **quick)
+    every = {**quick, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
+    context["stage"].pick(pick, None, context.all_parts, **every)
+    context["steps"].act(act, None, context.all_parts, **every)
+    context["undo"].click(undo, None, context.all_parts, **every)
     context["deselect"].click(deselect, None, context.all_parts, **quick)
     _wire_final(context)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import os
+import shutil
 import socket
 import sys
 import threading
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, SetupError
+from materialist.io.examples import PREFIX, example_path
 from materialist.studio import uploads
 from materialist.studio.hub import ALONE, Hub
 from materialist.studio.jobs import Jobs
@@ -48,16 +50,20 @@ def check_port(host: str, port: int) -> None:
             ) from error
 
 
-def first_project(work: WorkFolder, target: str | None) -> Project | None:
-    """What the studio was started on: a scene package, or a photo that was taken apart already. Raises InputError."""
+def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
+    """What the studio was started on: a scene package as a project, or a photo as a file. Raises InputError."""
     if target is None:
         return None
     path = Path(target)
-    if not (path / "scene.json").is_file():
-        raise InputError(f"There is no scene package at {target}.")
-    resolved = path.resolve()
-    known = next((p for p in work.projects() if p.scene == resolved), None)
-    return known or work.new(path.stem, ALONE, scene=resolved)
+    if (path / "scene.json").is_file():
+        resolved = path.resolve()
+        known = next((p for p in work.projects() if p.scene == resolved), None)
+        return known or work.new(path.stem, ALONE, scene=resolved)
+    photo = example_path(target) if target.startswith(PREFIX) else path
+    if not photo.is_file():
+        raise InputError(f"There is no photo and no scene package at {target}.")
+    uploads.checked_picture(photo, photo.name)
+    return photo
 
 
 def serve(
@@ -95,6 +101,7 @@ def serve(
     finally:
         hub.jobs.close()
         page.close(verbose=False)
+        shutil.rmtree(hub.work.cache, ignore_errors=True)
 
 
 def new_hub(work: str | Path, *, alone: bool, workers: int = 1) -> Hub:

@@ -109,7 +109,9 @@ def wire(context: Context, page: gr.Blocks) -> None:
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
         first = hub.start.name if isinstance(hub.start, Project) else last
-        if first and any(value == first for _, value in known):
+        if isinstance(hub.start, Path):
+            yield {parts["file"]: hub.handed(hub.start)}
+        elif first and any(value == first for _, value in known):
             yield from _resumed(context, session, first)
 
     @guarded
@@ -128,7 +130,7 @@ def wire(context: Context, page: gr.Blocks) -> None:
     parts["start"].click(start, wanted, opening, **free)
     parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **free)
     parts["cancel"].click(cancel, None, None, queue=False, show_progress="hidden", api_visibility="private")
-    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], *opening], **free)
+    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **free)
 
 
 def _facts(context: Context, session: Session, path: Path, name: str) -> str:
@@ -221,7 +223,7 @@ def _following(context: Context, session: Session, project: Project, job: Job) -
 def _resumed(context: Context, session: Session, name: str) -> Iterator[dict[Any, Any]]:
     """Open a project, or follow its inversion if that still runs."""
     hub = context.hub
-    project = hub.work.project(name, None if hub.alone else session.person)
+    project = hub.project(name, session.person)
     running = [j for j in hub.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
     if running:
         yield from _following(context, session, project, running[0])
@@ -258,7 +260,7 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
 
 def _projects(context: Context, session: Session) -> list[tuple[str, str]]:
     """Titles and names for the list of what can be continued."""
-    found = context.hub.work.projects(None if context.hub.alone else session.person)
+    found = context.hub.projects(session.person)
     running = {j.folder for j in context.hub.jobs.of(session.person, "invert") if not j.over}
     return [
         (f"{p.title} · {p.name}" + ("" if p.ready else " (in work)"), p.name)

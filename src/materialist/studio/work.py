@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
 
 from materialist.errors import InputError, OutputError
 
@@ -56,8 +59,12 @@ class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         _make(self.root)
-        self.cache = self.root / ".cache"
+        # A cache a process: it goes when the process ends, and another studio on the same folder keeps its own.
+        self.cache = self.root / ".cache" / str(os.getpid())
         _make(self.cache)
+        for leftover in self.cache.parent.iterdir():
+            if leftover.name.isdigit() and not psutil.pid_exists(int(leftover.name)):
+                shutil.rmtree(leftover, ignore_errors=True)
         try:
             with tempfile.TemporaryFile(dir=self.cache):
                 pass
@@ -69,13 +76,6 @@ class WorkFolder:
         found = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
         mine = [p for p in found if p is not None and person in (None, p.owner)]
         return sorted(mine, key=lambda p: (p.folder / CARD).stat().st_mtime, reverse=True)
-
-    def project(self, name: str, person: str | None = None) -> Project:
-        """The project of a name that came from a page. Raises InputError where this person has none of that name."""
-        for project in self.projects(person):
-            if project.name == name:
-                return project
-        raise InputError("This photo is no longer in the work folder; open it again.")
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere."""
