@@ -99,6 +99,7 @@ def test_bad_input_and_files(tmp_path):
         with pytest.raises(InputError, match=sentence):
             relight(scene, **options)
     edited = dimmed(fit, 0.5)
+    assert any("clipped regions around 20,7" in note for note in edited.report.warnings)
     save_scene(edited, tmp_path / "a.scene")
     assert load_scene(tmp_path / "a.scene").bodies[0].surface.emission == edited.bodies[0].surface.emission
     assert min(edited.bodies[0].surface.emission) > 0

@@ -56,7 +56,10 @@ def dimmed(scene: Scene, dim: float, *, seed: int = 0, device: str = "auto") -> 
         raise InputError("The photo shows no light: no clipped region on a surface covers a thousandth of it.")
     ambient, radiance = _explained(scene, masks, seed, device)
     provenance = {**scene.provenance, KEY: {"ambient": ambient, "radiance": radiance}}
-    return replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance)
+    places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
+    note = f"Taken for lights, {radiance:g} times as bright as the photo's white: the clipped regions around {places}."
+    report = replace(scene.report, warnings=(*scene.report.warnings, note))
+    return replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance, report=report)
 
 
 def explained(scene: Scene, edited: Scene) -> Scene:
