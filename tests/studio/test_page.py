@@ -121,7 +121,7 @@ CONTRAST = """() => {
   const rgba = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
   const low = [];
   for (const n of document.querySelectorAll('button, label, span, p, h1, h2, li, summary, input')) {
-    const text = [...n.childNodes].some((c) => c.nodeType === 3 && c.textContent.trim());
+    const text = [...n.childNodes].some((c) => c.nodeType === 3 && /\\w/.test(c.textContent));
     if (!text || n.disabled || n.closest(':disabled') ) continue;
     if (!n.checkVisibility({visibilityProperty: true, opacityProperty: true})) continue;
     if (n.closest('#stage, .sr-only')) continue;

@@ -107,7 +107,8 @@ class Session:
         with self.lock:
             scene, mode, before = self.scene, pick["mode"], self.selection
             if pick["tool"] == "click":
-                after = before.click(scene, *pick["at"], mode, method)
+                x, y = pick["at"]
+                after = before.click(scene, x, y, mode, method)
             elif pick["tool"] == "box":
                 after = before.box(scene, pick["at"], mode, method)
             else:

@@ -86,7 +86,7 @@ def compared(session: Session) -> tuple[Array, Array]:
     assert live is not None
     before = _bytes(live.scene.photo.linear)
     if session.final is not None and session.final.of(steps):
-        after = cv2.imread(str(session.final.path.with_suffix(".jpg")))[..., ::-1]
+        after: Array = np.asarray(cv2.imread(str(session.final.path.with_suffix(".jpg"))))[..., ::-1]
         native = _bytes(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)

@@ -10,7 +10,8 @@ let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null;
 
 function show() {
   const v = props.value || {};
-  if (v.width) { width = v.width; height = v.height; marks.setAttribute("viewBox", `0 0 ${width} ${height}`); }
+  if (v.width) { width = v.width; height = v.height; marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    view.style.maxWidth = `calc(72vh * ${width / height})`; }  // a portrait must not push its tools out of sight
   view.classList.toggle("empty", !width);
   if (v.picture !== undefined && v.picture !== photo.getAttribute("src")) {
     if (v.picture) photo.src = v.picture; else { photo.removeAttribute("src"); width = 0; view.classList.add("empty"); }
