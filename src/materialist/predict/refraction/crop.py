@@ -125,6 +125,8 @@ MIRROR = 9
 """The channel of `features` that holds the mirrored thickness."""
 MASK = 6
 """The channel of `features` that holds the mask."""
+NORMAL_X = 3
+"""The channel of `features` that changes its sign in a mirror."""
 
 
 def _frame(forward: Array) -> Array:

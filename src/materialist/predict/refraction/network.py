@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR
+from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, NORMAL_X
 
 STRIDE = 32
 """Sides of the input are multiples of this."""
@@ -78,6 +78,13 @@ class RefractionNet(nn.Module):
         inside = maps[:, MASK : MASK + 1]
         solid = (maps[:, MIRROR : MIRROR + 1] + LEAST) * (3 * torch.tanh(raw[:, :1] / 3)).exp()
         return torch.cat([solid, solid * raw[:, 1:].sigmoid()], 1) * inside
+
+
+def both_ways(network: RefractionNet, maps: Tensor) -> Tensor:
+    """The mean [B, 2, S, S] of what the network says of maps [B, CHANNELS, S, S] and of their mirror image."""
+    mirrored = maps.flip(-1)
+    mirrored[:, NORMAL_X] = -mirrored[:, NORMAL_X]
+    return (network(maps) + network(mirrored).flip(-1)) / 2
 
 
 class _Block(nn.Module):

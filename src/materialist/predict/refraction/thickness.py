@@ -70,8 +70,10 @@ def run(network: RefractionNet, maps: Array) -> Array:
     """[2, S, S] float32 solid and hollow thickness in units of the object's size, of features [C, S, S]."""
     import torch
 
+    from materialist.predict.refraction.network import both_ways
+
     with torch.inference_mode():
-        return network(torch.from_numpy(maps)[None])[0].numpy()
+        return both_ways(network, torch.from_numpy(maps)[None])[0].numpy()
 
 
 @lru_cache(maxsize=2)

@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
-from materialist.predict.refraction.crop import MASK, SIDE
+from materialist.predict.refraction.crop import MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import STRIDE, RefractionNet
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
@@ -175,7 +175,7 @@ def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator) -
     maps, target = views["maps"][chosen].astype(np.float32), views["target"][chosen].astype(np.float32)
     flip = rng.random(len(chosen)) < 0.5
     maps[flip], target[flip] = maps[flip, ..., ::-1], target[flip, ..., ::-1]
-    maps[flip, 3] *= -1  # the normal's x
+    maps[flip, NORMAL_X] *= -1
     gain, order = rng.uniform(0.7, 1.2, (len(chosen), 3, 1, 1)), rng.permutation(3)
     inside = maps[:, MASK : MASK + 1]
     maps[:, :3] = (np.clip((maps[:, :3] + 0.5 * inside)[:, order] * gain, 0, 1) - 0.5) * inside
