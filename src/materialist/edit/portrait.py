@@ -11,8 +11,10 @@ from materialist.types import Array, Scene
 
 MOST = 1_500_000
 """Pixels of a portrait that are traced; a larger one is traced smaller and enlarged."""
-FEWEST_PATHS = 24
-"""Paths a native pixel, whatever the working size gives: the denoiser needs as many."""
+FEWEST_PATHS = 32
+"""Paths a native pixel, whatever else: the denoiser needs as many."""
+MOST_PATHS = 4
+"""Most paths a native pixel, in multiples of those of the picture: bodies are small, and seen by all."""
 MARGIN = 4
 """Native pixels around the bodies that the denoiser sees."""
 CONTACT = 0.05
@@ -70,7 +72,9 @@ def portrait(
     factor = min(1.0, np.sqrt(MOST / ((box[1] - box[0]) * (box[3] - box[2]))))
     size = (max(2, round(native[0] * factor)), max(2, round(native[1] * factor)))
     part = _scaled(box, native, size)
-    paths = max(FEWEST_PATHS, round(spp * min(1.0, working[0] * working[1] / (size[0] * size[1]))))
+    # As many paths as a picture of working size has, on the part that the bodies take.
+    pixels = (part[1] - part[0]) * (part[3] - part[2])
+    paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
     picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
     if clean:

@@ -13,6 +13,8 @@ GRID = 4
 """Rays along each side of a pixel."""
 _RAYS = 2**20
 """Pixels looked at together: bounds the memory."""
+_PATHS = 2**23
+"""Paths traced together."""
 Box = tuple[int, int, int, int]
 """Rows and columns (top, bottom, left, right) of a part of a picture, the ends excluded."""
 
@@ -107,8 +109,15 @@ def radiance(target, size: tuple[int, int], box: Box, *, spp: int, seed: int, ma
             "crop_offset_x": left, "crop_offset_y": top, "crop_width": right - left, "crop_height": bottom - top,
             "pixel_format": "rgb", "component_format": "float32",
         },
-        "sampler": {"type": "independent"},
+        "sampler": {"type": "multijitter"},
     })  # fmt: skip
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
-    image = mi.render(target.mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed & 0xFFFFFFFF)
-    return np.array(image, np.float32)[..., :3]
+    # Bounded wavefronts, and whole squares of samples, which suit the sampler.
+    h, w = bottom - top, right - left
+    passes = max(1, -(-spp * h * w // _PATHS))
+    each = int(np.ceil(np.sqrt(spp / passes))) ** 2
+    total = np.zeros((h, w, 3))
+    for k in range(passes):
+        one = (seed * 9973 + k) & 0xFFFFFFFF
+        total += np.array(mi.render(target.mi_scene, sensor=sensor, integrator=integrator, spp=each, seed=one))[..., :3]
+    return (total / passes).astype(np.float32)
