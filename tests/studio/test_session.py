@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, package, room
 
-from materialist.edit.recipe import Step, apply, read_recipe
+from materialist.edit.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.context import light_values, material_values
 from materialist.studio.hub import Hub
@@ -203,7 +203,7 @@ def test_reopened_where_it_was_left(hub, session):
     hub.open(other, hub.start.name)
     assert other.stack.steps[0].options["hue"] == "77" and other.selection == Selection()
     assert "materialist apply" in commands(other) and "edits-me/edits.yaml" in commands(other)
-    other.add(Step("relight", {"rotate": "5"}))
+    other.light(rotate="5")
     assert len(session.stack.steps) == 1  # in memory they are apart
     hub.leave("another page")
     assert other.live is None and session.live is not None

@@ -14,7 +14,7 @@ from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.hub import Hub
 from materialist.studio.selection import read_pick
-from materialist.studio.session import Final
+from materialist.studio.showing import Final
 
 TITLE = "Materialist studio"
 DRAFT_SPP = 16

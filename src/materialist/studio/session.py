@@ -2,48 +2,26 @@
 
 from __future__ import annotations
 
-import re
-import shutil
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from materialist.edit.recipe import Step, read_recipe, write_recipe
+from materialist.edit.recipe import Step, write_recipe
 from materialist.errors import InputError
 from materialist.studio import views
+from materialist.studio.desk import keep, new_name, read_steps, write_mask
 from materialist.studio.jobs import Job
-from materialist.studio.live import LIVE, Live
+from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
+from materialist.studio.showing import Final, stage
 from materialist.studio.stack import Stack
 from materialist.studio.work import Project
-from materialist.types import Array, Scene
+from materialist.types import Scene
 
 EDITS = "edits.yaml"
 _UNDO = 60
 """How many steps back there are."""
-FILES = ("mask", "texture", "envmap", "mesh", "background")
-"""Options that name a file."""
-WORDS = ("thickness", "inpaint")
-"""Options that name a method, or a file."""
-
-
-@dataclass(frozen=True)
-class Final:
-    """A path-traced picture."""
-
-    steps: tuple[Step, ...]
-    """The edits in it."""
-    path: Path
-    """Its files (.png, .exr, .jpg), without the ending."""
-    spp: int
-    """Paths a pixel."""
-
-    def of(self, steps: tuple[Step, ...]) -> bool:
-        """Whether it shows these edits."""
-        return bool(steps) and self.steps == steps
 
 
 class Session:
@@ -61,7 +39,7 @@ class Session:
         """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.stack = Stack()
         self._past: list[tuple[str, Stack, Selection]] = []
-        self._mask_urls = views.mask_urls(None)
+        self.mask_urls = views.mask_urls(None)
         self.running: Job | None = None
         """The last job that this page asked for."""
         self.final: Final | None = None
@@ -89,7 +67,7 @@ class Session:
             self.close()
             self.project, self.live = project, Live(loaded)
             if (self.desk / EDITS).is_file():
-                self.stack = Stack(tuple(_confined(step, self.desk) for step in read_recipe(self.desk / EDITS)))
+                self.stack = Stack(read_steps(self.desk, self.desk / EDITS))
 
     def close(self) -> None:
         """Give the memory back; what was done stays in the work folder."""
@@ -119,7 +97,7 @@ class Session:
             if after.mask is None or mode not in (ADD, REMOVE) or step is None or self.stack.current is None:
                 self.stack = self.stack.chosen(None)
             else:  # the edit in hand grows or shrinks with its region
-                self._put(step, mask=self._write_mask(after.mask))
+                self._put(step, mask=write_mask(self.desk, after.mask))
 
     def deselect(self) -> None:
         with self.lock:
@@ -141,7 +119,7 @@ class Session:
                 if not (mask & (scene.depth > 0)).any():
                     raise InputError("The selection covers only sky; select a surface.")
                 self._remember("begin")
-                self.stack = self.stack.add(Step(kind, {"mask": self._write_mask(mask)}, self.desk))
+                self.stack = self.stack.add(Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk))
                 step = self.stack.steps[-1]
             else:
                 self._remember(f"{name} of {self.stack.current}")
@@ -157,7 +135,7 @@ class Session:
             self._remember(kind)
             before = self.stack
             if step is None:
-                step = Step(kind, {"mask": self._write_mask(mask)}, self.desk)  # type: ignore[arg-type]
+                step = Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk)  # type: ignore[arg-type]
                 self.stack = before.add(step)
             merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
             self._check_or(before, replace(step, options=merged))
@@ -173,13 +151,6 @@ class Session:
             if not self.stack.steps[self.stack.current or 0].options:
                 self.stack = self.stack.without(self.stack.current or 0)
                 self._save()
-
-    def add(self, step: Step) -> None:
-        """Append a step of any kind."""
-        with self.lock:
-            self._remember("add")
-            self.stack = self.stack.add(replace(step, folder=self.desk))
-            self._save()
 
     def place(self, x: float, y: float) -> None:
         """Stand the object in hand at a pixel: the one of the list that is chosen, else a new one of the library."""
@@ -241,11 +212,7 @@ class Session:
         """Put the steps of an uploaded edits.yaml in place of the stack. Raises InputError, and changes nothing."""
         with self.lock:
             scene, desk = self.scene, self.desk
-            try:
-                read = read_recipe(file)
-            except InputError as error:
-                raise InputError(str(error).replace(str(file), "the file")) from error
-            steps = tuple(_confined(step, desk) for step in read)
+            steps = read_steps(desk, file)
             if self.live is not None and scene is not None:
                 self.live.edited(tuple(step for step in steps if not step.skipped))
             self._remember("load")
@@ -254,21 +221,9 @@ class Session:
 
     # Showing
 
-    def stage(self, picture: bool = True) -> dict[str, Any]:
-        """What the stage shows: the picture as a data URL (unless not asked for), the mask, and what it is."""
-        with self.lock:
-            live, steps, stack = self.live, self.stack.active, self.stack
-            if live is None:
-                return {"picture": "", "width": 0, "height": 0, "badge": "", **views.mask_urls(None)}
-            camera = live.scene.camera
-            shown = {"width": camera.width, "height": camera.height, "lamps": self._lamps(stack), **self._mask_urls}
-            final = self.final
-        if not picture:
-            return shown
-        if final is not None and final.of(steps):
-            badge = f"Path traced, {final.spp} paths a pixel"
-            return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge}
-        return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": _badge(steps)}
+    def stage(self, *, edits: bool = True) -> dict[str, Any]:
+        """See `showing.stage`."""
+        return stage(self, edits=edits)
 
     def write_edits(self) -> str:
         """The recipe as a file for other commands; an empty text where no step is on."""
@@ -277,14 +232,12 @@ class Session:
             return str(self.desk / EDITS) if self.stack.active else ""
 
     def keep(self, file: Path, stem: str, suffix: str) -> str:
-        """Copy an uploaded file (checked before) to the desk under a name of ours; returns that name."""
-        name = f"{stem}-{self._number(stem)}{suffix}"
-        shutil.copyfile(file, self.desk / name)
-        return name
+        """See `desk.keep`."""
+        return keep(self.desk, file, stem, suffix)
 
     def new_name(self, stem: str, suffix: str) -> Path:
-        """A free place on the desk."""
-        return self.desk / f"{stem}-{self._number(stem)}{suffix}"
+        """See `desk.new_name`."""
+        return new_name(self.desk, stem, suffix)
 
     # Within
 
@@ -322,7 +275,7 @@ class Session:
 
     def _select(self, selection: Selection) -> None:
         self.selection = selection
-        self._mask_urls = views.mask_urls(selection.mask)
+        self.mask_urls = views.mask_urls(selection.mask)
 
     def _region_of(self, index: int | None) -> Selection:
         """The selection that a step was made with."""
@@ -333,50 +286,8 @@ class Session:
 
         return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
 
-    def _write_mask(self, mask: Array) -> str:
-        from materialist.io.image import write_png_bytes
-
-        file = self.new_name("mask", ".png")
-        write_png_bytes(file, mask.astype(np.uint8) * 255)
-        return file.name
-
-    def _number(self, stem: str) -> int:
-        pattern = re.compile(rf"{re.escape(stem)}-(\d+)\.")
-        taken = [int(m[1]) for p in self.desk.iterdir() if (m := pattern.match(p.name))]
-        return max(taken, default=0) + 1
-
-    def _lamps(self, stack: Stack) -> list[list[float]]:
-        """(x, y) of the lamps, for their marks."""
-        place = stack.last("relight")
-        lamps = stack.steps[place].options.get("lamps", []) if place is not None else []
-        return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
-
     def _save(self) -> None:
         if self.stack.steps:
             write_recipe(self.desk / EDITS, list(self.stack.steps))
         elif self.project is not None:
             (self.desk / EDITS).unlink(missing_ok=True)
-
-
-def _badge(steps: tuple[Step, ...]) -> str:
-    """What a picture that is not path traced shows, and what it leaves out."""
-    if not steps:
-        return "Photo"
-    if any(step.kind not in LIVE for step in steps):
-        return "Sketch: path tracing shows the rest"
-    if any("lamps" in step.options for step in steps):
-        return "Live preview: lamps show in path tracing"
-    return "Live preview"
-
-
-def _confined(step: Step, desk: Path) -> Step:
-    """The step with its files on the desk. Raises InputError where it names a file elsewhere or one that is missing."""
-    for name in (*FILES, *WORDS):
-        value = step.options.get(name)
-        if value is None or (name in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value)):
-            continue
-        if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
-            raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")
-        if not (desk / value).is_file():
-            raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
-    return replace(step, folder=desk)

@@ -104,7 +104,7 @@ def wire(context: Context, page: gr.Blocks) -> None:
 
     @guarded
     def arrive(token: str, last: str, request: gr.Request):
-        token = token if len(token) >= 16 else secrets.token_hex(8)
+        token = token if len(token or "") >= 16 else secrets.token_hex(8)
         session = hub.session(request.session_hash, hub.person(token))
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
@@ -238,20 +238,16 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
     parts = context.parts
     yield {parts["fit"]: box("Opening …")}
     context.hub.open(session, project.name)
-    steps = session.stack
-    if session.live is None:
+    live = session.live
+    if live is None:
         return
-    session.stack = type(steps)()
-    first = session.stage()
-    session.stack = steps
     known = _projects(context, session)
     yield {
-        **context.controls(session), parts["stage"]: first, parts["last"]: project.name,
+        **context.controls(session), parts["stage"]: session.stage(edits=False), parts["last"]: project.name,
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
         parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
     }  # fmt: skip
-    live = session.live
     live.wait()
     if session.live is live:
         ready = box("Ready: click an object, then move a slider.")

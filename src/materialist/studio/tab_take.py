@@ -14,7 +14,8 @@ from materialist.studio.context import Context
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
-from materialist.studio.session import EDITS, Final, Session
+from materialist.studio.session import EDITS, Session
+from materialist.studio.showing import Final
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
