@@ -146,6 +146,8 @@ def test_rays_that_meet_nothing_see_the_environment():
     assert found[:, 0].tolist() == pytest.approx([1, 0, 0.25])
     empty = ti.Behind(behind.picture, np.zeros(SHAPE), sky)
     assert ti.look(origin[:1], direction[:1], empty, CAMERA)[0, 0] == 1
+    # The sky that the picture shows comes from the picture.
+    assert ti.look(origin[2:], direction[2:], empty, CAMERA)[0].tolist() == [0.25] * 3
 
 
 def test_total_reflection_keeps_its_light():

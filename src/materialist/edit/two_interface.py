@@ -167,11 +167,18 @@ def _back_normal(front: Array, view: Array, back: str) -> Array:
 
 
 def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
-    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
+    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment.
+
+    Where a ray that meets no surface looks at the picture's sky, the picture knows it better than the environment map.
+    """
     distance = background_distance(origin, direction, behind.depth, camera)
-    place, _ = project(origin + np.where(np.isfinite(distance), distance, 0)[:, None] * direction, camera)
-    found = bilinear(behind.picture, place)
-    return np.where(np.isfinite(distance)[:, None], found, environment(direction, behind.envmap))
+    met = np.isfinite(distance)
+    end = np.where(met[:, None], origin + np.where(met, distance, 0)[:, None] * direction, direction)
+    place, depth = project(end, camera)
+    size = np.array([camera.width, camera.height])
+    sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
+    sky[sky] = bilinear(behind.depth[..., None], place[sky])[:, 0] == 0
+    return np.where((met | sky)[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
 
 
 def background_distance(origin: Array, direction: Array, depth: Array, camera: Camera) -> Array:
