@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
-from materialist.edit.background import make_hole, without
+from materialist.edit.background import without
 from materialist.edit.composite import composite
+from materialist.edit.hole import make_hole
 from materialist.errors import InputError
 from materialist.types import Photo
 

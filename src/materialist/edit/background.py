@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,33 +11,14 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.edit.behind import Behind, behind
 from materialist.edit.exemplar import Plan, exemplar_plan
+from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted
-from materialist.edit.region import checked_region
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Materials, Photo, Scene
 
-GROW = 0.006
-"""Part of the picture's longer side by which a hole is larger than the object: pixels at a silhouette show both."""
-MOST = 0.9
-"""Share of the picture's surfaces beyond which nothing is left to tell what stood behind."""
-UPWARD = 0.5
-"""Least Y of the normal of what a thing can stand on."""
-
 Inpaint = Callable[[Array, Array], Array]
 """inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
-
-
-@dataclass(frozen=True)
-class Hole:
-    """What is taken away, at working size."""
-
-    object: Array
-    """[H, W] bool: the object itself."""
-    gone: Array
-    """[H, W] bool: the object and a rim of mixed pixels; depth and normals end here."""
-    painted: Array
-    """[H, W] bool: where materials and photo are filled: `gone`, and its contact shadow if that is wanted."""
 
 
 def without(
@@ -83,29 +64,6 @@ def without(
     if picture is not None:
         removed = _matched(removed, hole, picture)
     return noted(removed, "remove", what)
-
-
-def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float = 0.0) -> Hole:
-    """The pixels that a removal concerns; arguments and errors as for `without`."""
-    for name, value, most in (("rim", grow, 0.2), ("shadow", shadow, 2.0)):
-        if not (np.isfinite(value) and 0 <= value <= most):
-            raise InputError(f"The {name} is {value:g}; it must lie in [0, {most:g}].")
-    own = checked_region(scene, mask) > 0.5
-    if not own.any():
-        raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
-    height, width = own.shape
-    gone = _grown(own, round(grow * max(height, width)))
-    surface = scene.depth > 0
-    if (gone & surface).sum() > MOST * surface.sum() or (gone | ~surface).all():
-        raise InputError(
-            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
-            "what stands behind; mark one object only."
-        )
-    painted = gone
-    if shadow > 0:
-        supports = (scene.geometry.plane_label >= 0) & (scene.normal[..., 1] > UPWARD)
-        painted = gone | (supports & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
-    return Hole(own, gone, painted)
 
 
 def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
@@ -275,13 +233,6 @@ def _denoised(scene: Scene) -> Array:
 
     guides = (scene.materials.albedo, scene.materials.albedo, scene.normal)
     return denoised(scene.rerender, scene.rerender, guides)[0]
-
-
-def _grown(mask: Array, pixels: int) -> Array:
-    import cv2
-
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(pixels, 1) + 1,) * 2)
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0 if pixels > 0 else mask
 
 
 def _enlarged_mask(mask: Array, native: tuple[int, int]) -> Array:

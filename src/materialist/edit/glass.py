@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.edit.background import GROW, Inpaint, without
+from materialist.edit.background import Inpaint, without
+from materialist.edit.hole import GROW
 from materialist.edit.material import noted
 from materialist.edit.region import checked_region
 from materialist.edit.thickness import ObjectThickness, object_thickness
 from materialist.errors import InputError
-from materialist.geometry.closed import Shell, closed_proxy
+from materialist.geometry.closed import closed_proxy
+from materialist.geometry.shell import Shell
 from materialist.types import Array, Body, Scene, Surface
 
 MODELS = ("closed", "two-interface")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from materialist.errors import InputError
 from materialist.geometry.contour import Region, region, silhouette_field
 from materialist.geometry.front import smooth_front
 from materialist.geometry.membrane import membrane
+from materialist.geometry.shell import Shell, joined, turned, vertex_normals
 from materialist.geometry.symmetry import border_distance, spacing, surface_in
 from materialist.types import Array, Camera
 
@@ -36,19 +36,6 @@ NOTHING = 1e9
 """Room behind an object with nothing there."""
 THIN = 0.004
 """Least thickness, as a part of the object's size: front and back never touch."""
-
-
-class Shell(NamedTuple):
-    """A closed surface."""
-
-    vertices: Array
-    """[V, 3] float32, camera frame, scene units."""
-    faces: Array
-    """[F, 3] int32, counter-clockwise seen from outside."""
-    normals: Array
-    """[V, 3] float32 unit, outwards."""
-    uv: Array
-    """[V, 2] float32 in [0, 1]: the place in the picture, u to the right, v DOWN."""
 
 
 def closed_proxy(
@@ -83,19 +70,6 @@ def closed_proxy(
         return shell
     inner = _cavity(view, front, squared, wall, camera)
     return shell if inner is None else joined([shell, turned(inner)])
-
-
-def joined(shells: list[Shell]) -> Shell:
-    """Several surfaces as one; none of them shares a vertex with another."""
-    first = np.cumsum([0] + [len(shell.vertices) for shell in shells])
-    faces = np.concatenate([shell.faces + start for shell, start in zip(shells, first)]).astype(np.int32)
-    vertices, normals, uv = (np.concatenate([getattr(s, n) for s in shells]) for n in ("vertices", "normals", "uv"))
-    return Shell(vertices, faces, normals, uv)
-
-
-def turned(shell: Shell) -> Shell:
-    """The surface inside out: that of a cavity."""
-    return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv)
 
 
 @dataclass(frozen=True)
@@ -296,12 +270,3 @@ def _in_space(place: Array, front: Array, beyond: Array, view: _View, camera: Ca
     )
     points = rays * (front + beyond / np.linalg.norm(rays, axis=-1))[:, None]
     return points, np.clip(np.stack([column / camera.width, row / camera.height], -1), 0, 1).astype(np.float32)
-
-
-def vertex_normals(vertices: Array, faces: Array) -> Array:
-    """[V, 3] float32 unit normals, the area-weighted mean of the faces around each vertex."""
-    corner = vertices[faces]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    ids = faces.ravel()
-    total = np.stack([np.bincount(ids, np.repeat(area[:, k], 3), len(vertices)) for k in range(3)], -1)
-    return (total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30)).astype(np.float32)

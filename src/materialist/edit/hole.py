@@ -1,0 +1,60 @@
+"""The pixels that taking an object away concerns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.edit.region import checked_region
+from materialist.errors import InputError
+from materialist.types import Array, Scene
+
+GROW = 0.006
+"""Part of the picture's longer side by which a hole is larger than the object: pixels at a silhouette show both."""
+MOST = 0.9
+"""Share of the picture's surfaces beyond which nothing is left to tell what stood behind."""
+UPWARD = 0.5
+"""Least Y of the normal of what a thing can stand on."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """What is taken away, at working size."""
+
+    object: Array
+    """[H, W] bool: the object itself."""
+    gone: Array
+    """[H, W] bool: the object and a rim of mixed pixels; depth and normals end here."""
+    painted: Array
+    """[H, W] bool: where materials and photo are filled: `gone`, and its contact shadow if that is wanted."""
+
+
+def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float = 0.0) -> Hole:
+    """The pixels that a removal concerns; arguments and errors as for `without`."""
+    for name, value, most in (("rim", grow, 0.2), ("shadow", shadow, 2.0)):
+        if not (np.isfinite(value) and 0 <= value <= most):
+            raise InputError(f"The {name} is {value:g}; it must lie in [0, {most:g}].")
+    own = checked_region(scene, mask) > 0.5
+    if not own.any():
+        raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
+    height, width = own.shape
+    gone = _grown(own, round(grow * max(height, width)))
+    surface = scene.depth > 0
+    if (gone & surface).sum() > MOST * surface.sum() or (gone | ~surface).all():
+        raise InputError(
+            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
+            "what stands behind; mark one object only."
+        )
+    painted = gone
+    if shadow > 0:
+        supports = (scene.geometry.plane_label >= 0) & (scene.normal[..., 1] > UPWARD)
+        painted = gone | (supports & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
+    return Hole(own, gone, painted)
+
+
+def _grown(mask: Array, pixels: int) -> Array:
+    import cv2
+
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(pixels, 1) + 1,) * 2)
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0 if pixels > 0 else mask

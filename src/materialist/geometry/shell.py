@@ -1,0 +1,44 @@
+"""Closed surfaces of triangles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from materialist.types import Array
+
+
+class Shell(NamedTuple):
+    """A closed surface."""
+
+    vertices: Array
+    """[V, 3] float32, camera frame, scene units."""
+    faces: Array
+    """[F, 3] int32, counter-clockwise seen from outside."""
+    normals: Array
+    """[V, 3] float32 unit, outwards."""
+    uv: Array
+    """[V, 2] float32 in [0, 1]: the place in the picture, u to the right, v DOWN."""
+
+
+def joined(shells: list[Shell]) -> Shell:
+    """Several surfaces as one; none of them shares a vertex with another."""
+    first = np.cumsum([0] + [len(shell.vertices) for shell in shells])
+    faces = np.concatenate([shell.faces + start for shell, start in zip(shells, first)]).astype(np.int32)
+    vertices, normals, uv = (np.concatenate([getattr(s, n) for s in shells]) for n in ("vertices", "normals", "uv"))
+    return Shell(vertices, faces, normals, uv)
+
+
+def turned(shell: Shell) -> Shell:
+    """The surface inside out: that of a cavity."""
+    return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv)
+
+
+def vertex_normals(vertices: Array, faces: Array) -> Array:
+    """[V, 3] float32 unit normals, the area-weighted mean of the faces around each vertex."""
+    corner = vertices[faces]
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    ids = faces.ravel()
+    total = np.stack([np.bincount(ids, np.repeat(area[:, k], 3), len(vertices)) for k in range(3)], -1)
+    return (total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30)).astype(np.float32)
