@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from materialist.render.buffers import tensor
@@ -46,7 +48,7 @@ def body_bsdf(mi, surface: Surface) -> dict:
 
 
 def _dielectric(surface: Surface) -> dict:
-    roughness = float(np.mean(surface.roughness))
+    roughness = float(surface.roughness.mean())
     tint = [float(np.sqrt(c)) for c in surface.tint]
     ior = max(float(surface.ior), 1.0001)  # Mitsuba takes no interface between equal media
     glass = {
@@ -81,7 +83,8 @@ def register() -> None:
 
         def __init__(self, props: mi.Properties):
             mi.Texture.__init__(self, props)
-            self.value = float(props["value"])
+            value: Any = props["value"]
+            self.value = float(value)
 
         def eval_1(self, si, active=True):
             return dr.select(si.wi.z > 0, mi.Float(self.value), mi.Float(1))
