@@ -61,7 +61,7 @@ def glass(
     background: Background = None,
     inpaint: Inpainter = None,
     shadow: Shadow = 0.0,
-    spp: Spp = 256,
+    spp: Spp = 96,
     denoise: Denoise = True,
     full_render: FullRender = False,
     save: Save = None,
