@@ -46,7 +46,9 @@ def layout(context: Context) -> None:
         parts["make_progress"] = gr.HTML("", js_on_load=None, elem_id="make_progress")
         parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
         parts["recipe"] = gr.File(label="Load an edits.yaml", type="filepath", height=110, file_types=[".yaml", ".yml"])
-        parts["commands"] = gr.Code("", language="shell", label="The same on the command line", interactive=False)
+        parts["commands"] = gr.Textbox(
+            "", label="The same on the command line", lines=4, interactive=False, buttons=["copy"], elem_id="commands"
+        )
 
 
 def wire(context: Context) -> None:
