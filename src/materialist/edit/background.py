@@ -28,7 +28,7 @@ def without(
     """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
 
     In the result `photo` and `rerender` are filled alike, from the same places: their difference is what the fit
-    misses of the surroundings, and `revealed.revealed` puts it on top of a rendering.
+    misses of the surroundings. `revealed.revealed` brings both into the composite.
 
     Args:
         mask: [H, W] bool, or weights in [0, 1], at working size.

@@ -66,7 +66,7 @@ def composite(
         picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
     layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
-    return into_photo(*revealed(scene, edited, layers))
+    return into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
 
 
 def pictures(
@@ -82,7 +82,7 @@ def pictures(
             yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         else:
             layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
-            yield into_photo(*revealed(scene, edited, layers))
+            yield into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
     tick("frames", len(edits), len(edits))
 
 

@@ -42,6 +42,11 @@ class Studio:
 
         return base, lambda spp, seed: self._render(edited, depth, spp, seed)
 
+    def beside(self, edited: Scene, other: Scene) -> Render:
+        """render(spp, seed) of `other` by the tracer that `twins` takes for `edited`."""
+        depth = max(_path_depth(s) for s in (self.scene, edited))
+        return lambda spp, seed: self._render(other, depth, spp, seed)
+
     def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
         """By Mitsuba's path tracer to that depth, by the splitting one for 0."""
         target = self._dressed(scene)

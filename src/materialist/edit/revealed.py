@@ -1,7 +1,7 @@
 """What an edit shows that the photo does not: places that an object hid, and glass.
 
-An edit that takes an object away carries a photo of its own, filled there, and a re-rendering filled alike
-(`background.without`). In the composite these stand in for the photo and the base rendering.
+An edit that takes an object away carries a photo of its own, filled there (`background.without`). In the composite it
+stands in for the photo, and a rendering without the object for the base.
 """
 
 from __future__ import annotations
@@ -10,30 +10,42 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edit.layers import Layers
+from materialist.edit.layers import Layers, denoised
 from materialist.types import Array, Photo, Scene
 
 
-def revealed(scene: Scene, edited: Scene, layers: Layers) -> tuple[Photo, Layers]:
-    """Photo and layers for `composite.into_photo`, of the layers of the two scenes' renderings.
+def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, clean: bool = True):
+    """(Photo, Layers) for `composite.into_photo`, of the layers that a `lights.Studio` rendered.
 
-    Returns the photo of `scene` where the edit left it, else that of `edited`, with layers whose base is the filled
-    re-rendering there. Under a body in place of the photo's surface (`layers.covered`) the rendering alone counts:
-    what the photo has beyond the fit is not what is seen through the body or on it.
+    The photo is that of the studio's scene where the edit left it, else that of `edited`; the base there is a
+    rendering of what that photo shows: the scene without the object, under its own light, and without what the edit
+    put in its place. So a place that is merely uncovered shows the filled photo, and the shadow of glass falls on it.
+    Under a body in place of the photo's surface (`layers.covered`) the rendering alone counts: what the photo has
+    beyond the fit is not what is seen through the body or on it.
     """
+    scene = studio.scene
     if edited.photo is scene.photo:
         return scene.photo, layers
-    covered = layers.covered
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
-    base = np.where(filled[..., None], edited.rerender, layers.base)
-    photo = edited.photo
+    base = np.where(filled[..., None], _bare(studio, edited, layers, spp, seed, clean), layers.base)
+    photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
         base = np.where(covered[..., None], photo.linear, base)
         photo = _without_detail(photo, covered)
     return photo, replace(
-        layers, base=base.astype(np.float32), reached=layers.reached | filled,
-        changed=layers.changed | filled,
-    )  # fmt: skip
+        layers, base=base.astype(np.float32), reached=layers.reached | filled, changed=layers.changed | filled
+    )
+
+
+def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: bool) -> Array:
+    """[H, W, 3] the edited scene with the bodies and the light of the fitted one."""
+    scene = studio.scene
+    if edited.bodies == scene.bodies and not layers.relit:
+        return layers.edited
+    bare = replace(edited, bodies=scene.bodies, envmap=scene.envmap, lamps=scene.lamps)
+    picture = studio.beside(edited, bare)(-(-spp // 2), 2 * seed)
+    guides = (edited.materials.albedo, edited.materials.albedo, edited.normal)
+    return denoised(picture, picture, guides)[0] if clean else picture
 
 
 def _without_detail(photo: Photo, covered: Array) -> Photo:
