@@ -66,7 +66,7 @@ class Preview:
         return Layers(base, picture, differs, changed_pixels(self.scene, edited) & differs, picture, relit)
 
     def picture(self, edited: Scene, *, quick: bool = False) -> Array:
-        """[H, W, 3] float32 linear: the edit in the photo at working size; `quick` without soft borders, much sooner."""
+        """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""
         from dataclasses import replace
 
         from materialist.edit.composite import into_photo, onto_working
