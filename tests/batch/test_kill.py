@@ -17,7 +17,8 @@ from materialist.batch.run import batch
 NAMES = ("slow1", "slow2", "slow3", "slow4", "quick")
 
 COMMAND = """
-import functools, sys
+import functools, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored
 import materialist.batch.run as run
 from materialist.cli import main
 run.batch = functools.partial(run.batch, function="made_batch:moody")

@@ -237,7 +237,9 @@ def test_help_answers_at_once():
 def test_an_interrupt_from_the_keyboard_is_130_and_leaves_nothing(photo, tmp_path):
     """A real process, a real signal, in the middle of the fit."""
     script = (
-        "import sys, time, types\nimport materialist\n"
+        # A background job starts with the interrupt ignored.
+        "import signal, sys, time, types\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "import materialist\n"
         "from materialist.cli import app\nfrom materialist.cli.outcome import run_to_exit_code\n"
         "pipeline = types.ModuleType('materialist.pipeline')\n"
         "def invert(photo, **options):\n    sys.stderr.write('fitting\\n'); sys.stderr.flush(); time.sleep(30)\n"

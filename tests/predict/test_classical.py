@@ -38,11 +38,19 @@ def test_any_picture_gets_sane_maps(shape, content):
     assert_sane(get_predictor("classical").predict(photo(linear)), shape)
 
 
-def test_auto_is_the_built_in_one_and_deterministic():
+def test_it_is_deterministic():
     linear = np.random.default_rng(2).random((48, 64, 3)).astype(np.float32) ** 2
-    a = get_predictor("auto").predict(photo(linear), seed=1)
-    b = get_predictor("classical").predict(photo(linear), seed=2)
+    a, b = (get_predictor("classical").predict(photo(linear), seed=seed) for seed in (1, 2))
     assert np.array_equal(a.depth, b.depth) and np.array_equal(a.materials.albedo, b.materials.albedo)
+
+
+def test_auto_is_the_bundled_network_and_this_one_only_where_there_are_no_weights(monkeypatch, tmp_path):
+    linear = np.random.default_rng(2).random((48, 64, 3)).astype(np.float32) ** 2
+    assert get_predictor("auto").predict(photo(linear)).predictor.startswith("bundled step")
+    monkeypatch.setattr("materialist.predict.bundled.WEIGHTS", tmp_path / "weights.safetensors")
+    found = get_predictor("auto").predict(photo(linear))
+    assert found.predictor == "classical"
+    assert any("no weights of the bundled network" in note for note in found.warnings)
 
 
 def test_soft_light_on_painted_squares_leaves_the_paint():

@@ -15,7 +15,7 @@ from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.types import Array, Camera, Materials, Prediction
 
-NETWORK_SIDE = 768
+NETWORK_SIDE = 256
 """Longest side that the network sees; larger photos are brought down and the maps up again, guided by the photo."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
