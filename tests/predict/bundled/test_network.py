@@ -93,14 +93,14 @@ def test_any_size(file, size):
     assert np.median(prediction.depth[known]) == pytest.approx(inference.MEDIAN_DEPTH, rel=0.05)
 
 
-def test_large_photos_are_seen_small(network, monkeypatch):
+def test_large_photos_and_their_mirror_images_are_seen_small(network, monkeypatch):
     seen = []
     run = inference._run
     monkeypatch.setattr(inference, "_run", lambda n, photo, *rest: seen.append(photo.shape[:2]) or run(n, photo, *rest))
     camera = Camera(150, 100, 60.0)
     linear = np.random.default_rng(0).random((100, 150, 3), dtype=np.float32)
-    prediction = inference.infer(network, linear, inference.rays_of(camera), side=96)
-    assert seen == [(64, 96)] and prediction.depth.shape == (100, 150)
+    prediction = inference.infer(network, linear, inference.rays_of(camera), sides=(96,))
+    assert seen == [(64, 96)] * 2 and prediction.depth.shape == (100, 150)
 
 
 def test_rays_go_on_into_the_padding(network):
@@ -210,3 +210,12 @@ def test_the_same_photo_gives_the_same_maps(file):
     first, second = BundledPredictor(file).predict(photo), BundledPredictor(file).predict(photo, seed=9)
     np.testing.assert_array_equal(first.depth, second.depth)
     assert linear_to_srgb(first.materials.albedo).shape == (48, 64, 3)
+
+
+def test_sky_is_what_is_joined_to_sure_sky():
+    logit = np.full((6, 9), 3.0, np.float32)
+    logit[:2, :4] = -2.0
+    logit[0, 0] = -5.0
+    logit[:2, 6:] = -2.0  # a white wall: likely, and nowhere sure
+    surface = inference._surface(logit)
+    assert not surface[:2, :4].any() and surface.sum() == 54 - 8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -15,8 +16,9 @@ from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.types import Array, Camera, Materials, Prediction
 
-NETWORK_SIDE = 256
-"""Longest side that the network sees; larger photos are brought down and the maps up again, guided by the photo."""
+NETWORK_SIDES = (160, 224)
+"""Longest sides at which the network sees the photo, and its mirror image: sizes that it was trained on. Answers are
+averaged, and brought to the photo's size with the photo as the guide."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
 EDGE_REACH = 0.047
@@ -25,12 +27,15 @@ MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
 DEPTH_SPAN = 50.0
 """Largest ratio of a depth to the median, either way."""
+SKY = (-1.0, -3.5)
+"""Logits of there being a surface below which a pixel is likely, and surely, sky."""
+_MIRROR = np.array([-1, 1, 1], np.float32)
 LEAST_ISLAND = 0.0005
 """Specks of sky or surface smaller than this part of the picture are taken for their surroundings."""
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", side: int = NETWORK_SIDE
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = NETWORK_SIDES
 ) -> Prediction:
     """Maps of a photo at its own size.
 
@@ -38,17 +43,17 @@ def infer(
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-        side: longest side, in pixels, that the network sees.
+        sides: longest sides, in pixels, at which the network sees the photo.
 
     Returns:
         A Prediction without a name: albedo linear, depth with median MEDIAN_DEPTH, 0 where the network sees no surface.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    small = _network_size(size, side)
+    small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
-    maps = _run(network, photo, resample.values(np.ascontiguousarray(rays), small), device)
-    surface = _without_specks(maps["mask"] > 0)
+    maps = _mean_answer(network, linear, rays, sides, device)
+    surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
     depth = _scaled(maps["depth"], surface)
@@ -108,6 +113,23 @@ def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float
     return np.clip(result[0] if values.ndim == 2 else np.stack(result, -1), 0, 1).astype(np.float32)
 
 
+def _mean_answer(
+    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any
+) -> dict[str, Array]:
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest size."""
+    target = _network_size(linear.shape[:2], max(sides))
+    answers = []
+    for size in sorted({_network_size(linear.shape[:2], side) for side in sides}):
+        photo, seen = resample.values(linear, size), resample.values(np.ascontiguousarray(rays), size)
+        answers.append(_run(network, photo, seen, device))
+        mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
+        found = {name: np.ascontiguousarray(m[:, ::-1]) for name, m in _run(network, *mirrored, device).items()}
+        answers.append(found | {"normal": found["normal"] * _MIRROR})
+    for answer in answers:  # what depth is relative to is every answer's own
+        answer["depth"] = answer["depth"] - np.median(answer["depth"])
+    return {n: np.mean([resample.values(a[n], target) for a in answers], axis=0) for n in answers[0]}
+
+
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:
     """The network's maps at the size of `photo` [h, w, 3]: [h, w] or [h, w, 3] float32."""
     height, width = photo.shape[:2]
@@ -141,6 +163,16 @@ def _scaled(log_depth: Array, surface: Array) -> Array:
     relative = log_depth - np.median(log_depth[surface])
     limit = np.log(DEPTH_SPAN)
     return np.where(surface, MEDIAN_DEPTH * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
+
+
+def _surface(logit: Array) -> Array:
+    """[h, w] bool from the logit of there being a surface: sky is what is likely sky and joined to what surely is.
+
+    White walls and windows look like sky, and a hole in a room costs more than a sky that is a far surface.
+    """
+    likely, sure = (logit < limit for limit in SKY)
+    _, labels = cv2.connectedComponents(likely.astype(np.uint8), connectivity=4)
+    return ~(likely & np.isin(labels, np.unique(labels[sure & likely])))
 
 
 def _without_specks(surface: Array) -> Array:
