@@ -109,7 +109,7 @@ class TransportCache:
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
-        take: Any = lambda v: dr.gather(type(v), v, pixels)  # noqa: E731
+        take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
         self.position, self.geometric_normal = take(si.p), take(si.n)
         normal, view = take(si.sh_frame.n), -take(d)
         self.normal = _towards(normal, view)

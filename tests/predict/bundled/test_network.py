@@ -219,3 +219,18 @@ def test_sky_is_what_is_joined_to_sure_sky():
     logit[:2, 6:] = -2.0  # a white wall: likely, and nowhere sure
     surface = inference._surface(logit)
     assert not surface[:2, :4].any() and surface.sum() == 54 - 8
+
+
+def test_a_tower_before_the_sky_is_a_surface_far_away():
+    camera = Camera(96, 64, 35.0)
+    photo = np.full((64, 96, 3), 0.8, np.float32)
+    photo[10:50, 40:44] = 0.2
+    detailed = inference._detailed(photo, inference.rays_of(camera))
+    assert detailed[30, 42] and not detailed[:, :20].any() and not detailed[:, 70:].any()
+    logit, surface = np.full((64, 96), 3.0, np.float32), np.ones((64, 96), bool)
+    logit[:32] = -5.0
+    surface[:32, :32] = False
+    log_depth = np.tile(np.linspace(0, 1, 64, dtype=np.float32)[:, None], (1, 96))
+    moved = inference._behind(log_depth, logit, surface)
+    np.testing.assert_array_equal(moved[32:], log_depth[32:])
+    assert (moved[:32, 32:] >= 0.95 * moved[32:].max()).all()

@@ -29,6 +29,10 @@ DEPTH_SPAN = 50.0
 """Largest ratio of a depth to the median, either way."""
 SKY = (-1.0, -3.5)
 """Logits of there being a surface below which a pixel is likely, and surely, sky."""
+DETAIL = 0.06
+"""Difference (sRGB-encoded) to a picture as smooth as an environment map from which something stands before the sky."""
+ENVMAP_TEXEL = np.pi / 256
+"""Size of a texel of the fitted environment map, radians."""
 _MIRROR = np.array([-1, 1, 1], np.float32)
 LEAST_ISLAND = 0.0005
 """Specks of sky or surface smaller than this part of the picture are taken for their surroundings."""
@@ -53,10 +57,10 @@ def infer(
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
     maps = _mean_answer(network, linear, rays, sides, device)
-    surface = _without_specks(_surface(maps["mask"]))
+    surface = _without_specks(_surface(maps["mask"]) | _detailed(photo, rays))
     if not surface.any():
         surface[:] = True
-    depth = _scaled(maps["depth"], surface)
+    depth = _scaled(_behind(maps["depth"], maps["mask"], surface), surface)
     albedo, roughness, metallic, normal = (maps[n] for n in ("albedo", "roughness", "metallic", "normal"))
     if small != size:
         guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
@@ -173,6 +177,27 @@ def _surface(logit: Array) -> Array:
     likely, sure = (logit < limit for limit in SKY)
     _, labels = cv2.connectedComponents(likely.astype(np.uint8), connectivity=4)
     return ~(likely & np.isin(labels, np.unique(labels[sure & likely])))
+
+
+def _detailed(photo: Array, rays: Array) -> Array:
+    """[h, w] bool where the photo shows more than an environment map can: towers and twigs before a sky.
+
+    rays: [H, W, 2] of the photo at any size.
+    """
+    pixel = float(rays[0, -1, 0] - rays[0, 0, 0]) / max(photo.shape[1] - 1, 1)  # radians, near the middle
+    encoded = linear_to_srgb(photo)
+    smooth = cv2.GaussianBlur(encoded, (0, 0), max(ENVMAP_TEXEL / max(pixel, 1e-6), 0.8))
+    detail = (np.abs(encoded - smooth).max(-1) > DETAIL).astype(np.uint8)
+    return cv2.dilate(detail, np.ones((5, 5), np.uint8)) > 0
+
+
+def _behind(log_depth: Array, logit: Array, surface: Array) -> Array:
+    """The logarithm of depth [h, w], with what was kept of the sky behind nearly all else."""
+    sure = surface & (logit > 0)
+    if not sure.any():
+        return log_depth
+    far = np.percentile(log_depth[sure], 95)
+    return np.where(surface & ~sure, np.maximum(log_depth, far), log_depth)
 
 
 def _without_specks(surface: Array) -> Array:
