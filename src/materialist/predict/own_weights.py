@@ -1,0 +1,60 @@
+"""Weights that this project trains: one .safetensors file, float16, that says what it is and how it is built."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from materialist.errors import WeightsError
+from materialist.predict.weights import load_weights, read_state
+
+
+def save(path: Path, network: Any, kind: str, facts: dict[str, Any]) -> None:
+    """Write a network that has an `architecture`, as float16, with `facts` (steps, data, scores), whole or not at all.
+
+    kind: what the file calls itself; another number is another network.
+    """
+    import torch
+    from safetensors.torch import save_file
+
+    tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in network.state_dict().items()}
+    architecture = json.dumps(network.architecture.as_dict())
+    partial = path.with_name(path.name + ".part")
+    save_file(tensors, str(partial), {"format": kind, "architecture": architecture, "facts": json.dumps(facts)})
+    partial.replace(path)
+
+
+def load(path: Path, kind: str, build: Callable[[dict[str, Any]], Any], remedy: str) -> tuple[Any, dict[str, Any]]:
+    """The network in evaluation mode, float32, and the facts it was written with.
+
+    Args:
+        build: the network from its stored architecture.
+        remedy: the command that makes such a file.
+
+    Raises:
+        WeightsError: the file is missing, damaged, of another kind, or does not fit its architecture.
+    """
+    tensors = read_state(path)
+    metadata = _metadata(path)
+    if metadata.get("format") != kind:
+        raise WeightsError(f"{path} has format {metadata.get('format')!r}, not {kind!r}; make it with: {remedy}.")
+    try:
+        network = build(json.loads(metadata["architecture"]))
+        facts = json.loads(metadata.get("facts", "{}"))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
+        raise WeightsError(f"{path} describes no usable network ({error}); make it again with: {remedy}.") from error
+    load_weights(network, tensors, path)
+    return network.eval().requires_grad_(False), facts
+
+
+def _metadata(path: Path) -> dict[str, str]:
+    """The texts in the file's header; none for files of another kind."""
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            return file.metadata() or {}
+    except (SafetensorError, OSError, ValueError):
+        return {}
