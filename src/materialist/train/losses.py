@@ -27,6 +27,11 @@ def l2(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     return mean((predicted - true).square(), mask)
 
 
+def cross_entropy(logit: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """Binary cross-entropy of logits against true values in [0, 1]; least where sigmoid(logit) is the expected value."""
+    return mean(F.binary_cross_entropy_with_logits(logit, true, reduction="none"), mask)
+
+
 def cosine(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """1 - cosine of the angle between normals (paper: L_N)."""
     return mean(1 - F.cosine_similarity(predicted, true, dim=1).unsqueeze(1), mask)

@@ -87,10 +87,13 @@ class BundledTask:
             "albedo_scaled": 2 * losses.scaled_l1(out["albedo"] ** 2.2, albedo**2.2, mask),
             "albedo_gradient": 0.7 * losses.gradient(out["albedo"], albedo, mask),
         }
-        for name in ("roughness", "metallic"):
-            predicted, true = out[name], batch[name]
-            found[name] = 0.5 * losses.l1(predicted, true, mask) + 2 * losses.l2(predicted, true, mask)
-            found[name] += 0.2 * losses.gradient(predicted, true, mask)
+        roughness, metallic = batch["roughness"], batch["metallic"]
+        found["roughness"] = 0.1 * losses.l1(out["roughness"], roughness, mask)
+        found["roughness"] += 3 * losses.l2(out["roughness"], roughness, mask)
+        found["roughness"] += 0.2 * losses.gradient(out["roughness"], roughness, mask)
+        # Metal is rare: under L1 and L2 a sigmoid ends at 0 everywhere, where it has no gradient left.
+        found["metallic"] = losses.cross_entropy(out["metallic_logit"], metallic, mask)
+        found["metallic"] += 0.2 * losses.gradient(out["metallic"], metallic, mask)
         found["normal"] = 1.5 * losses.cosine(out["normal"], batch["normal"], mask)
         found["normal_gradient"] = 0.2 * losses.gradient(out["normal"], batch["normal"], mask)
         return found | self._geometry(out, batch, mask)

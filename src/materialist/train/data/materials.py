@@ -277,8 +277,8 @@ def light(rng: np.random.Generator, emission: Colour, *, surface: bool = True) -
     return Material(_tile(rng, "plain"), (white,) * 3, 0.0, (0.6, 0.6), emission=scaled, surface=surface)
 
 
-_OBJECTS = ((ceramic, 0.22), (plastic, 0.22), (metal, 0.17), (wood, 0.13), (fabric, 0.08), (stone, 0.08),
-            (wall_paint, 0.1))  # fmt: skip
+_OBJECTS = ((ceramic, 0.2), (plastic, 0.2), (metal, 0.26), (wood, 0.11), (fabric, 0.07), (stone, 0.07),
+            (wall_paint, 0.09))  # fmt: skip
 
 
 def any_object(rng: np.random.Generator) -> Material:
