@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -104,10 +105,19 @@ def _renderer(llvm: str | None) -> Finding:
         return Finding("renderer (CPU)", "broken", f"the probe did not finish: {error}", "materialist doctor")
     if child.returncode == 0:
         return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
+    absent = re.search(r"(lib\S+\.so\S*): cannot open shared object", child.stderr)
+    if absent:
+        return Finding("renderer (CPU)", "broken", f"{absent[1]} is missing", _apt(absent[1]))
     last = (child.stderr.strip().splitlines() or ["no message"])[-1]
     return Finding(
         "renderer (CPU)", "broken", f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19"
     )
+
+
+def _apt(library: str) -> str:
+    from materialist.render.variant import package_of
+
+    return f"sudo apt-get install -y {package_of(library)}"
 
 
 def _cuda() -> Finding:

@@ -19,6 +19,13 @@ def test_a_wrong_llvm_is_found_in_a_child_and_survived(monkeypatch):
     assert finding.state == "broken" and "Cannot select" in finding.detail and "libllvm19" in finding.remedy
 
 
+def test_a_missing_library_is_named_with_its_package(monkeypatch):
+    said = "ImportError: libatomic.so.1: cannot open shared object file: No such file or directory\n\nNameError: name"
+    monkeypatch.setattr(doctor.subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, 1, "", said))
+    finding = doctor._renderer(None)
+    assert finding.detail == "libatomic.so.1 is missing" and finding.remedy == "sudo apt-get install -y libatomic1"
+
+
 def test_a_probe_that_hangs_is_survived(monkeypatch):
     def hang(*_, **__):
         raise subprocess.TimeoutExpired("python", 120)

@@ -127,6 +127,21 @@ def _ask(path: str) -> int | None:
     return int(result.stdout) if result.returncode == 0 and result.stdout.isdigit() else None
 
 
+def unloaded(error: BaseException) -> str:
+    """What kept Mitsuba's extension from loading, in one sentence; the first cause in the chain says it."""
+    while error.__context__ is not None:
+        error = error.__context__
+    match = re.search(r"(\S+\.so\S*): cannot open shared object", str(error))
+    if match is None:
+        return f"{error}; install it again with: pip install --force-reinstall mitsuba."
+    return f"the library {match[1]} is missing; install it with: sudo apt-get install -y {package_of(match[1])}"
+
+
+def package_of(library: str) -> str:
+    """Debian's package of a shared library: libatomic.so.1 is in libatomic1."""
+    return library.replace(".so.", "").replace(".so", "").lower()
+
+
 def cuda_usable() -> bool:
     """Whether an NVIDIA driver answers and has OptiX, which traces Mitsuba's rays; Mitsuba itself is not started."""
     import ctypes
@@ -160,7 +175,10 @@ def setup(device: str = "auto"):
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")
     _point_to_llvm(device)
-    import mitsuba as mi
+    try:
+        import mitsuba as mi
+    except (ImportError, NameError) as error:  # Dr.Jit hides a loader's error behind a NameError
+        raise SetupError(f"Mitsuba does not start: {unloaded(error)}") from error
 
     current = mi.variant()
     if device == "auto":

@@ -28,7 +28,7 @@ def l2(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
 
 
 def cross_entropy(logit: Tensor, true: Tensor, mask: Tensor) -> Tensor:
-    """Binary cross-entropy of logits against true values in [0, 1]; least where sigmoid(logit) is the expected value."""
+    """Binary cross-entropy of logits against values in [0, 1]; least where sigmoid(logit) is the expected value."""
     return mean(F.binary_cross_entropy_with_logits(logit, true, reduction="none"), mask)
 
 
