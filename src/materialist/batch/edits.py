@@ -6,12 +6,13 @@ import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from materialist.batch.packages import file_hash
 from materialist.edit.recipe import Step, read_recipe
 
-FILES = ("mask", "texture", "envmap")
-"""Options of a step that name a file; `{name}` in them stands for the photo's name."""
+FILES = ("mask", "texture", "envmap", "mesh", "background", "thickness")
+"""Options of a step that name a file, or a list of files; `{name}` in them stands for the photo's name."""
 
 
 def edits_for(path: str | Path, name: str) -> list[Step]:
@@ -23,18 +24,25 @@ def edits_key(path: str | Path, name: str, spp: int) -> str:
     """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples."""
     described = []
     for step in edits_for(path, name):
-        files = {key: _content(step, key) for key in FILES if isinstance(step.options.get(key), str)}
+        files = {
+            key: [_content(step, file) for file in _list(step.options[key])] for key in FILES if key in step.options
+        }
         described.append([step.kind, step.options, files])
     return hashlib.sha256(json.dumps([described, spp], sort_keys=True).encode()).hexdigest()
 
 
 def _named(options: dict, name: str) -> dict:
-    named = {k: v.replace("{name}", name) for k, v in options.items() if k in FILES and isinstance(v, str)}
+    put = lambda value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
+    named = {k: [put(one) for one in v] if isinstance(v, list) else put(v) for k, v in options.items() if k in FILES}
     return {**options, **named}
 
 
-def _content(step: Step, key: str) -> str | None:
+def _content(step: Step, file: Any) -> str | None:
     try:
-        return file_hash(step.folder / step.options[key])
+        return file_hash(step.folder / str(file))
     except OSError:
         return None
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]

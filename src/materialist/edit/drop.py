@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from materialist.camera import unproject
-from materialist.edit.convex import convex_pieces, hull
+from materialist.edit.convex import convex_pieces
+from materialist.edit.drop_ground import ground_below
 from materialist.edit.frames import MAX_FRAMES
-from materialist.edit.ground import blocks, field
 from materialist.edit.insert import extent, moved, put
 from materialist.edit.material import noted
 from materialist.edit.meshes import Model, read_model, repainted
@@ -23,12 +22,8 @@ from materialist.types import Array, Body, Scene
 
 METRES = 0.2
 """Longest side of a thing in the simulation: how fast it seems to fall tells its size."""
-REACH = 6.0
-"""Half of the side of the ground that things can fall onto, in longest sides."""
 UPRIGHT = 0.5
 """Cosine to the camera's up from which a plane can be a floor or a table top."""
-FLAT = 0.004
-"""How plane a block of the ground must be, in longest sides."""
 
 
 def drop(
@@ -67,7 +62,62 @@ def drop(
         InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
             missing.
     """
-    _check(frames, fps, height, spin, metres)
+    if not 2 <= frames <= MAX_FRAMES:
+        raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
+    _check("frame rate", fps, 1, 240)
+    falling = prepared(
+        scene, meshes, at, height=height, spin=spin, scale=scale, material=material, gravity=gravity, metres=metres,
+        seed=seed, up=up,
+    )  # fmt: skip
+    film, last = [], scene
+    poses: list[Pose] | None = None
+    for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
+        if poses is None or moves(poses, frame):
+            last, poses = falling.at(frame), frame
+        film.append(last)
+    return film
+
+
+@dataclass(frozen=True)
+class Falling:
+    """Things over a scene, before they fall."""
+
+    scene: Scene
+    things: list[Thing]
+    ground: list[Array]
+    """Convex blocks [n, 3], metres, z up."""
+    starts: list[tuple[tuple[Body, ...], Array]]
+    """For each thing its bodies as they would stand, camera frame, and the shift [3] (metres, z up) that lifts it."""
+    to_up: Array
+    """[3, 3] from the camera frame to the simulation's."""
+    factor: float
+    """Metres a scene unit."""
+    notes: tuple[str, ...]
+    what: dict[str, Any]
+    """For the provenance."""
+
+    def at(self, poses: list[Pose], notes: tuple[str, ...] = (), gone: frozenset[int] = frozenset()) -> Scene:
+        """The scene with the things in these poses, without those of the numbers `gone`."""
+        placed = tuple(
+            _posed(body, self.to_up, self.factor, shift, thing, pose)
+            for k, ((bodies, shift), thing, pose) in enumerate(zip(self.starts, self.things, poses))
+            for body in bodies
+            if k not in gone
+        )
+        known = self.scene.report.warnings
+        new = dict.fromkeys(note for note in (*self.notes, *notes) if note not in known)
+        report = replace(self.scene.report, warnings=(*known, *new))
+        return noted(replace(self.scene, bodies=(*self.scene.bodies, *placed), report=report), "drop", self.what)
+
+
+def prepared(
+    scene: Scene, meshes: Sequence[str | Path | Model], at: tuple[float, float] | Sequence[tuple[float, float]], *,
+    height: float, spin: float, scale: float, material: str, gravity: tuple[float, float, float] | None,
+    metres: float, seed: int, up: str,
+) -> Falling:  # fmt: skip
+    """Meshes over the place where they will fall; see `drop`."""
+    for name, value, low, high in (("height", height, 0, 100), ("spin", spin, -20, 20), ("metres", metres, 1e-3, 100)):
+        _check(name, value, low, high)
     load()
     models = [repainted(m if isinstance(m, Model) else read_model(m, up=up), material) for m in meshes]
     if not models:
@@ -75,8 +125,7 @@ def drop(
     places = _places(at, len(models))
     stood = [put(scene, model, place, scale=scale) for model, place in zip(models, places)]
     to_up = upright(down(scene, stood[0][1], gravity))
-    size = max(extent(bodies) for bodies, _ in stood)
-    factor = metres / size
+    factor = metres / max(extent(bodies) for bodies, _ in stood)
     starts = _raised(stood, to_up, factor, height * metres)
     rng = np.random.default_rng(seed)
     things = []
@@ -86,24 +135,13 @@ def drop(
         axis = rng.normal(size=3)
         turning = 2 * np.pi * spin * axis / np.linalg.norm(axis)
         things.append(Thing(tuple(p - centre for p in _pieces(bodies, to_up, factor, shift, seed)), centre, turning))
-    ground = _ground(scene, things, to_up, factor, metres)
+    ground = ground_below(scene, things, to_up, factor, metres)
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
         "height": height, "spin": spin, "scale": scale, "material": material, "seed": seed,
     }  # fmt: skip
-    notes = [note for model in models for note in model.warnings]
-    film, last = [], scene
-    poses: list[Pose] | None = None
-    for frame in fall(things, ground, frames=frames, fps=fps):
-        if poses is None or _moves(poses, frame):
-            placed = tuple(
-                _posed(body, to_up, factor, shift, thing, pose)
-                for (bodies, shift), thing, pose in zip(starts, things, frame)
-                for body in bodies
-            )
-            last, poses = _with(scene, placed, notes, what), frame
-        film.append(last)
-    return film
+    notes = tuple(note for model in models for note in model.warnings)
+    return Falling(scene, things, ground, starts, to_up, factor, notes, what)
 
 
 def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | None) -> Array:
@@ -135,14 +173,9 @@ def upright(direction: Array) -> Array:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _check(frames: int, fps: float, height: float, spin: float, metres: float) -> None:
-    if not 2 <= frames <= MAX_FRAMES:
-        raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
-    for name, value, low, high in (
-        ("frame rate", fps, 1, 240), ("height", height, 0, 100), ("spin", spin, -20, 20), ("metres", metres, 1e-3, 100),
-    ):  # fmt: skip
-        if not (np.isfinite(value) and low <= value <= high):
-            raise InputError(f"The {name} is {value:g}; it must lie in [{low:g}, {high:g}].")
+def _check(name: str, value: float, low: float, high: float) -> None:
+    if not (np.isfinite(value) and low <= value <= high):
+        raise InputError(f"The {name} is {value:g}; it must lie in [{low:g}, {high:g}].")
 
 
 def _places(at: Any, count: int) -> list[tuple[float, float]]:
@@ -183,32 +216,6 @@ def _pieces(bodies: tuple[Body, ...], to_up: Array, factor: float, shift: Array,
     return convex_pieces(vertices, faces, seed=seed)
 
 
-def _ground(scene: Scene, things: list[Thing], to_up: Array, factor: float, metres: float) -> list[Array]:
-    from materialist.render.scene import RenderScene
-
-    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
-    starts = np.stack([thing.centre for thing in things])
-    top = float(max((thing.centre + p)[:, 2].max() for thing in things for p in thing.pieces)) + metres
-    visible = unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
-    half = REACH * metres + float(np.ptp(starts[:, :2], axis=0).max()) / 2
-    ground = field(
-        lambda x, y, top: _heights(target, to_up, factor, x, y, top), visible, starts[:, :2].mean(0), half, top, metres
-    )  # fmt: skip
-    found = blocks(ground, flat=FLAT * metres, depth=2 * metres)
-    return [hull(block) for block in found]
-
-
-def _heights(target: Any, to_up: Array, factor: float, x: Array, y: Array, top: float) -> Array:
-    """z [n] (metres) of what rays downwards from `top` meet first in a `RenderScene`, NaN for nothing."""
-    mi = target.mi
-    start = np.stack([x, y, np.full_like(x, top)], -1) / factor @ to_up  # back in the camera frame
-    origin = mi.Point3f(*(mi.Float(np.ascontiguousarray(start[:, k], np.float32)) for k in range(3)))
-    direction = mi.Vector3f(*(float(v) for v in -to_up[2]))
-    hit = target.mi_scene.ray_intersect_preliminary(mi.Ray3f(origin, direction))
-    distance = np.array(hit.t, np.float64) * factor
-    return np.where(np.isfinite(distance) & np.array(hit.is_valid()), top - distance, np.nan)
-
-
 def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, pose: Pose) -> Body:
     """The body of the camera frame where the thing is now."""
     turn = to_up.T @ pose.turn @ to_up
@@ -217,15 +224,9 @@ def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, 
     return moved(body, turn, move)
 
 
-def _moves(before: list[Pose], now: list[Pose]) -> bool:
+def moves(before: list[Pose], now: list[Pose]) -> bool:
     """Whether anything has moved by more than a thousandth of a turn or of METRES."""
     return any(
         np.abs(a.centre - b.centre).max() > 1e-3 * METRES or np.abs(a.turn - b.turn).max() > 2e-3
         for a, b in zip(before, now)
     )
-
-
-def _with(scene: Scene, bodies: tuple[Body, ...], notes: list[str], what: dict[str, Any]) -> Scene:
-    known = scene.report.warnings
-    report = replace(scene.report, warnings=(*known, *(note for note in notes if note not in known)))
-    return noted(replace(scene, bodies=(*scene.bodies, *bodies), report=report), "drop", what)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.edit.background import without
+from materialist.edit.drop_rest import settle
 from materialist.edit.glass import glass
 from materialist.edit.insert import insert
 from materialist.edit.material import edit
@@ -22,10 +23,11 @@ MATERIAL = (
 )  # fmt: skip
 LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps")
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
+DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
 REMOVE = ("background", "inpaint", "shadow", "grow")
 GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
 KINDS = {
-    "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "glass": (*REGION, *GLASS),
+    "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "drop": DROP, "glass": (*REGION, *GLASS),
     "remove": (*REGION, *REMOVE),
 }  # fmt: skip
 """Kind of step -> what it may say."""
@@ -170,12 +172,37 @@ def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
     if missing:
         raise InputError(f"An insert needs its {missing[0]}, as in insert: {{mesh: mug.glb, at: [310, 220]}}.")
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("scale", "turn", "size") if k in given}
+    return insert(edited, _file(step, "mesh"), _numbers(given["at"], 2, "at"), **options, **_thing(step))
+
+
+def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    missing = [name for name in ("mesh", "at") if name not in given]
+    if missing:
+        raise InputError(f"A drop needs its {missing[0]}, as in drop: {{mesh: [mug.glb, ball.ply], at: [310, 220]}}.")
+    options: dict[str, Any] = {
+        k: _number(given[k], k) for k in ("height", "spin", "scale", "metres") if k in given
+    } | _thing(step)
+    if "gravity" in given:
+        options["gravity"] = _numbers(given["gravity"], 3, "gravity")
+    if "seed" in given:
+        seed = _number(given["seed"], "seed")
+        if not (0 <= seed < 2**32 and seed == int(seed)):
+            raise InputError(f"The seed is {given['seed']}; give a whole number from 0 to {2**32 - 1}.")
+        options["seed"] = int(seed)
+    places = [_numbers(one, 2, "at") for one in _list_of(given["at"])]
+    return settle(edited, _files(step, "mesh"), places, **options)
+
+
+def _thing(step: Step) -> dict[str, Any]:
+    """What an inserted and a dropped mesh share."""
+    given, options = step.options, {}
     if "material" in given:
         colour = given["material"]
         options["material"] = ",".join(colour) if isinstance(colour, list) else str(colour)
     if "up" in given:
         options["up"] = str(given["up"])
-    return insert(edited, _file(step, "mesh"), _numbers(given["at"], 2, "at"), **options)
+    return options
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -210,7 +237,9 @@ def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
     return glass(edited, _region(scene, step), **options, **_removal(step))
 
 
-_MAKERS = {"edit": _edit, "relight": _relight, "insert": _insert, "glass": _glass, "remove": _remove}
+_MAKERS = {
+    "edit": _edit, "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
+}  # fmt: skip
 """Kind of step -> (original scene, scene so far, step) -> scene."""
 
 
@@ -228,6 +257,14 @@ def _file(step: Step, name: str) -> Path:
     if not isinstance(value, str):
         raise InputError(f"The {name} must be a file name, not {value!r}.")
     return step.folder / value
+
+
+def _files(step: Step, name: str) -> list[Path]:
+    """One file name, or a list of them."""
+    value = step.options[name]
+    if isinstance(value, list) and value and all(isinstance(one, str) for one in value):
+        return [step.folder / one for one in value]
+    return [_file(step, name)]
 
 
 def _list_of(value: Any) -> list[Any]:

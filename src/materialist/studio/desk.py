@@ -54,11 +54,12 @@ def read_steps(desk: Path, file: Path) -> tuple[Step, ...]:
 def confined(step: Step, desk: Path) -> Step:
     """The step with its files on the desk. Raises InputError where it names a file elsewhere or one that is missing."""
     for name in (*FILES, *WORDS):
-        value = step.options.get(name)
-        if value is None or (name in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value)):
-            continue
-        if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
-            raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")
-        if not (desk / value).is_file():
-            raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
+        given = step.options.get(name)
+        for value in given if isinstance(given, list) else [] if given is None else [given]:
+            if name in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value):
+                continue
+            if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
+                raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")
+            if not (desk / value).is_file():
+                raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
     return replace(step, folder=desk)

@@ -8,7 +8,9 @@ from typing import Any
 
 from materialist.edit.recipe import Step
 
-_WORDS = {"edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "remove": "Removed"}
+_WORDS = {
+    "edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fallen", "remove": "Removed",
+}  # fmt: skip
 _PLAIN = {"remove": "the object", "glass": "clear"}
 """What to say of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness")

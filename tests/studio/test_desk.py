@@ -1,0 +1,22 @@
+"""Files of the desk: lists of edits may name those, and none elsewhere."""
+
+import pytest
+
+from materialist.edit.recipe import Step
+from materialist.errors import InputError
+from materialist.studio.desk import confined
+
+
+def test_every_file_of_a_list_is_looked_at(tmp_path):
+    (tmp_path / "mesh-1.ply").write_text("ply")
+    step = Step("drop", {"mesh": ["mesh-1.ply", "mesh-1.ply"], "at": ["3", "4"]})
+    assert confined(step, tmp_path).folder == tmp_path
+    for other, words in [("../secret.ply", "plain file name"), ("mesh-2.ply", "is not here"), ([["x.ply"]], "plain")]:
+        with pytest.raises(InputError, match=words):
+            confined(Step("drop", {"mesh": ["mesh-1.ply", other], "at": ["3", "4"]}), tmp_path)
+
+
+def test_a_method_is_no_file(tmp_path):
+    assert confined(Step("glass", {"thickness": "sweep"}), tmp_path).options == {"thickness": "sweep"}
+    with pytest.raises(InputError, match="plain file name"):
+        confined(Step("glass", {"thickness": "/etc/passwd"}), tmp_path)
