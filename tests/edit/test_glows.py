@@ -8,9 +8,11 @@ import pytest
 
 from materialist import metrics
 from materialist.camera import pixel_rays
-from materialist.edit.composite import composite
+from materialist.edit import glows
+from materialist.edit.composite import composite, pictures
+from materialist.edit.frames import moving_light
 from materialist.edit.glows import _explained, _patch, dimmed, visible_lights
-from materialist.edit.relight import relight
+from materialist.edit.relight import relight, rotated
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.io.package import load_scene, save_scene
@@ -89,11 +91,37 @@ def test_as_it_is_stays_nearly_so():
     assert metrics.psnr(composite(fit, relight(fit, dim=1.0), spp=64), fit.photo.linear) > 26
 
 
+def test_the_window_stays_while_the_rest_turns():
+    _, fit = rooms()
+    turned = relight(fit, dim=0.5, rotate=90)
+    still = relight(fit, dim=0.5)
+    np.testing.assert_array_equal(turned.envmap, rotated(still.envmap, 90))
+    assert turned.bodies[0].surface.emission == still.bodies[0].surface.emission
+    alone = relight(fit, dim=0.5, ambient=0)
+    assert not alone.envmap.any() and alone.bodies
+
+
+def test_frames_share_the_dimmed_lights_and_the_picture_that_they_are_compared_with(monkeypatch):
+    _, fit = rooms()
+    asked = []
+    monkeypatch.setattr(glows, "_explained", lambda *given: asked.append(given) or (0.8, 6.0))
+    film = list(moving_light(fit, 3, dim=0.25))
+    assert len(asked) == 1 and film[0].bodies is film[2].bodies and len(film[0].bodies) == 1
+    np.testing.assert_allclose(film[0].bodies[0].surface.emission, 1.5)
+    np.testing.assert_array_equal(film[1].envmap, rotated(film[0].envmap, 120))
+    together = list(pictures(fit, film, spp=4, denoise=False))
+    for frame, picture in zip(film[::2], together[::2]):
+        np.testing.assert_array_equal(picture, composite(fit, frame, spp=4, denoise=False))
+    assert np.abs(together[1] - together[0]).mean() > 1e-3
+    (same,) = pictures(fit, [fit], spp=4)
+    np.testing.assert_array_equal(same, fit.photo.original)
+
+
 def test_bad_input_and_files(tmp_path):
     _, fit = rooms()
     for scene, options, sentence in [
         (fit, {"dim": -1.0}, "dimming"), (fit, {"dim": np.nan}, "dimming"),
-        (fit, {"dim": 0.2, "rotate": 10}, "own light"), (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
+        (fit, {"dim": 0.2, "ambient": -1}, "ambient"), (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
         (replace(fit, photo=replace(fit.photo, linear=fit.photo.linear * 0.5)), {"dim": 0.2}, "no light"),
     ]:  # fmt: skip
         with pytest.raises(InputError, match=sentence):

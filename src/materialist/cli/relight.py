@@ -36,7 +36,9 @@ def relight(
         list[str] | None, typer.Option(metavar="X,Y,DEPTH,KELVIN,POWER", help="A lamp at a pixel and depth.")
     ] = None,
     ambient: Annotated[float, typer.Option(help="Factor on the light that was there.")] = 1.0,
-    dim: Annotated[float | None, typer.Option(help="Factor on windows and lamps that the photo shows.")] = None,
+    dim: Annotated[
+        float | None, typer.Option(help="Factor on windows and lamps that the photo shows; they stay put.")
+    ] = None,
     frames: Annotated[
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
@@ -66,8 +68,6 @@ def relight(
         if len(suns) > 1:
             raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
     else:
-        if dim is not None:
-            raise InputError("--dim makes one picture; leave out --frames.")
         _check_video(output, save, fps, force)
     options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient, "dim": dim}
     if envmap is not None:
@@ -106,7 +106,8 @@ def _video(
     scenes = list(moving_light(scene, count, **moving))
     with StageProgress(quiet=as_json) as progress:
         write_frames(output, pictures(scene, scenes, progress=progress, **shared), fps=fps, force=force)
+    warnings = [note for note in scenes[-1].report.warnings if note not in scene.report.warnings]
     report_success(
-        "relight", as_json, [f"Look at {output}"], video=str(output), frames=count, fps=fps,
-        seconds=time.monotonic() - start,
+        "relight", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
+        frames=count, fps=fps, warnings=warnings, seconds=time.monotonic() - start,
     )  # fmt: skip

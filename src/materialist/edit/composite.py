@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from materialist.edit.glows import explained
+from materialist.edit.glows import KEY, explained
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio
 from materialist.edit.portrait import Portrait
@@ -74,10 +74,12 @@ def pictures(
     denoise: bool = True, device: str = "auto", progress=None,
 ) -> Iterator[Array]:  # fmt: skip
     """The composites of many edits of one scene, as for `composite`; what they share is rendered once."""
-    studio = Studio(scene, device=device)
     tick = progress or (lambda *_: None)
+    studio, lights = Studio(scene, device=device), None
     for k, edited in enumerate(edits):
         tick("frames", k, len(edits))
+        if edited.provenance.get(KEY) != lights:  # frames of one film share their lights, and so their base picture
+            studio, lights = Studio(explained(scene, edited), device=device), edited.provenance.get(KEY)
         if full_render:
             yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         else:

@@ -25,6 +25,7 @@ LAMP_RADIUS = 0.015
 def relight(
     scene: Scene,
     *,
+    dim: float | None = None,
     envmap: Array | None = None,
     gain: float | str = 1.0,
     rotate: float = 0.0,
@@ -32,11 +33,12 @@ def relight(
     sun_power: float = 1.0,
     ambient: float = 1.0,
     lamps: tuple[Lamp, ...] | list[Lamp] = (),
-    dim: float | None = None,
 ) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of arguments.
 
     Args:
+        dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. They become surfaces that glow and
+            stay where they are, whatever happens to the light from around.
         envmap: [h, 2h, 3] linear radiance >= 0 in place of the fitted light, in the project's convention.
         gain: factor on `envmap`; "auto" gives it the fitted map's mean light, for captures of unknown exposure.
         rotate: turn of the light about the vertical, degrees; > 0 moves what is in front of the camera to its right.
@@ -44,16 +46,18 @@ def relight(
         sun_power: irradiance of the sun on a surface that faces it, relative to that of the light before.
         ambient: factor on the environment map (not on its new sun), 0 for lamps alone.
         lamps: glowing spheres to add; make them with `lamp`.
-        dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. It does not go with another map,
-            a turn or a sun.
 
     Raises:
         InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
     """
-    light = scene.envmap
     for name, amount, high in (("ambient", ambient, 1e4), ("sun power", sun_power, 1e4)):
         if not (np.isfinite(amount) and 0 <= amount <= high):
             raise InputError(f"The {name} is {amount}; it must lie in [0, {high:g}].")
+    if dim is not None:
+        from materialist.edit.glows import dimmed
+
+        scene = dimmed(scene, dim)
+    light = scene.envmap
     if envmap is not None:
         light = checked_envmap(envmap) * _gain(gain, envmap, scene.envmap)
     if rotate:
@@ -61,15 +65,8 @@ def relight(
     disc = np.zeros_like(light)
     if sun is not None:
         light, disc = with_sun(light, *sun, power=sun_power)
-    if dim is not None:
-        if envmap is not None or rotate or sun is not None:
-            raise InputError("Dimming starts from the photo's own light; leave out the map, the turn and the sun.")
-        from materialist.edit.glows import dimmed
-
-        scene = dimmed(scene, dim)
-        light = scene.envmap
     light = (light * np.float32(ambient) + disc).astype(np.float32)
-    if not light.any() and not (lamps or scene.lamps):
+    if not light.any() and not (lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)):
         raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
     what = {
         "envmap": None if envmap is None else list(np.shape(envmap)), "gain": gain if envmap is not None else None,

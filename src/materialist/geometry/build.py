@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.geometry.backs import backs_of
 from materialist.geometry.boundary import depth_to_mesh
-from materialist.geometry.completion import complete
+from materialist.geometry.completion import complete, join, structural
+from materialist.geometry.inflate import inflated
+from materialist.geometry.objects import find_objects
 from materialist.geometry.planes import find_planes
+from materialist.geometry.rims import set_back_rims
 from materialist.types import Array, Camera, Geometry
+
+COMPLETIONS = ("planes,backs", "planes", "none")
+"""What can be added to what the picture shows: continued planes and backs of objects, planes alone, nothing."""
 
 
 def build_geometry(
@@ -17,10 +24,10 @@ def build_geometry(
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
-    completion: "planes" or "none". Raises InputError for maps or options that cannot be used.
+    completion: one of `COMPLETIONS`. Raises InputError for maps or options that cannot be used.
     """
-    if completion not in ("planes", "none"):
-        raise InputError(f"Completion is '{completion}'; choose 'planes' or 'none'.")
+    if completion not in COMPLETIONS:
+        raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W]
     if completion == "none":
@@ -28,4 +35,22 @@ def build_geometry(
     planes = find_planes(depth, normal, camera, seed=seed)
     for k, plane in enumerate(planes):
         label[plane.mask] = k
-    return Geometry(complete(mesh, planes, depth, camera), label)
+    if completion == "planes":
+        return Geometry(complete(mesh, planes, depth, camera), label)
+    bounds = structural(planes, depth, camera)
+    objects = find_objects(mesh, depth, np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)]))
+    thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
+    mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
+    backs = backs_of(mesh, objects, thickness, depth, bounds)
+    return Geometry(join([complete(mesh, planes, depth, camera), backs]), label)
+
+
+def completion_of(geometry: Geometry) -> str:
+    """Which of `COMPLETIONS` a geometry was built with, read off its mesh (one without objects has no backs)."""
+    mesh = geometry.mesh
+    corners = mesh.vertices[mesh.faces[mesh.face_plane < 0]].astype(np.float64)  # [F, 3, 3]
+    away = (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * corners[:, 0]).sum(-1)
+    # Seen from the camera, a back turns the other way than everything else.
+    if (away > 1e-9 * np.abs(away).max(initial=0)).any():
+        return "planes,backs"
+    return "planes" if (mesh.face_plane >= 0).any() else "none"

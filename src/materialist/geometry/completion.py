@@ -74,7 +74,7 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, e
     of the scene nor cross the frame (the flat side of an object) are left alone. Walls go on by `WALL_REACH` only.
     """
     depth = np.asarray(depth, np.float64)
-    sheets = [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent))]
+    sheets = _sheets(planes, depth, camera, extent)
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
@@ -82,7 +82,16 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, e
         inside = _inside_frame(sheet, walls, farthest, camera)  # [Q, 4, 3]
         outside = _beyond_frame(sheet, walls, camera)  # [T, 3, 3]
         parts += [_patch(sheet, corners, camera) for corners in (inside, outside) if len(corners)]
-    return _join(parts)
+    return join(parts)
+
+
+def structural(planes: list[Plane], depth: Array, camera: Camera) -> list[Plane]:
+    """The planes that `complete` continues: floors, walls and table tops, not the flat sides of objects."""
+    return [sheet.plane for sheet in _sheets(planes, np.asarray(depth, np.float64), camera, EXTENT)]
+
+
+def _sheets(planes: list[Plane], depth: Array, camera: Camera, extent: float) -> list[_Sheet]:
+    return [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent))]
 
 
 def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float) -> _Sheet | None:
@@ -216,7 +225,7 @@ def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
     )
 
 
-def _join(parts: list[Mesh]) -> Mesh:
+def join(parts: list[Mesh]) -> Mesh:
     """One mesh of several; faces keep their order."""
     first = np.cumsum([0] + [len(part.vertices) for part in parts])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
