@@ -57,7 +57,8 @@ def invert(
             (MoGe), else from EXIF, else 35.
         size: longer side of the working image, pixels.
         envmap_size: (width, height) of the environment map; width = 2 * height.
-        completion: `planes` continues dominant planes beyond what the photo shows; `none` does not.
+        completion: `planes` continues dominant planes beyond what the photo shows, `planes,backs` also gives objects
+            backs; `none` does neither.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).

@@ -55,7 +55,7 @@ def invert(
     fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
     size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
     envmap_size: Annotated[str, typer.Option(metavar="WxH", help="Size of the environment map.")] = "512x256",
-    completion: Annotated[Completion, typer.Option(help="Continue planes behind objects and beyond the frame.")] = (
+    completion: Annotated[Completion, typer.Option(help="Continue planes beyond what is seen, give objects backs.")] = (
         Completion.planes
     ),
     tau: Annotated[float, typer.Option(help="Grazing angle below which the surface is cut, degrees.")] = 6.0,

@@ -36,6 +36,7 @@ class Preset(StrEnum):
 class Completion(StrEnum):
     """How what the picture does not show is continued."""
 
+    planes_backs = "planes,backs"
     planes = "planes"
     none = "none"
 

@@ -217,13 +217,12 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Arr
 
 
 def _geometry(scene: Scene, found: Behind):
-    from materialist.geometry.build import build_geometry
+    from materialist.geometry.build import build_geometry, completion_of
 
     options = scene.provenance
-    completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
     return build_geometry(
-        found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)), completion=completion,
-        seed=int(options.get("seed", 0) or 0),
+        found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
+        completion=completion_of(scene.geometry), seed=int(options.get("seed", 0) or 0),
     )  # fmt: skip
 
 

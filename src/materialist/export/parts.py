@@ -76,10 +76,10 @@ def _mean(materials: Materials, members: Array) -> Materials:
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
     """Geometry of a coarser depth map with at most `most` triangles, and the maps at its size."""
-    from materialist.geometry.build import build_geometry
+    from materialist.geometry.build import build_geometry, completion_of
 
     camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
-    completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
+    completion = completion_of(scene.geometry)
     tau = float(scene.provenance.get("tau", 6.0))
     for _ in range(12):
         width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))
