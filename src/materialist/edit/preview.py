@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from materialist.edit.layers import Layers, changed_pixels, is_relit
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
+
+if TYPE_CHECKING:
+    from materialist.edit.preview_light import OtherLight
 
 
 class Preview:
@@ -32,6 +35,7 @@ class Preview:
         setup(device)
         from materialist.fit.engine import TransportEngine
         from materialist.transport.cache import TransportCache
+        from materialist.transport.filter import taps
 
         self.scene = scene
         self._engine = TransportEngine(
@@ -41,7 +45,8 @@ class Preview:
         # A few rays a pixel are enough for what surfaces pass on: it is averaged again where it arrives.
         self._quick = TransportCache(scene.geometry, scene.camera, seed=seed, diffuse_samples=8, specular_samples=1)
         self._tables = self._engine.tables(scene.envmap)
-        self._other: tuple[Array, Any] | None = None
+        self._taps = list(taps(self._engine.guide))
+        self._other: tuple[Array, OtherLight] | None = None
         self._part: tuple[Array, Any] | None = None
         self._base = base = self._shaded(scene.materials, self._tables)
         self._base_picture = self._image(base, self._sky(scene.envmap))
@@ -52,10 +57,10 @@ class Preview:
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
         self._check(edited)
-        tables = self._tables_for(edited)
-        if tables is self._tables:
+        light = self._light_for(edited)
+        if light is None:
             return self._image(self._reshaded(edited), self._sky(edited.envmap))
-        return self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+        return self._image(light.shaded(*self._maps(edited.materials)), self._sky(edited.envmap))
 
     def layers(self, edited: Scene) -> Layers:
         """What `composite.into_photo` needs, from the cache."""
@@ -80,23 +85,21 @@ class Preview:
         if edited.geometry is not self.scene.geometry:
             raise InputError("The preview was built for another geometry; build one for this scene.")
 
-    def _tables_for(self, edited: Scene):
-        """Those of the fitted light, or of the last other one."""
+    def _light_for(self, edited: Scene):
+        """None for the fitted light; the `OtherLight` is kept until there is a third."""
         if np.array_equal(edited.envmap, self.scene.envmap):
-            return self._tables
+            return None
         if self._other is None or not np.array_equal(edited.envmap, self._other[0]):
             self._other = (edited.envmap, self._relit(edited))
         return self._other[1]
 
     def _relit(self, edited: Scene):
-        """Tables under another light, which surfaces pass on once."""
-        engine, kept = self._engine, self._engine.radiance
+        """The `OtherLight` of an edited scene, which surfaces pass on once."""
+        from materialist.edit.preview_light import OtherLight
+
         first = self._quick.gather(edited.envmap, None)
-        try:
-            engine.set_radiance(self._image(self._shaded(edited.materials, first), self._sky(edited.envmap)))
-            return engine.tables(edited.envmap)
-        finally:
-            engine.set_radiance(kept)
+        passed_on = self._image(self._shaded(edited.materials, first), self._sky(edited.envmap))
+        return OtherLight(self._engine, self._engine.cache.gather(edited.envmap, passed_on), self._taps)
 
     def _reshaded(self, edited: Scene):
         """[P, 3] under the fitted light: pixels whose materials changed are shaded anew, the others known."""
@@ -116,10 +119,16 @@ class Preview:
 
         from materialist.transport.shading import shade
 
+        with torch.no_grad():
+            return shade(tables, *self._maps(materials, pixels))
+
+    def _maps(self, materials: Materials, pixels: Array | None = None):
+        """Albedo [P, 3], roughness and metallic [P] of the surface pixels, or of some of them; torch."""
+        import torch
+
         pixels = self._engine.cache.pixels if pixels is None else pixels
         take = lambda m, n: torch.from_numpy(np.ascontiguousarray(m.reshape(-1, *([n] if n > 1 else [])))[pixels])  # noqa: E731
-        with torch.no_grad():
-            return shade(tables, take(materials.albedo, 3), take(materials.roughness, 1), take(materials.metallic, 1))
+        return take(materials.albedo, 3), take(materials.roughness, 1), take(materials.metallic, 1)
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""

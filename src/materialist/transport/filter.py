@@ -7,12 +7,17 @@ levels keep their detail.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import torch
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
+
+
+Tap = tuple[int, int, torch.Tensor]
+"""(rows, columns) to a neighbour, and the weight [H, W] that it has for each pixel."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +40,23 @@ def guide_weights(guide: Guide, dy: int, dx: int, sharpness: float) -> torch.Ten
     return cosine.pow(sharpness) * torch.exp(-0.5 * away * away)
 
 
-def joint_filter(values: torch.Tensor, guide: Guide, *, sharpness: float = 32.0, step: int = 1) -> torch.Tensor:
-    """Average `values` [H, W, C] over 5 x 5 neighbours `step` pixels apart that lie on the same surface."""
-    total = torch.zeros_like(values)
-    norm = torch.zeros_like(guide.scale)
+def taps(guide: Guide, *, sharpness: float = 32.0, step: int = 1) -> Iterator[Tap]:
+    """5 x 5 neighbours `step` pixels apart and their weights; `list` them to filter more than once."""
     for i, wy in enumerate(_TAPS):
         for j, wx in enumerate(_TAPS):
             dy, dx = (i - 2) * step, (j - 2) * step
-            weight = wy * wx * guide_weights(guide, dy, dx, sharpness)
-            total.addcmul_(_shifted(values, dy, dx), weight[..., None])
-            norm += weight
+            yield dy, dx, wy * wx * guide_weights(guide, dy, dx, sharpness)
+
+
+def joint_filter(
+    values: torch.Tensor, guide: Guide, *, sharpness: float = 32.0, step: int = 1, known: list[Tap] | None = None
+) -> torch.Tensor:
+    """Average `values` [H, W, C] over neighbours (`taps`, unless `known`) that lie on the same surface."""
+    total = torch.zeros_like(values)
+    norm = torch.zeros_like(guide.scale)
+    for dy, dx, weight in known or taps(guide, sharpness=sharpness, step=step):
+        total.addcmul_(_shifted(values, dy, dx), weight[..., None])
+        norm += weight
     return total / norm.clamp_min(1e-6)[..., None]
 
 
@@ -60,19 +72,19 @@ def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
     return out
 
 
-def filter_tables(cache, tables, guide: Guide):
+def filter_tables(cache, tables, guide: Guide, known: list[Tap] | None = None):
     """Filter the diffuse lobe and the specular levels that are wider than a pixel's neighbourhood; returns Tables."""
-    kept = _first_filtered(cache)
+    kept = first_filtered()
     stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
     grid = torch.zeros(guide.scale.numel(), stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
-    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
+    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide, known=known).view(len(grid), -1)[pixels]
     levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
     return type(tables)(smooth[:, :9].contiguous(), torch.stack(list(levels)))
 
 
-def _first_filtered(cache) -> int:
+def first_filtered() -> int:
     """Index of the first roughness level to filter: sharper ones are nearly noise-free and carry reflected detail."""
     from materialist.transport.cache import ROUGHNESS_LEVELS
 
