@@ -14,6 +14,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
+from materialist.predict.bundled.relief import with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
 NETWORK_SIDES = (160, 224)
@@ -65,24 +66,33 @@ def infer(
     if small != size:
         guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
         albedo, roughness, metallic = (guided(m, guide, fine) for m in (albedo, roughness, metallic))
-    depth, normal = with_edges(depth, normal, linear)
+    depth, normal = with_edges(depth, normal, linear, rays)
+    depth *= MEDIAN_DEPTH / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
     return Prediction(materials, normal, depth)
 
 
-def with_edges(depth: Array, normal: Array, linear: Array) -> tuple[Array, Array]:
-    """Depth [h, w] and normals [h, w, 3] brought to the size of the photo [H, W, 3], with its edges."""
+def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
+    """Depth [h, w] and normals [h, w, 3] brought to the size of the photo [H, W, 3], with its edges.
+
+    rays: [H, W, 2] x and y of the photo's rays at z = -1.
+    """
     size = linear.shape[:2]
     middle = _network_size(size, EDGE_SIDE)
     photo = linear_to_srgb(resample.values(linear, middle))
-    guide = Guide(photo, radius=max(2, round(EDGE_REACH * max(middle))))
+    reach = max(2, round(EDGE_REACH * max(middle)))
+    guide = Guide(photo, radius=reach)
     depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
     known = depth > 0
-    logarithm = np.log(np.where(known, depth, 1)).astype(np.float32)
-    depth = np.where(known, np.exp(weighted_median(logarithm, guide, known=known)), 0).astype(np.float32)
+    coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
+    sharp = weighted_median(coarse, guide, known=known)
     planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
-    normal = np.stack(planes, -1)
+    normal = _unit(np.stack(planes, -1))
+    logarithm = with_relief(
+        np.where(known, coarse, np.nan), sharp, normal, resample.values(np.ascontiguousarray(rays), middle), reach=reach
+    )
+    depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
         depth, normal = resample.depth(depth, size), resample.normals(normal, size)
     return depth, normal

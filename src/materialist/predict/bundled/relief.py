@@ -1,0 +1,106 @@
+"""Depth with the relief of the normals: smooth where the network saw one surface, broken where it saw two.
+
+Medians that put edges where the photo has them also print the photo's texture onto every slope, and a mesh of that
+shades itself with tiny steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+
+from materialist.types import Array
+
+STEEPEST = 0.12
+"""Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
+STEP = (0.02, 0.05)
+"""Change of log depth within reach, beyond that of the slopes, that is surely none, and surely an edge."""
+BREAK = 0.008
+"""Change of log depth from pixel to pixel, beyond that of the slopes, that may be left open where there is an edge."""
+PART = 0.12
+"""Part of the whole change within reach that one such pair must have: an edge is one step, print of texture is many."""
+OPEN = 1e-3
+"""Weight of such a pair of pixels."""
+LENGTH = 10.0
+"""Pixels above which the depth decides, below which the normals do."""
+
+
+def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reach: int) -> Array:
+    """Logarithm of depth that follows the normals in the small, `sharp` at edges, `coarse` elsewhere.
+
+    Solves min over u of sum of w |u_q - u_p - g_pq|^2 over neighbours + sum |u_p - target_p|^2 / LENGTH^2, where g is
+    the slope that the normals demand: n . d(z r) = 0 gives d log z = -n . dr / (n . r).
+
+    Args:
+        coarse: [H, W] logarithm of depth as the network gives it, NaN where there is no surface; without edges.
+        sharp: [H, W] the same with edges.
+        normal: [H, W, 3] unit. rays: [H, W, 2] x and y of the rays at z = -1.
+        reach: pixels by which an edge of `coarse` may be off, or blurred.
+
+    Returns:
+        [H, W] float32, NaN where `coarse` is.
+    """
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import cg
+
+    known = np.isfinite(coarse) & np.isfinite(sharp)
+    if known.sum() < 9:
+        return sharp
+    slopes = slopes_of(normal, rays)
+    change = excess(coarse, known, slopes, reach)
+    edge = np.clip((change - STEP[0]) / (STEP[1] - STEP[0]), 0, 1) ** 2
+    target = np.where(known, edge * np.nan_to_num(sharp) + (1 - edge) * np.nan_to_num(coarse), 0).astype(np.float64)
+    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
+    count = int(known.sum())
+    first, second, wanted, weight = _pairs(known, index, target, slopes, change)
+    rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
+    step = coo_matrix((np.r_[-root, root], (rows, np.r_[first, second])), (len(first), count)).tocsr()
+    system = (step.T @ step + diags(np.full(count, LENGTH**-2))).tocsr()
+    moved, _ = cg(system, step.T @ (root * wanted), rtol=1e-3, maxiter=100, M=diags(1 / system.diagonal()))
+    found = np.full(coarse.shape, np.nan, np.float32)
+    found[known] = target[known] + moved
+    return found
+
+
+def excess(coarse: Array, known: Array, slopes: tuple[Array, Array], reach: int) -> Array:
+    """[H, W] change of log depth within reach of a pixel, along a row or a column, that the normals do not explain.
+
+    Infinite next to where the surface ends, whose outline stays as it is.
+    """
+    most = np.zeros(coarse.shape, np.float32)
+    for axis, slope in ((1, slopes[0]), (0, slopes[1])):
+        own = np.zeros(coarse.shape, np.float32)
+        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
+        both = known[near] & known[far]
+        own[near] = np.where(both, coarse[far] - coarse[near] - (slope[near] + slope[far]) / 2, 0)
+        window = (2 * reach + 1, 1) if axis else (1, 2 * reach + 1)
+        within = np.abs(cv2.boxFilter(own, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT))
+        most = np.maximum(most, within)
+    ending = cv2.dilate((~known).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
+    return np.where(ending, np.inf, most).astype(np.float32)
+
+
+def slopes_of(normal: Array, rays: Array) -> tuple[Array, Array]:
+    """[H, W] change of log depth from one pixel to the next, to the right and downwards."""
+    across = float(rays[0, -1, 0] - rays[0, 0, 0]) / max(rays.shape[1] - 1, 1)
+    down = float(rays[-1, 0, 1] - rays[0, 0, 1]) / max(rays.shape[0] - 1, 1)
+    facing = normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] - normal[..., 2]
+    length = np.sqrt((rays**2).sum(-1) + 1)
+    facing = np.minimum(facing, -STEEPEST * length)  # n . r < 0 where the surface is seen
+    return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
+
+
+def _pairs(known: Array, index: Array, target: Array, slopes: tuple[Array, Array], change: Array) -> tuple[Any, ...]:
+    """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
+    parts = []
+    for axis, slope in ((1, slopes[0]), (0, slopes[1])):
+        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
+        both = known[near] & known[far]
+        wanted = ((slope[near] + slope[far]) / 2 - (target[far] - target[near]))[both]
+        around = np.minimum(change[near], change[far])[both]
+        least = np.where(np.isinf(around), BREAK, np.maximum(BREAK, PART * around))
+        broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
+        parts.append((index[near][both], index[far][both], wanted, np.where(broken, OPEN, 1.0)))
+    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

@@ -1,0 +1,57 @@
+"""Relief: slopes come from the normals, edges stay where they are sharp."""
+
+import cv2
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays
+from materialist.predict.bundled.relief import excess, slopes_of, with_relief
+from materialist.types import Camera
+
+CAMERA = Camera(64, 48, 50.0)
+RAYS = pixel_rays(CAMERA)[..., :2].copy()  # [48, 64, 2]
+
+
+def _plane(normal, offset):
+    """log depth [H, W] and normals [H, W, 3] of the plane n . x = -offset before the camera."""
+    normal = np.array(normal) / np.linalg.norm(normal)
+    directions = np.concatenate([RAYS, -np.ones((*RAYS.shape[:2], 1))], -1)
+    depth = -offset / (directions @ normal)
+    return np.log(depth).astype(np.float32), np.broadcast_to(normal, directions.shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("normal", [(0.1, 0.2, 1), (0, 1, 0.7), (0.8, 0, 0.6)])
+def test_texture_printed_onto_a_plane_is_gone(normal):
+    true, normals = _plane(normal, 1.5)
+    assert np.isfinite(true).all()
+    printed = true + np.random.default_rng(0).choice([-0.01, 0, 0.02], true.shape).astype(np.float32)
+    assert excess(true, np.ones(true.shape, bool), slopes_of(normals, RAYS), 5).max() < 2e-3  # trapezoids
+    found = with_relief(true, printed, normals, RAYS, reach=5)
+    assert np.abs(found - true).max() < 2e-3
+    # The same print in what has no edge elsewhere either: normals win in the small, depth keeps the level.
+    found = with_relief(printed, printed, normals, RAYS, reach=5)
+    roughness = lambda d: np.abs(np.diff(d - true, axis=1)).mean()  # noqa: E731
+    assert roughness(found) < 0.2 * roughness(printed)
+    assert abs((found - true).mean()) < 5e-3
+
+
+def test_an_edge_stays_where_it_is_sharp():
+    far, normals = _plane((0, 0, 1), 3.0)
+    sharp = far.copy()
+    sharp[10:40, 20:40] -= 0.5
+    found = with_relief(cv2.GaussianBlur(sharp, (0, 0), 3), sharp, normals, RAYS, reach=8)
+    assert np.abs(found - sharp)[12:38, 22:38].max() < 0.05
+    step = found[25, 19] - found[25, 20]
+    assert step > 0.4  # in one pixel
+    flattened = with_relief(far, sharp, normals, RAYS, reach=8)
+    assert np.abs(flattened - far).max() < 1e-3, "where the network saw no edge there is none"
+
+
+def test_what_has_no_surface_stays_so():
+    depth, normals = _plane((0, 0.3, 1), 2.0)
+    depth[:10] = np.nan
+    found = with_relief(depth, depth, normals, RAYS, reach=4)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(depth))
+    assert np.nanmax(np.abs(found - depth)) < 1e-3
+    nothing = np.full_like(depth, np.nan)
+    assert np.isnan(with_relief(nothing, nothing, normals, RAYS, reach=4)).all()
