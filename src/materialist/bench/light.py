@@ -29,13 +29,14 @@ NOTE = """Light fitted to synthetic photographs whose materials, geometry and li
 `envmap` figures compare the fitted with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; MSE
 linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `mesh` the
 depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
-`ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is
-the whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o planes`: without
-the continued planes (`--completion none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the
-true maps. Seconds are those of the light fit with its ray tracing, without the mesh, and for `inversion` those of all
-of it; CPU seconds add up all processors and hardly depend on what else the computer does. The first sample's hold the
-compilation of kernels that the computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that
-size inside the fit instead of 512x256, which makes its steps cheaper."""
+`ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
+whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o planes`: without the
+continued planes (`--completion none`), `with backs`: objects have backs, too (`planes,backs`). `w/o mat`: albedo and
+roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit with its ray
+tracing, without the mesh, and for `inversion` those of all of it; CPU seconds add up all processors and hardly depend
+on what else the computer does. The first sample's hold the compilation of kernels that the computer has not met before.
+`128x64`: the paper's MLP is evaluated on a map of that size inside the fit instead of 512x256, which makes its steps
+cheaper."""
 
 COLUMNS = (
     Column("envmap_ssim", "envmap SSIM", "higher"),
@@ -106,8 +107,8 @@ def run(
 
     `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
     begins with another light, so that small runs meet several. `completion` is that of `invert` under the methods;
-    with `relight`, whole inversions with and without the continued planes are relit. `spp` are the samples a pixel of
-    all pictures that are compared. The report is written after every row.
+    with `relight`, whole inversions with and without continued planes and backs are relit. `spp` are the samples a
+    pixel of all pictures that are compared. The report is written after every row.
     """
     chosen = _methods(methods)
     from rich.console import Console
@@ -143,6 +144,10 @@ def _methods(names: str) -> dict[str, Method]:
     return chosen
 
 
+ADDED = {"planes": "", "planes,backs": " with backs", "none": " w/o planes"}
+"""`--completion` of the relit rows, and how their names end."""
+
+
 class _Clock:
     """Wall and processor seconds since it was made; the latter hardly change when other programs run beside."""
 
@@ -176,11 +181,11 @@ class _Stage:
         return self._meshes[completion]
 
     def relit(self) -> Iterator[dict[str, Any]]:
-        """Rows of the ceiling and of whole inversions, with and without the continued planes."""
+        """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
         from materialist import pipeline
 
         truth = self.sample.truth
-        for completion, suffix in (("planes", ""), ("none", " w/o planes")):
+        for completion, suffix in ADDED.items():
             yield {"method": CEILING + suffix, **self._on_mesh(completion, truth.materials, self.sample.envmap)}
             clock = _Clock()
             found = pipeline.invert(
