@@ -13,7 +13,7 @@ from materialist.studio.context import Context, steps
 from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.hub import Hub
-from materialist.studio.selection import read_pick
+from materialist.studio.selection import read_pick, sam_missing
 from materialist.studio.showing import Final
 
 TITLE = "Materialist studio"
@@ -79,6 +79,11 @@ def _left(parts: dict[str, Any]) -> None:
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
         parts["brush"] = gr.Slider(2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[])
+    missing = sam_missing()
+    parts["sam"] = gr.Checkbox(
+        False, label="Find objects with SAM 2", interactive=missing is None, elem_id="sam",
+        info=missing or "A trained network in place of colour, depth and normals; seconds a click.",
+    )  # fmt: skip
     with gr.Row():
         parts["undo"] = gr.Button("Undo", size="sm", min_width=80)
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
@@ -97,14 +102,14 @@ def _wire(context: Context) -> None:
         context[name].change(None, context[name], None, js=script, api_visibility="private")
 
     @guarded
-    def pick(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
+    def pick(sam: bool, event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session, wanted = context.session(request), read_pick(event._data)
         if wanted["tool"] == "lamp":
             tab_light.place_lamp(session, *wanted["at"])
         elif wanted["tool"] == "place":
             session.place(*wanted["at"])
         else:
-            session.pick(wanted)
+            session.pick(wanted, "sam2" if sam else "grabcut")
         return context.everything(session)
 
     @guarded
@@ -127,7 +132,7 @@ def _wire(context: Context) -> None:
         return context.everything(session)
 
     every = {**quick, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
-    context["stage"].pick(pick, None, context.all_parts, **every)
+    context["stage"].pick(pick, context["sam"], context.all_parts, **every)
     context["steps"].act(act, None, context.all_parts, **every)
     context["undo"].click(undo, None, context.all_parts, **every)
     context["deselect"].click(deselect, None, context.all_parts, **quick)
