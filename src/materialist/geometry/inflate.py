@@ -29,7 +29,9 @@ def inflated(objects: Objects, depth: Array, spacing: float) -> Array:
         rim = np.zeros(inside.shape, bool)
         rim.ravel()[free[objects.label.ravel()[free] == k]] = True
         out[box][inside[box]] = _round(inside[box], rim[box])[inside[box]]
-    return out * np.asarray(depth, np.float64) * spacing
+    # A pixel is as wide as at the middle of the ray, where the outline is, not at the front.
+    share = np.minimum(out * spacing, 1)
+    return share * np.asarray(depth, np.float64) / (1 - share / 2)
 
 
 def _round(inside: Array, rim: Array) -> Array:
@@ -39,7 +41,7 @@ def _round(inside: Array, rim: Array) -> Array:
     width = np.where(inside, distance_transform_edt(~rim) + 0.5, 0)  # [h, w] to the outline
     widest = float(width.max())
     radius = width.copy()
-    for level in np.geomspace(0.5, widest, LEVELS):
+    for level in np.geomspace(0.5, 0.999 * widest, LEVELS):
         core = width >= level
         within = distance_transform_edt(~core) < level
         radius = np.where(within & inside, np.maximum(radius, level), radius)
