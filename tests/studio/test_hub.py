@@ -20,6 +20,14 @@ def shared(tmp_path):
     hub.jobs.close()
 
 
+def test_a_page_shows_what_it_showed_before_or_what_the_studio_was_started_on(shared):
+    mine, given = shared.work.new("Mine", "a" * 16), shared.work.new("Given", ALONE)
+    assert shared.first("") == "" and shared.first(None) == "" and shared.first(shared.kept(mine)) == mine.name
+    shared.start = given
+    assert shared.first("") == given.name and shared.first(shared.kept(mine)) == mine.name
+    assert shared.first(f"another/{mine.name}") == given.name  # of a studio that has ended
+
+
 def test_people_are_kept_apart(shared):
     anna, bert = "a" * 16, "b" * 16
     project = shared.work.new("Anna's", anna)

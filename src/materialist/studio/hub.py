@@ -35,6 +35,8 @@ class Hub:
     start: Project | Path | None = None
     """What to open first: a scene, or a photo to show on the opening tab."""
     examples: bool = True
+    run: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Tells this studio from the ones before it in what a browser keeps."""
     _sessions: dict[str, Session] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -70,6 +72,18 @@ class Hub:
             if project.name == name:
                 return project
         raise InputError("This photo is no longer in the work folder; open it again.")
+
+    def kept(self, project: Project) -> str:
+        """What a browser keeps of the photo it shows."""
+        return f"{self.run}/{project.name}"
+
+    def first(self, kept: Any) -> str:
+        """The name of the project that a page which arrives should show; an empty text for none.
+
+        The photo it showed before, if that was in this studio; else what this studio was started on.
+        """
+        run, _, name = str(kept or "").rpartition("/")
+        return self.start.name if isinstance(self.start, Project) and run != self.run else name
 
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""

@@ -108,7 +108,7 @@ def wire(context: Context, page: gr.Blocks) -> None:
         session = hub.session(request.session_hash, hub.person(token))
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
-        first = hub.start.name if isinstance(hub.start, Project) else last
+        first = hub.first(last)
         if isinstance(hub.start, Path):
             yield {parts["file"]: hub.handed(hub.start)}
         elif first and any(value == first for _, value in known):
@@ -198,7 +198,7 @@ def _following(context: Context, session: Session, project: Project, job: Job) -
     parts, hub = context.parts, context.hub
     session.running = job
     yield {
-        parts["last"]: project.name,
+        parts["last"]: hub.kept(project),
         parts["cancel"]: gr.update(visible=True),
         parts["start"]: gr.update(interactive=False),
     }
@@ -243,7 +243,8 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
         return
     known = _projects(context, session)
     yield {
-        **context.controls(session), parts["stage"]: session.stage(edits=False), parts["last"]: project.name,
+        **context.controls(session), parts["stage"]: session.stage(edits=False),
+        parts["last"]: context.hub.kept(project),
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
         parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
