@@ -20,10 +20,6 @@ from materialist.types import Camera
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 
 
-CHOICE_PRICE = 0.25
-"""How much of the price of leaving the prior counts in the choice of a start: neither candidate is near its optimum."""
-
-
 def remapped(prior: torch.Tensor) -> torch.Tensor:
     """Roughness and metallic of [P, 5] maps moved to 0.7 x + 0.2, where gradients live (paper, Initialization)."""
     return torch.cat([prior[:, :3], 0.7 * prior[:, 3:] + 0.2], 1)
@@ -65,7 +61,7 @@ def better_start(
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
     share = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-    price = CHOICE_PRICE * settings.delta * share * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
+    price = settings.delta * share * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
     short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
     candidates, costs = [], []
     for maps in (start, other):
