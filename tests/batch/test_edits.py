@@ -40,7 +40,9 @@ def test_a_drop_is_applied_to_every_photo(tmp_path):
     from made_meshes import box_file
 
     box_file(tmp_path / "box.ply")
-    (tmp_path / "edits.yaml").write_text("- drop: {mesh: box.ply, at: [12, 8], scale: 3, height: 0.2, gravity: [0, 0, -1]}\n")
+    (tmp_path / "edits.yaml").write_text(
+        "- drop: {mesh: box.ply, at: [12, 8], scale: 3, height: 0.2, gravity: [0, 0, -1]}\n"
+    )
     photos(tmp_path / "photos", "one")
     runs = tmp_path / "runs"
     outcome = batch(

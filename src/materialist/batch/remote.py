@@ -29,6 +29,7 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
     """URLs of the photos at a URL: a folder with its subfolders, a pattern with *, or one photo."""
     with _told(url):
         system, path = _system(url)
+        system.invalidate_cache()  # what was listed earlier in this process may have changed
         if not any(mark in path for mark in "*[") and _suffix(url) in suffixes:
             return [url]
         paths = system.glob(path) if any(mark in path for mark in "*[") else system.find(path)
