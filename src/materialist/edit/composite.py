@@ -65,7 +65,7 @@ def composite(
     if full_render:
         picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
-    layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
+    layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, sparing=True, progress=progress)
     return into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
 
 

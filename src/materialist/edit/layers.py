@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from materialist.edit.portrait import Portrait
+from materialist.edit.sparing import FEWEST, Begun, spared
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -37,15 +38,20 @@ class Layers:
     """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
 
 
-def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None) -> Layers:
+def render_layers(
+    studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, sparing: bool = False, progress=None
+) -> Layers:
     """Render a fitted scene (`lights.Studio`) and an edit of it, and separate the edit from the noise.
 
     `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
-    noise. See `difference`.
+    noise. See `difference`. With `sparing` pixels whose difference has little noise get a quarter of the paths (see
+    `sparing`); for the one edit of a scene, since the base picture then fits no other.
     """
     scene = studio.scene
     base, other = studio.twins(edited)
     changed = changed_pixels(scene, edited)
+    # Another light changes every pixel.
+    begun = studio.begun(edited) if sparing and spp >= FEWEST and not is_relit(scene, edited) else None
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
     if scene.bodies != edited.bodies:
@@ -57,7 +63,7 @@ def render_layers(studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean
         if clean and anything.any():
             albedo, normal = studio.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
-    layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress)
+    layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress)
     return replace(layers, relit=is_relit(scene, edited), portrait=alone, covered=covered)
 
 
@@ -81,7 +87,7 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 def difference(
     base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
-    clean: bool = True, progress=None,
+    clean: bool = True, begun: tuple[Begun, Begun] | None = None, progress=None,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
 
@@ -94,17 +100,21 @@ def difference(
         guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
             another one, of the edited scene.
         clean: denoise both pictures before they are compared, where the denoiser is installed.
+        begun: the same two renderings in shares, to trace all paths only where noise would be seen.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     tick = progress or (lambda *_: None)
-    halves: list[list[Array]] = []
-    for k in range(2):
-        pair = []
-        for j, render in enumerate((base, edited)):
-            tick("render", 2 * k + j, 4)
-            pair.append(render(-(-spp // 2), 2 * seed + k))
-        halves.append(pair)
+    if begun is not None:
+        halves = spared(begun, changed, spp=spp, seed=seed, tick=tick)[0]
+    else:
+        halves = []
+        for k in range(2):
+            pair = []
+            for j, render in enumerate((base, edited)):
+                tick("render", 2 * k + j, 4)
+                pair.append(render(-(-spp // 2), 2 * seed + k))
+            halves.append(pair)
     tick("render", 4, 4)
     (b0, e0), (b1, e1) = halves
     b, e = (b0 + b1) / 2, (e0 + e1) / 2

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from materialist.edit.layers import Render
+from materialist.edit.sparing import Begun
 from materialist.errors import InputError
+from materialist.render.share import Share
 from materialist.types import Array, Lamp, Scene
 
 PATHS_PER_RAY = 3
@@ -41,6 +43,23 @@ class Studio:
             return self._base[key]
 
         return base, lambda spp, seed: self._render(edited, depth, spp, seed)
+
+    def begun(self, edited: Scene) -> tuple[Begun, Begun] | None:
+        """A share of the base and of `edited`, None where the tracer of `twins` knows no shares.
+
+        Both have the random numbers of `twins`, and no picture is kept.
+        """
+        if max(_path_depth(s) for s in (self.scene, edited)):
+            return None
+
+        def begin(scene: Scene) -> Begun:
+            def render(spp: int, seed: int, share: Share) -> tuple[Array, int]:
+                rays = -(-spp // PATHS_PER_RAY)
+                return self._dressed(scene).render(spp=rays, seed=seed, share=share), share.rays(rays)
+
+            return render
+
+        return begin(self.scene), begin(edited)
 
     def beside(self, edited: Scene, other: Scene) -> Render:
         """render(spp, seed) of `other` by the tracer that `twins` takes for `edited`."""

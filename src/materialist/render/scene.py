@@ -87,7 +87,9 @@ class RenderScene:
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
-    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
+    def render(
+        self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False, share=None
+    ) -> Array:
         """Path-trace the picture: by splitting paths (`render.split`), or under a peaked light by Mitsuba's `path`.
 
         Args:
@@ -95,6 +97,7 @@ class RenderScene:
                 pictures.
             max_depth: path length; 2 is direct light alone, 1 the sky alone.
             hide_emitters: leave pixels of the sky black.
+            share: a `split.Share`: trace these rays alone. Only the splitting tracer can.
 
         Returns:
             [H, W, 3] float32 linear radiance.
@@ -103,8 +106,13 @@ class RenderScene:
 
         _check_options(spp, max_depth)
         if self._peaked or not 2 <= max_depth <= DEEPEST:
+            if share is not None:
+                raise InputError("A share of the rays cannot be traced under a peaked light, or at this path length.")
             return self.render_path(spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
-        return trace(self.mi_scene, self.camera, spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
+        return trace(
+            self.mi_scene, self.camera, spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters,
+            share=share,
+        )  # fmt: skip
 
     def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
         """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""

@@ -14,6 +14,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.render.buffers import integers
+from materialist.render.share import Share
 from materialist.transport.sampling import point
 from materialist.types import Array, Camera
 
@@ -26,7 +28,10 @@ DEEPEST = 6
 _R2 = (0.7548776662466927, 0.5698402909980532)
 
 
-def trace(scene: mi.Scene, camera: Camera, *, spp: int, seed: int, max_depth: int, hide_emitters: bool) -> Array:
+def trace(
+    scene: mi.Scene, camera: Camera, *, spp: int, seed: int, max_depth: int, hide_emitters: bool,
+    share: Share | None = None,
+) -> Array:  # fmt: skip
     """[H, W, 3] radiance of a scene whose one emitter is an environment map and whose BSDFs are `materialist_disney`.
 
     Args:
@@ -34,22 +39,53 @@ def trace(scene: mi.Scene, camera: Camera, *, spp: int, seed: int, max_depth: in
         seed: equal seeds give equal pictures.
         max_depth: path length, 2 (direct light) to DEEPEST.
         hide_emitters: leave pixels of the sky black.
+        share: trace these rays alone; the radiance is their mean, and 0 in pixels without any.
     """
-    lanes = camera.width * camera.height
-    random: Any = mi.PCG32(size=lanes, initstate=mi.UInt64(seed))  # type: ignore[operator]
-    corner, pixel = _corners(camera, lanes)
-    total = _loop(scene, corner, pixel, random, dr.opaque(mi.UInt32, spp), max_depth - 1, not hide_emitters)
-    dr.eval(total)
-    return np.array(total).T.reshape(camera.height, camera.width, 3) / np.float32(spp)
+    pixels = np.arange(camera.width * camera.height) if share is None or share.pixels is None else share.pixels
+    rays = spp if share is None else share.rays(spp)
+    picture = np.zeros((camera.height * camera.width, 3), np.float32)
+    if rays and len(pixels):
+        lane = integers(mi, pixels)
+        corner, pixel = _corners(camera, lane)
+        shifts, random = _random(lane, seed, share is not None and share.rest)
+        order = (dr.opaque(mi.UInt32, value) for value in _order(share))
+        count = (dr.opaque(mi.UInt32, rays), dr.opaque(mi.UInt32, spp), *order)
+        total = _loop(scene, corner, pixel, shifts, random, count, max_depth - 1, not hide_emitters)
+        dr.eval(total)
+        picture[pixels] = np.array(total).T / np.float32(rays)
+    return picture.reshape(camera.height, camera.width, 3)
+
+
+def _order(share: Share | None) -> tuple[int, int, int]:
+    """(first, step, group): ray j of those that are traced is number first + step * j + j // group of them all."""
+    endless = 2**31
+    if share is None:
+        return 0, 1, endless
+    return (1, 1, share.every - 1) if share.rest else (0, share.every, endless)
+
+
+def _random(lane, seed: int, rest: bool):
+    """The starts of a pixel's three lattices, which all its rays share, and its generator for what follows."""
+    number = mi.UInt64(lane)
+    # As PCG32(size=...) does it for all pixels at once; a pixel's numbers do not depend on which others are traced.
+    stream = mi.UInt64(0xDA3E39CB94B95BDB) + number  # type: ignore[operator]
+    random: Any = mi.PCG32(initstate=mi.UInt64(seed) + number, initseq=stream)  # type: ignore[operator]
+    shifts = tuple(_uniform(random) for _ in range(3))
+    if rest:
+        random = mi.PCG32(initstate=mi.UInt64(seed + (1 << 40)) + number, initseq=stream)  # type: ignore[operator]
+    dr.eval(shifts, random)
+    return shifts, random
 
 
 @dr.syntax
-def _loop(scene, corner, pixel, random, count, bounces: int, sky: bool):
-    """Sum over `count` camera rays of every pixel."""
-    jitter, diffuse, specular = _uniform(random), _uniform(random), _uniform(random)
+def _loop(scene, corner, pixel, shifts, random, counts, bounces: int, sky: bool):
+    """Sum over camera rays of every pixel; `counts`: how many are traced, how many there are, and `_order`."""
+    jitter, diffuse, specular = shifts
+    rays, count, first, step, group = counts
     total = mi.Color3f(0)
-    i = dr.zeros(mi.UInt32, dr.width(corner))
-    while i < count:
+    j = dr.zeros(mi.UInt32, dr.width(corner))
+    while j < rays:
+        i = first + step * j + j // group
         ray = _camera_ray(corner + pixel * _kronecker(i, jitter))
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
         hit = si.is_valid()
@@ -61,7 +97,7 @@ def _loop(scene, corner, pixel, random, count, bounces: int, sky: bool):
             total += _path(scene, si, 0, sample, hit, bounces, random) / SPLIT
             k += 1
         total += _path(scene, si, 1, point(i, count, specular), hit, bounces, random)
-        i += 1
+        j += 1
     return total
 
 
@@ -95,9 +131,8 @@ def radiance(scene, direction, active):
     return mi.Color3f(scene.environment().eval(si, active))
 
 
-def _corners(camera: Camera, lanes: int):
+def _corners(camera: Camera, lane):
     """Top left corner of each pixel on the plane z = -1, and the step from there to its opposite corner."""
-    lane = dr.arange(mi.UInt32, lanes)
     row, col = mi.Float(lane // camera.width), mi.Float(lane % camera.width)
     corner = mi.Point2f((col - camera.width / 2) / camera.focal, (camera.height / 2 - row) / camera.focal)
     dr.eval(corner)
