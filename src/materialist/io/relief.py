@@ -48,7 +48,8 @@ def _samples(vertices: Array, faces: Array, view: Camera) -> tuple[Array, Array]
     screen, depth = _project(vertices, view)
     corners, ahead = screen[faces], (depth[faces] > 0).all(-1)  # [F, 3, 2], [F]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    # Faces turned away are not drawn, so that the back of an object does not shine through between the front's samples.
+    area = 0.5 * np.maximum(first[:, 1] * second[:, 0] - first[:, 0] * second[:, 1], 0)
     low = np.clip(corners.min(1), 0, (view.width, view.height))
     high = np.clip(corners.max(1), 0, (view.width, view.height))
     # A face that reaches far out of the picture is worth the samples of its whole area, up to a bound.
