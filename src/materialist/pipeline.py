@@ -36,7 +36,7 @@ def invert(
     fov: float | str | None = "auto",
     size: int = 512,
     envmap_size: tuple[int, int] = (512, 256),
-    completion: str = "planes",
+    completion: str = "planes,backs",
     tau: float = 6.0,
     mask: Array | None = None,
     strategy: str = "default",
@@ -57,8 +57,8 @@ def invert(
             (MoGe), else from EXIF, else 35.
         size: longer side of the working image, pixels.
         envmap_size: (width, height) of the environment map; width = 2 * height.
-        completion: `planes` continues dominant planes beyond what the photo shows, `planes,backs` also gives objects
-            backs; `none` does neither.
+        completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
+            `planes` leaves objects open behind, `none` does neither.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).

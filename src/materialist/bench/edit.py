@@ -35,9 +35,9 @@ PSNR on sRGB-encoded, clipped pictures. `hue` turns the largest object's albedo 
 object; for `insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all.
 `ceiling` is the same edit path-traced with the true maps and the true light on the mesh of the true depth, no photo in
 it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited;
-`edit, predicted` with the predictor that is named; `backs`: on meshes whose objects have backs. `untouched` is the
-photo as it was. `preview` rows: seconds of one preview by cached transport, `final` those of the composite at 256
-paths, both at the latency size; CPU seconds hardly depend on what else the computer does."""
+`edit, predicted` with the predictor that is named; `w/o backs`: on meshes whose objects are open behind. `untouched`
+is the photo as it was. `preview` rows: seconds of one preview by cached transport, `final` those of the composite at
+256 paths, both at the latency size; CPU seconds hardly depend on what else the computer does."""
 
 
 def run(
@@ -48,7 +48,7 @@ def run(
     size: int = 96,
     kinds: str = ",".join(KINDS),
     predictor: str = "",
-    backs: bool = False,
+    without_backs: bool = False,
     spp: int = 256,
     truth_spp: int = 576,
     latency: int = 512,
@@ -57,9 +57,9 @@ def run(
 ) -> Report:
     """Edit `scenes` synthetic photos of `size` pixels in the `kinds` of ways (separated by commas).
 
-    `predictor` adds a row fitted with that predictor's maps, `backs` rows whose meshes have backs of objects; `latency`
-    is the size of the picture that previews and the final edit are timed on, 0 for no such rows. The report is written
-    after every row.
+    `predictor` adds a row fitted with that predictor's maps, `without_backs` rows whose objects are open behind;
+    `latency` is the size of the picture that previews and the final edit are timed on, 0 for no such rows. The report
+    is written after every row.
     """
     chosen = tuple(kind.strip() for kind in str(kinds).split(","))
     for kind in chosen:
@@ -76,8 +76,8 @@ def run(
 
     setup(device)
     settings = {
-        "scenes": scenes, "size": size, "kinds": ",".join(chosen), "predictor": predictor or None, "backs": backs,
-        "spp": spp, "truth_spp": truth_spp, "latency": latency, "seed": seed,
+        "scenes": scenes, "size": size, "kinds": ",".join(chosen), "predictor": predictor or None,
+        "without_backs": without_backs, "spp": spp, "truth_spp": truth_spp, "latency": latency, "seed": seed,
         "data": None if data is None else data.name,
     }  # fmt: skip
     rows: list[dict[str, Any]] = []
@@ -86,7 +86,7 @@ def run(
     for scene in track(range(scenes), "bench edit", console=Console(stderr=True)):
         sample, other = (make_sample(scene, 0, k, size=size, data=data, seed=seed) for k in (scene, scene + 1))
         options: dict[str, Any] = {"spp": spp, "truth_spp": truth_spp, "seed": seed, "device": device}
-        for row in _edited(sample, other.envmap, chosen, predictor, backs, strips, options):
+        for row in _edited(sample, other.envmap, chosen, predictor, without_backs, strips, options):
             rows.append({**row, "sample": sample.name})
             write(report, output)
     if latency:
@@ -97,7 +97,7 @@ def run(
 
 
 def _edited(
-    sample: SyntheticSample, light: Array, kinds: tuple[str, ...], predictor: str, backs: bool,
+    sample: SyntheticSample, light: Array, kinds: tuple[str, ...], predictor: str, without_backs: bool,
     strips: list[list[Array]], options: dict[str, Any],
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rows of all edits of one sample."""
@@ -111,12 +111,12 @@ def _edited(
         found = pipeline.invert(sample.photo, predictor=predictor, **shared)
         fitted["edit, predicted"] = (found, clock.read()["seconds"])
     perfect = {"": true_scene(sample)}
-    if backs:
-        completion = "planes,backs"
-        perfect[", backs"] = true_scene(sample, completion)
+    if without_backs:
+        completion = "planes"
+        perfect[", w/o backs"] = true_scene(sample, completion)
         clock = _Clock()
         found = pipeline.invert(sample.photo, prior=sample.truth, completion=completion, **shared)
-        fitted["edit, backs"] = (found, clock.read()["seconds"])
+        fitted["edit, w/o backs"] = (found, clock.read()["seconds"])
     for edit in edits(sample, light, kinds):
         yield from _compared(edit, sample, perfect, fitted, strips, options)
 

@@ -138,7 +138,7 @@ def _body(solid: shapes.Solid) -> Body:
     return Body(take(solid.vertices), solid.faces, take(solid.normals), take(solid.uv), constant(colour, 0.4, 0.0))
 
 
-def true_scene(sample: SyntheticSample, completion: str = "planes") -> Scene:
+def true_scene(sample: SyntheticSample, completion: str = "planes,backs") -> Scene:
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light."""
     from materialist.geometry.build import build_geometry
 

@@ -30,8 +30,8 @@ NOTE = """Light fitted to synthetic photographs whose materials, geometry and li
 linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `mesh` the
 depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
 `ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
-whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o planes`: without the
-continued planes (`--completion none`), `with backs`: objects have backs, too (`planes,backs`). `w/o mat`: albedo and
+whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o backs`: with objects
+open behind (`--completion planes`); `w/o planes`: without continued planes, either (`none`). `w/o mat`: albedo and
 roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit with its ray
 tracing, without the mesh, and for `inversion` those of all of it; CPU seconds add up all processors and hardly depend
 on what else the computer does. The first sample's hold the compilation of kernels that the computer has not met before.
@@ -97,7 +97,7 @@ def run(
     lights: int = 2,
     size: int = 96,
     methods: str = "default,paper",
-    completion: str = "planes",
+    completion: str = "planes,backs",
     relight: bool = True,
     spp: int = 256,
     seed: int = 0,
@@ -144,7 +144,7 @@ def _methods(names: str) -> dict[str, Method]:
     return chosen
 
 
-ADDED = {"planes": "", "planes,backs": " with backs", "none": " w/o planes"}
+ADDED = {"planes,backs": "", "planes": " w/o backs", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
 
 

@@ -56,7 +56,7 @@ def invert(
     size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
     envmap_size: Annotated[str, typer.Option(metavar="WxH", help="Size of the environment map.")] = "512x256",
     completion: Annotated[Completion, typer.Option(help="Continue planes beyond what is seen, give objects backs.")] = (
-        Completion.planes
+        Completion.planes_backs
     ),
     tau: Annotated[float, typer.Option(help="Grazing angle below which the surface is cut, degrees.")] = 6.0,
     mask: Annotated[Path | None, typer.Option(metavar="PNG", help="Region with one roughness and metallic.")] = None,
