@@ -7,16 +7,17 @@ levels only when somebody moves a roughness under this light.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
-from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
-from materialist.transport.filter import Tap, filter_tables, first_filtered, joint_filter
-from materialist.transport.light import DIELECTRIC_R0
-from materialist.transport.shading import shade, specular_at
 from materialist.types import Array
+
+if TYPE_CHECKING:
+    import torch
+
+    from materialist.transport.cache import Tables
+    from materialist.transport.filter import Tap
 
 
 class OtherLight:
@@ -34,6 +35,10 @@ class OtherLight:
 
     def shaded(self, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
         """[P, 3] radiance of all surface pixels; albedo [P, 3], roughness and metallic [P]."""
+        from materialist.transport.filter import filter_tables
+        from materialist.transport.light import DIELECTRIC_R0
+        from materialist.transport.shading import shade
+
         known = roughness.numpy()
         if self._lobes is None and self._tables is None:
             self._lobes = (known, self._filtered(roughness))
@@ -47,6 +52,12 @@ class OtherLight:
 
     def _filtered(self, roughness: torch.Tensor) -> torch.Tensor:
         """[P, 9]: D(R), S0(R), S1(R) of each pixel's roughness [P]."""
+        import torch
+
+        from materialist.transport.cache import ROUGHNESS_LEVELS
+        from materialist.transport.filter import first_filtered, joint_filter
+        from materialist.transport.shading import specular_at
+
         r = roughness[:, None]
         d0, d1, d2 = self._raw.diffuse.split(3, -1)
         lobes = torch.cat([d0 + r * (d1 + r * d2), specular_at(self._raw, roughness)], -1)
