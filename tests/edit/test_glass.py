@@ -66,7 +66,8 @@ def test_thickness_is_given_mirrored_or_predicted():
     given = object_thickness(scene, MASK, np.full(MASK.shape, 0.5, np.float32))
     assert given.method == "given" and (given.solid[MASK] == 0.5).all() and (given.solid[~MASK] == 0).all()
     assert object_thickness(scene, MASK, "symmetry").method == "symmetry"
-    assert object_thickness(scene, MASK).method in ("network", "symmetry")
+    assert object_thickness(scene, MASK, "half-turn").method == "half-turn"
+    assert object_thickness(scene, MASK).method in ("half-turn", "network", "symmetry")
     for wrong, message in (
         (np.ones((3, 3)), "thickness map is"), (-np.ones(MASK.shape), "negative"), (np.zeros(MASK.shape), "0 all over"),
         ("guess", "give a file, or one of"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,16 +38,13 @@ def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> 
     from materialist.edit.behind import SKY, behind
     from materialist.edit.exemplar import exemplar_plan
     from materialist.geometry.membrane import membrane
-    from materialist.geometry.planes import find_planes
 
     hole = _grown(scene.mask)
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
     label = np.full(hole.shape, SKY)
     if depth.any():
-        plane = np.full(hole.shape, -1, np.int8)
-        for k, found in enumerate(find_planes(depth, normal, scene.camera)):
-            plane[found.mask] = k
+        plane = planes_of(scene, depth, normal)
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
     plan = exemplar_plan(linear_to_srgb(photo * gain), hole, np.ones_like(hole), label)
@@ -84,14 +82,42 @@ def closed_proxy(
     """
     from materialist.geometry.closed import closed_proxy as close
 
-    mi, front = scene._mi, scene.front
+    front = scene.front
     shell = close(front.depth, front.normal, scene.mask, thickness, scene.camera, behind=behind.depth)
+    return before(scene, shell, behind, envmap, ior, spp=spp, seed=seed)
+
+
+def before(
+    scene: GlassScene, body: Any, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
+) -> Array:
+    """[H, W, 3] linear, inside the object's mask: a closed body (vertices, faces, normals, uv) before the background.
+
+    Denoised as `materialist glass` does, where the denoiser is installed.
+    """
+    mi = scene._mi
     description: dict[str, Any] = {"type": "scene", **_light(mi, envmap), **_backdrop(scene, behind)}
-    description["object"] = _mesh(mi, shell, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
+    description["object"] = _mesh(mi, body, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
     picture = path_traced(
         mi, description, scene.camera, depth=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask
     )  # fmt: skip
-    return np.where(scene.mask[..., None], picture, 0)
+    return np.where(scene.mask[..., None], _clean(picture, scene), 0)
+
+
+def _clean(picture: Array, scene: GlassScene) -> Array:
+    """[H, W, 3] without noise in the rectangle around the object."""
+    from materialist.errors import SetupError
+    from materialist.render.denoise import denoise
+
+    rows, columns = np.flatnonzero(scene.mask.any(1)), np.flatnonzero(scene.mask.any(0))
+    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    part = np.ascontiguousarray(picture[window])
+    try:
+        clean = denoise(part, albedo=np.ones_like(part), normal=np.ascontiguousarray(scene.front.normal[window]))
+    except SetupError:
+        return picture
+    whole = picture.copy()
+    whole[window] = clean
+    return whole
 
 
 def _backdrop(scene: GlassScene, behind: Background) -> dict[str, Any]:
@@ -123,18 +149,34 @@ def plain_background(scene: GlassScene, behind: Background) -> Array:
     return np.where(scene.mask[..., None], behind.picture, 0).astype(np.float32)
 
 
-def thicknesses(scene: GlassScene, photo: Array) -> dict[str, Array]:
-    """[H, W] thickness along the camera rays by where it comes from: 'true', 'predicted', 'symmetry'."""
+def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str, Array]:
+    """[H, W] thickness along the camera rays by where it comes from.
+
+    'true', 'predicted' (what `materialist glass` takes by itself), 'network' (RefractionNet alone, where its weights
+    are), 'symmetry'. The upright direction comes from the floor of the background, where there is one.
+    """
     from materialist.errors import WeightsError
+    from materialist.geometry.half_turn import upright
     from materialist.geometry.symmetry import symmetric_thickness
     from materialist.predict.refraction import thickness
+    from materialist.predict.refraction.choice import best_thickness
 
     front: Front = scene.front
-    found = {"true": front.thickness}
-    try:
-        guess = thickness(photo, scene.mask, front.normal, front.depth, scene.camera)
-        found["predicted"] = guess.solid
-    except WeightsError:
-        pass  # the other two still tell something
+    seen = (photo, scene.mask, front.normal, front.depth, scene.camera)
+    up = upright(behind.depth, behind.normal, planes_of(scene, behind.depth, behind.normal), scene.camera)
+    found = {"true": front.thickness, "predicted": best_thickness(*seen, up=up).thickness.solid}
+    with suppress(WeightsError):  # the others still tell something
+        found["network"] = thickness(*seen).solid
     found["symmetry"] = symmetric_thickness(front.depth, front.normal, scene.mask, scene.camera)
     return found
+
+
+def planes_of(scene: GlassScene, depth: Array, normal: Array) -> Array:
+    """[H, W] int8: the plane of each pixel of what is around the object, -1 for none."""
+    from materialist.geometry.planes import find_planes
+
+    plane = np.full(depth.shape, -1, np.int8)
+    if depth.any():
+        for k, found in enumerate(find_planes(depth, normal, scene.camera)):
+            plane[found.mask] = k
+    return plane

@@ -1,4 +1,4 @@
-"""How thick the object under a mask is: predicted by RefractionNet, mirrored, or given."""
+"""How thick the object under a mask is: its front turned around, predicted by RefractionNet, mirrored, or given."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.errors import InputError, WeightsError
+from materialist.errors import InputError
 from materialist.geometry.front import smooth_front
 from materialist.geometry.symmetry import object_size, surface_in, symmetric_thickness
 from materialist.types import Array, Scene
 
-METHODS = ("auto", "network", "symmetry")
+METHODS = ("auto", "half-turn", "network", "symmetry")
 WALL = 0.05
 """Wall of a hollow object, as a part of its size, where nothing tells it."""
 WALLS = (0.015, 0.12)
@@ -29,7 +29,7 @@ class ObjectThickness:
     wall: float
     """Of the object, were it hollow."""
     method: str
-    """Which method it comes from: `network`, `symmetry` or `given`."""
+    """Which method it comes from: `half-turn`, `network`, `symmetry` or `given`."""
 
 
 def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "auto") -> ObjectThickness:
@@ -37,8 +37,9 @@ def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "au
 
     Args:
         mask: [H, W] bool at working size.
-        method: `network` (RefractionNet), `symmetry` (the paper's assumption), `auto` (the network where its weights
-            are, else symmetry), a map [H, W] of scene units along the rays, or a file with one.
+        method: `half-turn` (the front turned around an upright axis), `network` (RefractionNet), `symmetry` (the
+            paper's assumption), `auto` (the turn where it fits and agrees with the network, else the network, without
+            weights symmetry), a map [H, W] of scene units along the rays, or a file with one.
 
     Raises:
         InputError: an unknown method, a map of another size or with negative values, a mask without a surface.
@@ -47,12 +48,10 @@ def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "au
     inside = surface_in(mask, scene.depth, scene.camera)
     size = object_size(inside, scene.depth, pixel_rays(scene.camera))
     if isinstance(method, str) and method in METHODS:
+        if method == "network":
+            return _by_network(scene, inside, size)
         if method != "symmetry":
-            try:
-                return _by_network(scene, inside, size)
-            except WeightsError:
-                if method == "network":
-                    raise
+            return _chosen(scene, inside, size, method)
         return ObjectThickness(_mirrored(scene, inside), WALL * size, "symmetry")
     given = _given(method, inside.shape)
     if not (given[inside] > 0).any():
@@ -64,12 +63,31 @@ def _by_network(scene: Scene, inside: Array, size: float) -> ObjectThickness:
     from materialist.predict.refraction import thickness
 
     found = thickness(scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
+    return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network")
+
+
+def _chosen(scene: Scene, inside: Array, size: float, method: str) -> ObjectThickness:
+    from materialist.geometry.half_turn import upright
+    from materialist.predict.refraction.choice import best_thickness
+
+    up = upright(scene.depth, scene.normal, np.where(inside, -1, scene.geometry.plane_label), scene.camera)
+    choice = best_thickness(
+        scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, prefer=method
+    )  # fmt: skip
+    solid = choice.thickness.solid
+    if choice.method == "symmetry":
+        solid = _mirrored(scene, inside)
+    return ObjectThickness(solid, _wall(scene, inside, choice.thickness, size), choice.method)
+
+
+def _wall(scene: Scene, inside: Array, found, size: float) -> float:
+    """Thickness of its wall, were it hollow, of a `predict.refraction.Thickness`."""
     rays = pixel_rays(scene.camera)
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)
     wall = float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL * size
-    return ObjectThickness(found.solid, float(np.clip(wall, WALLS[0] * size, WALLS[1] * size)), "network")
+    return float(np.clip(wall, WALLS[0] * size, WALLS[1] * size))
 
 
 def _mirrored(scene: Scene, inside: Array) -> Array:

@@ -173,17 +173,22 @@ def _closed(view: _View, front: Array, squared: Array, camera: Camera) -> Shell:
     # Values beyond the mask: what is near goes on, so that the silhouette, between pixels, has some.
     known = view.inside
     edge = silhouette_field(view.inside)  # [h, w] pixels
-    maps = np.log(np.maximum(membrane(front, known), 1e-9)), _steady(squared, edge, known), edge
+    steady = _steady(squared, edge, known)
+    length = np.linalg.norm(view.rays, axis=-1)
+    # Towards a silhouette front and back turn away, and the middle between them does not: it can be carried on.
+    middle = front + np.sqrt(np.maximum(steady * np.maximum(edge, 0), 0)) / (2 * length)
+    maps = np.log(np.maximum(membrane(middle, known), 1e-9)), steady, edge, length
     size = (width * factor, height * factor)
     field = cv2.resize((edge - COLLAR).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     found = region(_ended(field))
     if not len(found.faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
     place = (found.points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
-    log_front, steady, edge = (_sampled(values, place) for values in maps)
+    log_middle, steady, edge, length = (_sampled(values, place) for values in maps)
     thick = np.sqrt(np.maximum(steady, 0) * np.maximum(edge, COLLAR))
+    own = np.exp(log_middle) - thick / (2 * length)
     thick = np.minimum(thick, _sampled(_room(view, front), place, order=1))
-    return _assembled(found, place, np.exp(log_front), thick, view, camera)
+    return _assembled(found, place, own, thick, view, camera)
 
 
 def _steady(squared: Array, edge: Array, known: Array) -> Array:

@@ -1,0 +1,265 @@
+"""Thickness of what stands upright and looks alike from behind: the visible front, turned half around an upright axis.
+
+Cylinders, vases, bottles, boxes, pyramids and cushions are their own image after half a turn about an upright axis
+(C2). Seen from above, the plane through their silhouette is not where front and back meet, so that the mirror of
+`symmetry` is wrong for them; the turn is not. The axis is where the turned front fits: inside the mask, behind the
+front, met by it at the left and right silhouette, and about as thick as a guess says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.geometry.membrane import membrane
+from materialist.geometry.symmetry import border_distance, object_size, spacing, surface_in
+from materialist.types import Array, Camera
+
+COARSE = 40
+"""Pixels along the object while the axis is looked for."""
+TILTS = (0.0, 0.2, 0.4)
+"""Radians that the camera may look down, to start from, where nothing tells the upright direction."""
+STEEPEST_VIEW = 0.6
+"""Radians beyond which looking down costs."""
+EDGED = 0.35
+"""n.v at the object's lower end above which it ends in an edge, at a flat base; below, the surface turns away."""
+SIDEWAYS = 0.85
+"""Least share of the horizontal in the direction across a silhouette that counts as left or right."""
+GAP = 0.4
+"""Largest error that is told from larger ones, as a part of the object's size."""
+FITS, FAILS = 0.06, 0.14
+"""Misfit up to which an object is taken to be its own image, and from which it is not."""
+FINE = 3
+"""Points along a pixel when the turned front is drawn."""
+
+
+@dataclass(frozen=True)
+class HalfTurn:
+    """The back of an object by a half turn."""
+
+    thickness: Array
+    """[H, W] float32 along the camera ray, scene units; 0 outside the mask."""
+    misfit: float
+    """How badly the best turned front fits the visible one and the mask, as a part of the object's size."""
+    up: Array
+    """[3] unit: the axis' direction, camera frame."""
+    foot: Array
+    """[3] a point of the axis, at the lowest visible height, scene units."""
+
+    @property
+    def trust(self) -> float:
+        """In [0, 1]: 1 where the object is its own image as far as can be seen."""
+        return float(np.clip((FAILS - self.misfit) / (FAILS - FITS), 0, 1))
+
+
+def half_turn(
+    depth: Array, normal: Array, mask: Array, guess: Array, camera: Camera, *, up: Array | None = None
+) -> HalfTurn:
+    """The thickness of an object, were it its own image after half a turn about an upright axis.
+
+    Args:
+        depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
+        guess: [H, W] another estimate of the thickness, scene units: which axis, of those that fit, is left to it.
+        up: [3] unit, the upright direction in the camera's frame, where a support tells it; else the camera is taken
+            not to lean sideways, and the angle at which it looks down is found with the axis.
+
+    Raises:
+        InputError: maps of different sizes, or a mask without any surface.
+    """
+    inside = surface_in(mask, depth, camera)
+    rays = pixel_rays(camera).astype(np.float64)
+    fit = _Fit(depth, normal, inside, guess, rays, None if up is None else np.asarray(up, np.float64))
+    misfit, _ = fit.search(fit.strangeness)
+    _, axis = fit.search(fit.difference)
+    return HalfTurn(_thickness(np.asarray(depth, np.float64), inside, rays, axis), misfit, axis.up, axis.foot)
+
+
+def upright(depth: Array, normal: Array, plane: Array, camera: Camera) -> Array | None:
+    """[3] unit, camera frame: across the largest plane that faces upwards, or None.
+
+    depth [H, W] planar, normal [H, W, 3] unit, plane [H, W] int: the plane of a pixel, -1 for none.
+    """
+    points = pixel_rays(camera).astype(np.float64) * np.asarray(depth, np.float64)[..., None]
+    best, most = None, 12
+    for k in np.unique(plane[plane >= 0]):
+        own = (plane == k) & (depth > 0)
+        mean = normal[own].mean(0) if own.any() else np.zeros(3)
+        if own.sum() > most and mean[1] > 0.6 * max(float(np.linalg.norm(mean)), 1e-9):
+            offset = points[own][:: max(1, int(own.sum()) // 4000)]
+            across = np.linalg.svd(offset - offset.mean(0), full_matrices=False)[2][-1]
+            across = across * np.sign(across @ mean or 1.0)
+            if across[1] > 0.6:
+                best, most = across, int(own.sum())
+    return best
+
+
+@dataclass(frozen=True)
+class _Axis:
+    up: Array
+    """[3] unit."""
+    foot: Array
+    """[3] scene units."""
+    base: bool
+    """Whether the object ends at a plane through `foot`."""
+
+    def turned(self, points: Array) -> Array:
+        """[N, 3] points after half a turn."""
+        offset = points - self.foot
+        return 2 * (offset @ self.up)[:, None] * self.up - offset + self.foot
+
+    def base_depth(self, rays: Array) -> Array:
+        """[...] planar depth at which rays [..., 3] (z = -1) pass the base downwards; inf where they do not."""
+        falling = rays @ self.up
+        reached = float(self.foot @ self.up) / np.where(falling < -1e-6, falling, -1e-6)
+        return np.where(self.base & (falling < -1e-6) & (reached > 0), reached, np.inf)
+
+
+class _Fit:
+    """The object at few pixels, and how well an axis fits it."""
+
+    def __init__(self, depth: Array, normal: Array, inside: Array, guess: Array, rays: Array, up: Array | None):
+        rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
+        step = max(1, round(max(np.ptp(rows), np.ptp(columns)) / COARSE))
+        part = np.s_[rows[0] : rows[-1] + 1 : step, columns[0] : columns[-1] + 1 : step]
+        self.up, self.size = up, object_size(inside, depth, rays)
+        self.inside, self.rays = inside[part], rays[part]
+        self.depth, self.guess = (np.asarray(v, np.float64)[part] for v in (depth, guess))
+        self.step = spacing(self.rays)
+        self.length = np.linalg.norm(self.rays, axis=-1)
+        self.points = (self.rays * self.depth[..., None])[self.inside]  # [N, 3]
+        self.normals = np.asarray(normal, np.float64)[part][self.inside]  # [N, 3]
+        self.facing = np.clip(-(np.asarray(normal)[part] * self.rays).sum(-1) / self.length, 0.06, 1)
+        self._borders()
+
+    def _borders(self) -> None:
+        from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+        self.away = distance_transform_edt(~np.pad(self.inside, 1))[1:-1, 1:-1]
+        border = border_distance(self.inside)
+        # Left and right only: above and below, what is seen turned is not what the rays leave by.
+        field = gaussian_filter(np.pad(self.inside.astype(float), 3), 1.5)
+        down, right = (g[3:-3, 3:-3] for g in np.gradient(field))
+        self.rim = self.inside & (border < 1.7) & (np.abs(right) > SIDEWAYS * np.hypot(right, down))
+        # At distance e from a silhouette with a round section the front lies e cos / (1 - sin) before it.
+        before = border * self.depth * self.step * self.facing / (1 - np.sqrt(1 - self.facing**2) + 1e-6)
+        self.widest = np.minimum(2 * before, GAP * self.size)  # [h, w] gap next to the silhouette, at most
+
+    def axis(self, values: Array) -> _Axis:
+        """The axis of parameters (right, behind) in units of the object's size, and the tilt in radians."""
+        up = np.array([0, np.cos(values[2]), np.sin(values[2])]) if self.up is None else self.up
+        centre = np.array([*self.points[:, :2].mean(0), np.median(self.points[:, 2])])
+        foot = centre + self.size * np.array([values[0], 0, -values[1]])
+        height = self.points @ up
+        low = float(np.percentile(height, 1))
+        bottom = height < low + 0.06 * np.ptp(height)
+        base = bool(np.median(self.facing[self.inside][bottom]) > EDGED)
+        return _Axis(up, foot + (low - foot @ up) * up, base)
+
+    def strangeness(self, axis: _Axis) -> float:
+        """How little the turned front goes with the mask and the front, as a part of the object's size."""
+        wrong, gap = self._against(axis)
+        more = np.clip((gap - self.widest) / self.size, 0, GAP)[self.rim]
+        return 2 * wrong + (float(np.where(np.isfinite(more), more, GAP).mean()) if len(more) else 0.0)
+
+    def difference(self, axis: _Axis) -> float:
+        """The same, but for the guess in place of the silhouette: relative to the guessed thickness."""
+        wrong, gap = self._against(axis)
+        told = self.inside & np.isfinite(gap)
+        off = np.abs(np.maximum(gap, 0) - self.guess)[told].sum() / max(float(self.guess[told].sum()), 1e-9)
+        return 2 * wrong + min(off, 3.0) + 0.3 * float((self.inside & ~told).sum() / self.inside.sum())
+
+    def _against(self, axis: _Axis) -> tuple[float, Array]:
+        """What of the turned front lies outside the mask or before the front, and [h, w] the gap between the two."""
+        back = axis.turned(self.points)
+        z = np.maximum(-back[:, 2], 1e-9)
+        x = (back[:, 0] / z - self.rays[0, 0, 0]) / self.step
+        y = (self.rays[0, 0, 1] - back[:, 1] / z) / self.step
+        height, width = self.inside.shape
+        i, j = np.clip(np.round(y).astype(int), 0, height - 1), np.clip(np.round(x).astype(int), 0, width - 1)
+        beyond = np.maximum(np.abs(y - i), np.abs(x - j)) - 0.5
+        pixel = self.step * float(np.median(-self.points[:, 2])) / self.size
+        outside = np.minimum((np.maximum(beyond, 0) + self.away[i, j]) * pixel, GAP)
+        before = np.clip((self.depth[i, j] - z) / self.size, 0, GAP) * self.inside[i, j]
+        exits = np.full(self.inside.shape, -np.inf)
+        np.maximum.at(exits, (i, j), z)
+        exits = np.minimum(_spread(exits), axis.base_depth(self.rays))
+        return float(outside.mean() + 2 * before.mean()), (exits - self.depth) * self.length
+
+    def _unturned(self, axis: _Axis) -> float:
+        """How far normals are from meeting the axis, as those of a lathed body do; it tells the tilt of such a one."""
+        across = np.cross(axis.up, self.points - axis.foot)
+        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+        return float(np.abs((self.normals * across).sum(-1)).mean())
+
+    def search(self, measure: Callable[[_Axis], float]) -> tuple[float, _Axis]:
+        """The axis at which a measure is least, and its value there, by simplex searches from a few places."""
+        from scipy.optimize import minimize
+
+        def cost(values: Array) -> float:
+            axis = self.axis(values)
+            if self.up is not None:
+                return measure(axis)
+            looking = max(0.0, abs(values[2] - STEEPEST_VIEW / 2) - STEEPEST_VIEW / 2)
+            return measure(axis) + looking + 0.3 * min(self._unturned(axis), 0.3)
+
+        starts = [np.array([0.0, b, t]) for b in (0.1, 0.3, 0.5) for t in (TILTS if self.up is None else TILTS[:1])]
+        steps = np.diag([0.08, 0.12, 0.12])
+        best: tuple[float, Array] = (np.inf, starts[0])
+        for start in sorted(starts, key=cost)[:3]:
+            options = {
+                "maxfev": 120,
+                "xatol": 2e-3,
+                "fatol": 1e-4,
+                "initial_simplex": np.stack([start, *(start + steps)]),
+            }
+            found = minimize(cost, start, method="Nelder-Mead", options=options)
+            best = min(best, (float(found.fun), found.x), key=lambda pair: pair[0])
+        axis = self.axis(best[1])
+        return measure(axis), axis
+
+
+def _spread(exits: Array) -> Array:
+    """[h, w] with empty pixels (-inf) taking the largest of their neighbours."""
+    from scipy.ndimage import maximum_filter
+
+    return np.where(np.isfinite(exits), exits, maximum_filter(exits, 3))
+
+
+def _thickness(depth: Array, inside: Array, rays: Array, axis: _Axis) -> Array:
+    """[H, W] float32: the turned front drawn pixel by pixel, its gaps spanned, cut at the base."""
+    exits = _drawn(depth, inside, rays, axis)
+    drawn = inside & (exits > 0)
+    length = np.linalg.norm(rays, axis=-1)
+    if axis.base:
+        # The walls go on down to the base.
+        exits = np.minimum(membrane(exits, drawn), axis.base_depth(rays))
+        squared = np.maximum((exits - depth) * length, 0) ** 2
+    else:
+        # At a silhouette that turns away the thickness ends; squares change evenly there.
+        squared = membrane(np.maximum((exits - depth) * length, 0) ** 2, drawn | ~inside)
+    return np.where(inside, np.sqrt(np.maximum(squared, 0)), 0).astype(np.float32)
+
+
+def _drawn(depth: Array, inside: Array, rays: Array, axis: _Axis) -> Array:
+    """[H, W] largest planar depth of the turned front in each pixel, 0 for none."""
+    import cv2
+
+    log_depth = membrane(np.log(np.where(inside, depth, 1)), inside).astype(np.float32)
+    large = np.exp(cv2.resize(log_depth, None, fx=FINE, fy=FINE, interpolation=cv2.INTER_LINEAR))
+    kept = cv2.resize(inside.astype(np.uint8), None, fx=FINE, fy=FINE, interpolation=cv2.INTER_NEAREST) > 0
+    i, j = np.nonzero(kept)
+    step = spacing(rays)
+    right = rays[0, 0, 0] + ((j + 0.5) / FINE - 0.5) * step
+    above = rays[0, 0, 1] - ((i + 0.5) / FINE - 0.5) * step
+    own = np.stack([right, above, -np.ones(len(i))], -1) * large[i, j][:, None].astype(np.float64)
+    back = axis.turned(own)
+    z = np.maximum(-back[:, 2], 1e-9)
+    column = np.round((back[:, 0] / z - rays[0, 0, 0]) / step).astype(int)
+    row = np.round((rays[0, 0, 1] - back[:, 1] / z) / step).astype(int)
+    there = (column >= 0) & (column < depth.shape[1]) & (row >= 0) & (row < depth.shape[0])
+    exits = np.zeros(depth.shape)
+    np.maximum.at(exits, (row[there], column[there]), z[there])
+    return exits
