@@ -182,9 +182,20 @@ def test_what_is_behind_its_surroundings_is_no_object():
     normal = np.tile(np.float32([0, 0, 1]), (48, 64, 1))
     mesh = depth_to_mesh(depth, normal, camera)
     taken = depth == 3
-    assert (find_objects(mesh, depth, taken).label == -1).all()
-    found = find_objects(mesh, 12 - depth, ~taken)  # the other way round it stands before them
-    assert found.label.max() == -1 or (found.label[taken] >= 0).mean() < 1
+    assert (find_objects(mesh, depth, normal, taken).label == -1).all()
+    before = np.where(taken, 9.0, 3.0)  # the other way round it stands before them
+    found = find_objects(depth_to_mesh(before, normal, camera), before, normal, taken)
+    np.testing.assert_array_equal(found.label, np.where(taken, -1, 0))
+    assert found.free.all() and len(found.border) == 2 * (24 + 32)
+
+
+def test_a_surface_whose_normals_contradict_it_stays_open():
+    depth, normal, label = maps()
+    normal[label == BALL] = [0, 0, 1]
+    plain = build_geometry(depth, normal, CAMERA, completion="planes").mesh
+    closed = build_geometry(depth, normal, CAMERA, completion="planes,backs").mesh
+    np.testing.assert_array_equal(closed.faces, plain.faces)
+    np.testing.assert_array_equal(closed.vertices, plain.vertices)
 
 
 def test_sections_are_taken_to_be_round():
@@ -193,7 +204,7 @@ def test_sections_are_taken_to_be_round():
     inside = np.isfinite(depth)
     depth = np.where(inside, depth, 0)
     mesh = depth_to_mesh(depth, np.where(inside[..., None], normal, [0, 0, 1]).astype(np.float32), camera)
-    objects = find_objects(mesh, depth, np.zeros_like(inside))
+    objects = find_objects(mesh, depth, normal, np.zeros_like(inside))
     assert objects.label.max() == 0 and objects.free.all()
     thickness = inflated(objects, depth, 1 / camera.focal)
     true = 2 * (20 - depth[inside])

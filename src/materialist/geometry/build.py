@@ -38,7 +38,7 @@ def build_geometry(
     if completion == "planes":
         return Geometry(complete(mesh, planes, depth, camera), label)
     bounds = structural(planes, depth, camera)
-    objects = find_objects(mesh, depth, np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)]))
+    objects = find_objects(mesh, depth, normal, np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)]))
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)

@@ -17,6 +17,10 @@ FREE = 0.3
 touches the floor, is hidden, or is cut by the frame. What lies behind its surroundings has no outline of its own."""
 FRAMED = 0.4
 """Largest share of its outline that may be the picture's frame."""
+CUT_OFF = 0.05
+"""Largest part of the light by its normals that an object may get from below its own faces: an open one lets it in, a
+closed one does not. Exact maps have up to 0.03, at rims; a smooth jug by a network 0.02, its leaves and their gaps,
+which come out as one crumpled patch, 0.12 to 0.19: those stay open."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +39,14 @@ class Objects:
     """[E] bool: beyond the edge there is something farther, or the sky: the object's surface turns away here."""
 
 
-def find_objects(mesh: Mesh, depth: Array, taken: Array) -> Objects:
+def find_objects(mesh: Mesh, depth: Array, normal: Array, taken: Array) -> Objects:
     """Split what lies on no structural plane into objects.
 
-    mesh: of the depth map, from `depth_to_mesh`. depth: [H, W] planar scene units, 0 = none. taken: [H, W] bool, the
-    pixels of floors, walls and table tops.
+    mesh: of the depth map, from `depth_to_mesh`. depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit.
+    taken: [H, W] bool, the pixels of floors, walls and table tops.
 
-    An object is a connected patch of the mesh, cut at depth boundaries, whose outline stands free (`FREE`).
+    An object is a connected patch of the mesh, cut at depth boundaries, whose outline stands free (`FREE`) and whose
+    faces agree with its normals (`CUT_OFF`).
     """
     corner = _corners(mesh, depth > 0)
     label = _patches(corner, (depth > 0) & ~taken)
@@ -49,8 +54,10 @@ def find_objects(mesh: Mesh, depth: Array, taken: Array) -> Objects:
     count, owner = int(label.max(initial=-1)) + 1, label.ravel()[pixel]
     length = np.maximum(np.bincount(owner, minlength=count), 1)
     share = np.stack([np.bincount(owner[kind == k], minlength=count) / length for k in range(4)])  # [4, count]
-    large = np.bincount(label[label >= 0], minlength=count) >= max(LEAST_PIXELS, LEAST_SHARE * label.size)
-    kept = large & (share[_FREE] >= np.maximum(FREE, share[_HIDDEN])) & (share[_FRAME] <= FRAMED)
+    pixels = np.bincount(label[label >= 0], minlength=count)
+    kept = pixels >= max(LEAST_PIXELS, LEAST_SHARE * label.size)
+    kept &= _cut_off(mesh, corner, label, normal, count) <= CUT_OFF * pixels
+    kept &= (share[_FREE] >= np.maximum(FREE, share[_HIDDEN])) & (share[_FRAME] <= FRAMED)
     number = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)  # the last one for no object
     mine = kept[owner]
     return Objects(number[label].astype(np.int32), corner, edges[mine], pixel[mine], kind[mine] == _FREE)
@@ -83,6 +90,19 @@ def _patches(corner: Array, free: Array) -> Array:
         graph = coo_matrix((np.ones(len(row), np.int8), (row, column)), (count, count))
         label[free] = connected_components(graph, directed=False)[1]
     return label
+
+
+def _cut_off(mesh: Mesh, corner: Array, label: Array, normal: Array, count: int) -> Array:
+    """[count] sum over an object's pixels of the part of the light by their normals that comes from below their faces.
+
+    Of a hemisphere weighted by the cosine to n, the part below a plane with the normal m is (1 - n . m) / 2.
+    """
+    inside = label >= 0
+    corners = mesh.vertices[corner[inside]].astype(np.float64)  # [N, 4, 3]
+    facing = np.cross(corners[:, 3] - corners[:, 0], corners[:, 1] - corners[:, 2])  # across the diagonals
+    facing /= np.maximum(np.linalg.norm(facing, axis=-1, keepdims=True), 1e-30)
+    lost = (1 - (facing * normal[inside]).sum(-1)) / 2
+    return np.bincount(label[inside], lost, minlength=count)
 
 
 _NEIGHBOURS = (
