@@ -35,10 +35,11 @@ def build_geometry(
     planes = find_planes(depth, normal, camera, seed=seed)
     for k, plane in enumerate(planes):
         label[plane.mask] = k
-    if completion == "planes":
-        return Geometry(complete(mesh, planes, depth, camera), label)
     bounds = structural(planes, depth, camera)
-    objects = find_objects(mesh, depth, normal, np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)]))
+    taken = np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)])  # [H, W] bool
+    objects = find_objects(mesh, depth, normal, taken) if completion == "planes,backs" else None
+    if objects is None or not (objects.label >= 0).any():
+        return Geometry(complete(mesh, planes, depth, camera), label)
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)
