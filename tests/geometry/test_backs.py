@@ -85,6 +85,27 @@ def test_the_camera_sees_the_same_surface():
     assert same.mean() > 0.95 and (distance > old - 1e-6).all()  # rims alone move, and away
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_random_boards_and_holes(seed):
+    """Boards before a wall, in any order, over the frame's sides, some with holes to the sky."""
+    camera, rng = Camera(30, 22, 45.0), np.random.default_rng(seed)
+    depth = np.full((22, 30), 9.0)
+    for _ in range(6):
+        row, column = rng.integers(-3, 18), rng.integers(-3, 26)
+        board = np.s_[max(row, 0) : row + rng.integers(4, 9), max(column, 0) : column + rng.integers(4, 12)]
+        depth[board] = np.minimum(depth[board], rng.uniform(2, 8))
+    depth[rng.uniform(size=depth.shape) < 0.02] = 0
+    normal = np.tile(np.float32([0, 0, 1]), (22, 30, 1))
+    plain, mesh = (build_geometry(depth, normal, camera, completion=c).mesh for c in ("planes", "planes,backs"))
+    assert (len(mesh.faces) > len(plain.faces)) == (seed > 0)  # those of seed 0 all touch the frame or each other
+    pixels = np.arange(depth.size)
+    at = np.stack([pixels % 30, pixels // 30], -1) + rng.uniform(0.01, 0.99, (depth.size, 2))
+    distance, face = trace(mesh, np.zeros(3), screen_rays(camera, at))
+    np.testing.assert_array_equal(face >= 0, depth.ravel() > 0)
+    np.testing.assert_array_equal(mesh.face_pixel[face[face >= 0]], pixels[face >= 0])
+    np.testing.assert_allclose(distance[face >= 0], depth.ravel()[face >= 0], rtol=0.01)  # rims move a little
+
+
 def loose_edges(mesh, label, thing, plain):
     """How many edges of a thing's added faces no other of its faces runs through backwards, and how many there are.
 
