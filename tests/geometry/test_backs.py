@@ -97,14 +97,14 @@ def test_random_boards_and_holes(seed):
     depth[rng.uniform(size=depth.shape) < 0.02] = 0
     normal = np.tile(np.float32([0, 0, 1]), (22, 30, 1))
     plain, mesh = (build_geometry(depth, normal, camera, completion=c).mesh for c in ("planes", "planes,backs"))
-    assert (len(mesh.faces) > len(plain.faces)) == (seed > 0)  # those of seed 0 all touch the frame or each other
+    assert (len(mesh.faces) > len(plain.faces)) == (seed > 0)  # what stands free with seed 0 is two pixels wide
     pixels = np.arange(depth.size)
     at = np.stack([pixels % 30, pixels // 30], -1) + rng.uniform(0.01, 0.99, (depth.size, 2))
     distance, face = trace(mesh, np.zeros(3), screen_rays(camera, at))
     np.testing.assert_array_equal(face >= 0, depth.ravel() > 0)
     np.testing.assert_array_equal(mesh.face_pixel[face[face >= 0]], pixels[face >= 0])
     before, _ = trace(plain, np.zeros(3), screen_rays(camera, at))
-    np.testing.assert_allclose(distance[face >= 0], before[face >= 0], rtol=0.01)  # rims move a little
+    np.testing.assert_allclose(distance[face >= 0], before[face >= 0], rtol=0.03)  # rims move a little
 
 
 def loose_edges(mesh, label, thing, plain):
