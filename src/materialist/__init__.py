@@ -30,6 +30,7 @@ _HOME = {
     "glass": "edit.glass",
     "remove": "edit.remove",
     "drop": "edit.drop",
+    "settle": "edit.drop_rest",
     "composite": "edit.composite",
     "batch": "batch",
     **dict.fromkeys(
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from materialist.batch.run import batch as batch
     from materialist.edit.composite import composite as composite
     from materialist.edit.drop import drop as drop
+    from materialist.edit.drop_rest import settle as settle
     from materialist.edit.glass import glass as glass
     from materialist.edit.insert import insert as insert
     from materialist.edit.material import edit as edit
