@@ -17,6 +17,7 @@ import numpy as np
 from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
+from materialist.bench.glass_latency import latencies
 from materialist.bench.glass_models import Background
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.color import linear_to_srgb
@@ -34,6 +35,8 @@ COLUMNS = (
     Column("lpips_asymmetric", "LPIPS asymmetric", "lower"),
     Column("thickness_symmetric", "d error symmetric", "lower"),
     Column("thickness_asymmetric", "d error asymmetric", "lower"),
+    Column("seconds", "s", "lower", 2),
+    Column("cpu_seconds", "CPU s", "lower", 2),
 )
 NOTE = (
     "Within the object's mask only, on sRGB-encoded pictures at the exposure of the photo; truth is a path-traced "
@@ -70,23 +73,30 @@ class Case:
 def run(
     *, data: Path | None, output: Path, shapes: int = 2, envmaps: int = 2, iors: str | float = "1.1,1.3",
     background: str = "room", size: int = 128, spp: int = 144, full: bool = False, draws: int = 10, pictures: int = 6,
-    seed: int = 0, device: str = "auto",
+    latency: int = 0, seed: int = 0, device: str = "auto",
 ) -> None:  # fmt: skip
     """Compare the two-interface model and the closed proxy with true glass.
 
     `shapes` objects of each group, each under `envmaps` lights with each of `iors` (comma-separated); `full` is the
     paper's 20 objects x 30 lights x 1.1 and 1.3. `background` is 'room', a patterned floor and wall, or 'envmap',
-    nothing but the light. `draws` noisy thicknesses a case; `pictures` cases are drawn.
+    nothing but the light. `draws` noisy thicknesses a case; `pictures` cases are drawn. `latency`
+    is the size of a picture on which the preview is timed; `shapes` may then be 0.
     """
     from materialist.render.variant import setup
 
     refraction = [float(x) for x in str(iors).split(",")]
     if full:
         shapes, envmaps, refraction = 10, 30, [1.1, 1.3]
-    if min(shapes, envmaps, spp) < 1 or size < 32 or not all(1 < x <= 3 for x in refraction):
+    if (
+        shapes < (not latency)
+        or min(envmaps, spp) < 1
+        or size < 32
+        or not (latency == 0 or latency >= 64)
+        or not all(1 < x <= 3 for x in refraction)
+    ):
         raise InputError(
-            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, size {size}, iors {iors}: give at least 1, 1, 1, 32 "
-            "pixels, and indices of refraction above 1 up to 3."
+            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, size {size}, iors {iors}, latency {latency}: give at "
+            "least 1, 1, 1, 32 pixels, indices of refraction above 1 up to 3, and a latency of 0 or 64 pixels or more."
         )
     if background not in scenes.ENVMAP_ROWS:
         raise InputError(f"The background is {background!r}; choose room or envmap.")
@@ -94,16 +104,19 @@ def run(
     rows: list[dict[str, Any]] = []
     drawn: list[Array] = []
     settings = {"data": None if data is None else str(data), "shapes": shapes, "envmaps": envmaps, "iors": str(iors),
-                "background": background, "size": size, "spp": spp, "seed": seed}  # fmt: skip
+                "background": background, "size": size, "spp": spp, "latency": latency, "seed": seed}  # fmt: skip
     report = Report("Glass", NOTE, settings, COLUMNS, rows, plotted=("psnr_symmetric", "psnr_asymmetric"))
     options: dict[str, Any] = {"background": background, "size": size, "spp": spp, "seed": seed}
-    for case, room in cases(data, shapes, envmaps, refraction, **options):
+    for case, room in cases(data, shapes, envmaps, refraction, **options) if shapes else ():
         found, strip = compared(case, room, spp=spp, draws=draws, seed=seed)
         rows.extend(found)
         if len(drawn) < pictures:
             drawn.append(strip)
             _draw(drawn, output / "sheet.png")
         write(report, output)  # what is there already is worth having when a long run is stopped
+    if latency:
+        rows.extend(latencies(data, latency, spp=16, seed=seed, device=device))
+        write(report, output)
 
 
 def cases(

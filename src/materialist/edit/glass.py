@@ -46,7 +46,9 @@ def glass(
     Raises:
         InputError: an option out of its range, or a mask that cannot be used. WeightsError: a network without weights.
     """
-    _check(ior, transmission, tint, roughness, model)
+    check_glass(ior, transmission, tint, roughness)
+    if model not in MODELS:
+        raise InputError(f"The model is '{model}'; choose one of {', '.join(MODELS)}.")
     own = checked_region(scene, mask) > 0.5
     found = object_thickness(scene, own, thickness) if own.any() else None
     removed = without(
@@ -119,7 +121,8 @@ def _beyond(picture: Array, own: Array) -> Array:
     return picture[rows, columns]
 
 
-def _check(ior: float, transmission: float, tint, roughness: float, model: str) -> None:
+def check_glass(ior: float, transmission: float, tint, roughness: float) -> None:
+    """Raise InputError for values out of range, as of `glass`."""
     if not (np.isfinite(ior) and IOR[0] <= ior <= IOR[1]):
         raise InputError(
             f"The index of refraction is {ior:g}; it must lie in [1, 3] (water 1.33, glass 1.5, diamond 2.4)."
@@ -129,5 +132,3 @@ def _check(ior: float, transmission: float, tint, roughness: float, model: str) 
             raise InputError(f"The {name} is {value:g}; it must lie in [0, 1].")
     if len(tint) != 3 or not all(np.isfinite(c) and 0 <= c <= 1 for c in tint):
         raise InputError(f"The tint is {tint}; it must be three numbers in [0, 1]: linear R, G, B.")
-    if model not in MODELS:
-        raise InputError(f"The model is '{model}'; choose one of {', '.join(MODELS)}.")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from materialist.edit.fireflies import without_fireflies
 from materialist.edit.portrait import Portrait
 from materialist.edit.sparing import FEWEST, Begun, spared
 from materialist.errors import InputError
@@ -124,7 +125,7 @@ def difference(
         return Layers(b, b, differs, changed & differs, raw)
     gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
     if clean:
-        b, e = denoised(b, e, guides)
+        b, e = denoised(b, without_fireflies(e, changed), guides)
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached, raw)

@@ -79,7 +79,7 @@ def portrait(
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
     if clean:
         picture = _denoised(picture, guide)
-    picture = _purified(picture, guide.share)
+    picture = purified(picture, guide.share)
     picture = _enlarged(picture, sight.share.shape)
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
@@ -120,7 +120,7 @@ def _denoised(picture: Array, guide: Any) -> Array:
         return picture
 
 
-def _purified(picture: Array, share: Array) -> Array:
+def purified(picture: Array, share: Array) -> Array:
     """[h, w, 3] without what is behind in pixels at the rim: they take the mean of the covered ones around."""
     import cv2
 

@@ -20,10 +20,12 @@ from materialist.types import Array, Camera
 
 COARSE = 40
 """Pixels along the object while the axis is looked for."""
-TILTS = (0.0, 0.2, 0.4)
+TILTS = (0.05, 0.25, 0.45)
 """Radians that the camera may look down, to start from, where nothing tells the upright direction."""
-STEEPEST_VIEW = 0.6
-"""Radians beyond which looking down costs."""
+LOOKING_DOWN = (0.28, 2.0)
+"""Angle, radians, at which things that stand somewhere are usually seen, and what the square of a deviation costs."""
+LATHED = 0.3
+"""Largest misfit of normals to a lathed body that is told from larger ones: others are not lathed at all."""
 EDGED = 0.35
 """n.v at the object's lower end above which it ends in an edge, at a flat base; below, the surface turns away."""
 SIDEWAYS = 0.85
@@ -202,10 +204,10 @@ class _Fit:
             axis = self.axis(values)
             if self.up is not None:
                 return measure(axis)
-            looking = max(0.0, abs(values[2] - STEEPEST_VIEW / 2) - STEEPEST_VIEW / 2)
-            return measure(axis) + looking + 0.3 * min(self._unturned(axis), 0.3)
+            usual, price = LOOKING_DOWN
+            return measure(axis) + price * (values[2] - usual) ** 2 + min(self._unturned(axis), LATHED)
 
-        starts = [np.array([0.0, b, t]) for b in (0.1, 0.3, 0.5) for t in (TILTS if self.up is None else TILTS[:1])]
+        starts = [np.array([0.0, b, t]) for b in (0.1, 0.3, 0.5) for t in (TILTS if self.up is None else (0.0,))]
         steps = np.diag([0.08, 0.12, 0.12])
         best: tuple[float, Array] = (np.inf, starts[0])
         for start in sorted(starts, key=cost)[:3]:
