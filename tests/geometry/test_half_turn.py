@@ -44,7 +44,7 @@ def test_a_cylinder_seen_from_above(up):
     depth, normal, mask, true = cylinder()
     guess = true * (1 + 0.4 * np.sin(np.arange(80) / 3) * np.cos(np.arange(64) / 4)[:, None])
     found = half_turn(depth, normal, mask, guess, CAMERA, up=up)
-    assert found.misfit < 0.03 and found.trust == 1
+    assert found.misfit < 0.06 and found.trust == 1
     assert np.degrees(np.arccos(np.clip(found.up @ UP, -1, 1))) < 7
     turned = error(found.thickness, true, mask)
     assert turned < 0.15 and turned < 0.9 * error(guess, true, mask)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,8 @@ ENVMAP_ROWS = {"room": 64, "envmap": 256}
 """Light in a room is brought to few rows: small suns make caustics that no affordable picture shows cleanly."""
 BRIGHTEST = 60.0
 """Largest radiance of the light, as a multiple of its mean."""
+LIFT = 0.002
+"""Air between an object and the floor: where two surfaces are one, which of them a ray meets first is an accident."""
 EXPOSED = 0.8
 """Luminance of the brightest fiftieth of the background."""
 
@@ -140,6 +142,7 @@ class GlassScene:
         self.to_scene = view.to_scene
         self.camera = Camera(size, size, view.fov)
         turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
+        turned = replace(turned, vertices=turned.vertices + np.array([0, LIFT, 0]))
         item = scenes.Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0)
         self.item = scenes.in_camera(item, view)
         self.room = [scenes.in_camera(i, view) for i in _room(rng)] if background == "room" else []
