@@ -1,0 +1,75 @@
+"""Which thickness is believed: the turned front for what looks the same from behind, the network for the rest."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays
+from materialist.errors import WeightsError
+from materialist.predict.refraction import choice
+from materialist.predict.refraction.thickness import Thickness
+from materialist.types import Camera
+
+CAMERA = Camera(64, 64, 40.0)
+LEVEL = np.array([0.0, 1, 0])
+
+
+def ball(radius=0.6, distance=3.0):
+    """Depth, normal, mask and thickness of a ball straight ahead."""
+    rays = pixel_rays(CAMERA).astype(float)
+    centre = np.array([0, 0, -distance])
+    a, b = (rays**2).sum(-1), rays @ centre
+    root = b * b - a * (centre @ centre - radius**2)
+    mask = root > 0
+    near = (b - np.sqrt(np.maximum(root, 0))) / a
+    normal = np.where(mask[..., None], (rays * near[..., None] - centre) / radius, [0, 0, 1])
+    thick = np.where(mask, 2 * np.sqrt(np.maximum(root, 0)) / a * np.linalg.norm(rays, axis=-1), 0)
+    return np.where(mask, near, 5.0), normal, mask, thick
+
+
+@pytest.fixture
+def network(monkeypatch):
+    """Lets RefractionNet say what a test wants."""
+
+    def say(solid):
+        monkeypatch.setattr(choice, "thickness", lambda *_: Thickness(solid, 0.3 * solid))
+
+    return say
+
+
+def chosen(depth, normal, mask, **options):
+    return choice.best_thickness(np.full((64, 64, 3), 0.5, np.float32), mask, normal, depth, CAMERA, **options)
+
+
+def test_a_rough_guess_becomes_the_back_of_the_ball(network):
+    depth, normal, mask, true = ball()
+    wave = 1 + 0.3 * np.sin(np.arange(64) / 2)
+    network((true * wave).astype(np.float32))
+    found = chosen(depth, normal, mask, up=LEVEL)
+    assert found.method == "half-turn"
+    error = np.abs(found.thickness.solid - true)[mask].sum() / true[mask].sum()
+    assert error < 0.12 < np.abs(wave - 1).mean()
+    assert (found.thickness.hollow <= found.thickness.solid).all() and found.thickness.hollow.max() > 0
+
+
+def test_where_they_disagree_and_the_turn_does_not_fit_the_network_is_believed(network):
+    depth, normal, mask, true = ball()
+    rows, columns = np.mgrid[:64, :64]
+    boot = mask & ((columns > 32) | (rows > 32))
+    steep = np.where(columns > 32, 4.0, 0.25) * true * boot
+    network(steep.astype(np.float32))
+    found = chosen(depth, normal, boot, up=LEVEL)
+    assert found.method == "network"
+    np.testing.assert_array_equal(found.thickness.solid, steep.astype(np.float32))
+    assert chosen(depth, normal, boot, up=LEVEL, prefer="half-turn").method == "half-turn"
+
+
+def test_without_weights_the_mirror_is_the_guess(monkeypatch):
+    def missing(*_):
+        raise WeightsError("none")
+
+    monkeypatch.setattr(choice, "thickness", missing)
+    depth, normal, mask, true = ball()
+    found = chosen(depth, normal, mask)
+    assert found.method in ("half-turn", "symmetry")
+    assert np.abs(found.thickness.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    assert (found.thickness.hollow == 0).all()
