@@ -12,12 +12,29 @@ from materialist.types import Array, Scene
 _INNER, _OUTER = 0.02, 0.22
 """How far the border may move inwards and outwards, as a share of the longer side; thin parts stick out."""
 
+_PASSES = 3
+"""How often the band follows the border: a first pass stops at a shadow, whose far side the next one can reach."""
+_SETTLED = 0.98
+"""Overlap of two passes from which a third would change nothing."""
+
 _GAP = 0.015
 """Half of the gap across which two parts are one, as a share of the longer side."""
 
 
 def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool: the rough mask with its border moved, within a band, to where colour and depth change."""
+    """[H, W] bool: the rough mask with its border moved to where colour and depth change, a band at a time."""
+    mask = _moved(scene, rough, points)
+    for _ in range(_PASSES - 1):
+        wider = _moved(scene, mask, points)
+        settled = _overlap(wider, mask) > _SETTLED
+        mask = wider
+        if settled:
+            break
+    return mask
+
+
+def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool: the rough mask with its border moved within a band."""
     import cv2
 
     mask = rough.astype(np.uint8)
@@ -29,8 +46,12 @@ def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Ar
         label[y, x] = cv2.GC_FGD
     found = tidy(grabcut(scene, label.astype(np.uint8)), points)
     # GrabCut can lose an object whose colours are those of its surroundings; the rough mask is then better.
-    overlap = (found & rough).sum() / max((found | rough).sum(), 1)
-    return found if overlap > 0.6 else tidy(rough, points)
+    return found if _overlap(found, rough) > 0.6 else tidy(rough, points)
+
+
+def _overlap(a: Array, b: Array) -> float:
+    """Intersection over union of two masks [H, W]."""
+    return float((a & b).sum() / max((a | b).sum(), 1))
 
 
 def _disc(share: float, mask: Array) -> Array:
