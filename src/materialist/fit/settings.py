@@ -115,7 +115,7 @@ DEFAULT = FitSettings(
         clipped=True,
         delta=1.0,
         weights=(0.02, 0.01, 0.021),
-        smooth=(0.002, 0.01, 0.01),
+        smooth=(0.002, 0.1, 0.03),
         stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
         other_metallic=0.95,
     ),
