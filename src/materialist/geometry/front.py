@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from materialist.geometry.symmetry import border_distance, spacing
+from materialist.geometry.slopes import slopes
+from materialist.geometry.symmetry import border_distance
 from materialist.types import Array
 
 REACH = 0.25
 """Depth decides over lengths above this part of the object's size, normals below. Networks give the slant of a surface
 better than its relief, which is flat and noisy; where both are exact they agree."""
-STEEPEST = 0.12
-"""Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
 RIM = 1.5
 """Pixels from the silhouette whose depth is not believed: there a depth map mixes the object with what is behind."""
 
@@ -36,7 +35,7 @@ def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smo
     size = float(np.sqrt(inside.sum()))
     if inside.sum() < 9:
         return np.asarray(depth, np.float64)
-    slope_x, slope_y = _slopes(_blurred_normals(normal, inside, smooth * size), rays)
+    slope_x, slope_y = slopes(_blurred_normals(normal, inside, smooth * size), rays)
     log_depth = np.log(np.where(inside, depth, 1).astype(np.float64))
     index = np.cumsum(inside.ravel()).reshape(inside.shape) - 1
     first, second, wanted, weight = _pairs(inside, index, log_depth, slope_x, slope_y)
@@ -51,14 +50,6 @@ def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smo
     out = np.asarray(depth, np.float64).copy()
     out[inside] = np.exp(log_depth[inside] + np.clip(change, -0.5, 0.5))
     return out
-
-
-def _slopes(normal: Array, rays: Array) -> tuple[Array, Array]:
-    """[H, W] change of log depth from one pixel to the next, to the right and downwards."""
-    length = np.linalg.norm(rays, axis=-1)
-    facing = np.minimum((normal * rays).sum(-1), -STEEPEST * length)  # n . r < 0 where the surface is seen
-    per_pixel = spacing(rays)
-    return -normal[..., 0] * per_pixel / facing, normal[..., 1] * per_pixel / facing
 
 
 def _pairs(inside: Array, index: Array, log_depth: Array, slope_x: Array, slope_y: Array):

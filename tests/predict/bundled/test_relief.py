@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays
-from materialist.predict.bundled.relief import excess, slopes_of, with_relief
+from materialist.geometry.slopes import slopes
+from materialist.predict.bundled.relief import excess, with_relief
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 50.0)
@@ -25,7 +26,7 @@ def test_texture_printed_onto_a_plane_is_gone(normal):
     true, normals = _plane(normal, 1.5)
     assert np.isfinite(true).all()
     printed = true + np.random.default_rng(0).choice([-0.01, 0, 0.02], true.shape).astype(np.float32)
-    assert excess(true, np.ones(true.shape, bool), slopes_of(normals, RAYS), 5).max() < 2e-3  # trapezoids
+    assert excess(true, np.ones(true.shape, bool), slopes(normals, RAYS), 5).max() < 2e-3  # trapezoids
     found = with_relief(true, printed, normals, RAYS, reach=5)
     assert np.abs(found - true).max() < 2e-3
     # The same print in what has no edge elsewhere either: normals win in the small, depth keeps the level.

@@ -11,10 +11,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from materialist.geometry.slopes import slopes
 from materialist.types import Array
 
-STEEPEST = 0.12
-"""Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
 STEP = (0.02, 0.05)
 """Change of log depth within reach, beyond that of the slopes, that is surely none, and surely an edge."""
 BREAK = 0.008
@@ -48,13 +47,13 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     known = np.isfinite(coarse) & np.isfinite(sharp)
     if known.sum() < 9:
         return sharp
-    slopes = slopes_of(normal, rays)
-    change = excess(coarse, known, slopes, reach)
+    demanded = slopes(normal, rays)
+    change = excess(coarse, known, demanded, reach)
     edge = np.clip((change - STEP[0]) / (STEP[1] - STEP[0]), 0, 1) ** 2
     target = np.where(known, edge * np.nan_to_num(sharp) + (1 - edge) * np.nan_to_num(coarse), 0).astype(np.float64)
     index = np.cumsum(known.ravel()).reshape(known.shape) - 1
     count = int(known.sum())
-    first, second, wanted, weight = _pairs(known, index, target, slopes, change)
+    first, second, wanted, weight = _pairs(known, index, target, demanded, change)
     rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
     step = coo_matrix((np.r_[-root, root], (rows, np.r_[first, second])), (len(first), count)).tocsr()
     system = (step.T @ step + diags(np.full(count, LENGTH**-2))).tocsr()
@@ -64,13 +63,13 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     return found
 
 
-def excess(coarse: Array, known: Array, slopes: tuple[Array, Array], reach: int) -> Array:
+def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: int) -> Array:
     """[H, W] change of log depth within reach of a pixel, along a row or a column, that the normals do not explain.
 
     Infinite next to where the surface ends, whose outline stays as it is.
     """
     most = np.zeros(coarse.shape, np.float32)
-    for axis, slope in ((1, slopes[0]), (0, slopes[1])):
+    for axis, slope in ((1, demanded[0]), (0, demanded[1])):
         own = np.zeros(coarse.shape, np.float32)
         near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
         both = known[near] & known[far]
@@ -82,20 +81,10 @@ def excess(coarse: Array, known: Array, slopes: tuple[Array, Array], reach: int)
     return np.where(ending, np.inf, most).astype(np.float32)
 
 
-def slopes_of(normal: Array, rays: Array) -> tuple[Array, Array]:
-    """[H, W] change of log depth from one pixel to the next, to the right and downwards."""
-    across = float(rays[0, -1, 0] - rays[0, 0, 0]) / max(rays.shape[1] - 1, 1)
-    down = float(rays[-1, 0, 1] - rays[0, 0, 1]) / max(rays.shape[0] - 1, 1)
-    facing = normal[..., 0] * rays[..., 0] + normal[..., 1] * rays[..., 1] - normal[..., 2]
-    length = np.sqrt((rays**2).sum(-1) + 1)
-    facing = np.minimum(facing, -STEEPEST * length)  # n . r < 0 where the surface is seen
-    return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
-
-
-def _pairs(known: Array, index: Array, target: Array, slopes: tuple[Array, Array], change: Array) -> tuple[Any, ...]:
+def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> tuple[Any, ...]:
     """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
     parts = []
-    for axis, slope in ((1, slopes[0]), (0, slopes[1])):
+    for axis, slope in ((1, demanded[0]), (0, demanded[1])):
         near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
         both = known[near] & known[far]
         wanted = ((slope[near] + slope[far]) / 2 - (target[far] - target[near]))[both]
