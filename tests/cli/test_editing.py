@@ -149,6 +149,8 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         ([*RELIGHT, "--lamp", "1,2,3,99999,1"], "99999"),
         ([*RELIGHT, "--rotate", "9", "--frames", "4"], ".mp4"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "1", "-o", "OUT"], "frames is 1"),
+        (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--full-render", "--spp", "0", "-o", "OUT"], "--spp"),
+        (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--fps", "0", "-o", "OUT"], "--fps"),
         (["apply", "SCENE", "bad.yaml", "-o", "OUT.png"], "shininess"),
         (["apply", "SCENE", "none.yaml", "-o", "OUT.png"], "none.yaml"),
         (["select", "SCENE", "--click", "1,1", "-o", "OUT.exr"], ".png"),

@@ -7,17 +7,20 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
-from materialist.cli.picture import (
+from materialist.cli.options import (
     Denoise,
+    Device,
+    DeviceOption,
+    Force,
     FullRender,
+    Json,
     PictureOutput,
     Save,
     SceneArgument,
+    Seed,
     Spp,
-    check_before,
-    write_result,
 )
+from materialist.cli.picture import check_before, write_result
 
 
 def register(app: typer.Typer) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.options import Device, DeviceOption, FieldOfView, Json, Seed, WorkingSize, output_option
 from materialist.cli.outcome import INTERRUPTED, report_success
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def batch(
         str,
         typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUNS", help="Folder of the results.")],
+    output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
     apply: Annotated[
         Path | None,
         typer.Option(metavar="EDITS", help="Edits for every photo; {name} in a mask's file name is the photo's."),
@@ -39,8 +39,8 @@ def batch(
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster, or local.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in RUNS.")] = False,
     predictor: Annotated[str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")] = "auto",
-    fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
-    size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
+    fov: FieldOfView = "auto",
+    size: WorkingSize = 512,
     spp: Annotated[int, typer.Option(help="Paths per pixel of the edits' renderings.")] = 256,
     seed: Seed = 0,
     device: DeviceOption = Device.auto,

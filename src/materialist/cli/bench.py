@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.options import Device, DeviceOption, Json, Seed, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
 
@@ -24,7 +24,7 @@ def bench(
         str,
         typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass, edit, studio."),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="Folder for the report.")],
+    output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,
     seed: Seed = 0,
     device: DeviceOption = Device.auto,

@@ -8,11 +8,23 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.options import (
+    MESH_FILES,
+    Denoise,
+    Device,
+    DeviceOption,
+    Force,
+    FramesPerSecond,
+    FullRender,
+    Json,
+    MeshMaterial,
+    SceneArgument,
+    Seed,
+    output_option,
+)
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import Denoise, FullRender, SceneArgument, numbers
+from materialist.cli.picture import check_paths, check_video, numbers
 from materialist.cli.progress import StageProgress
-from materialist.errors import InputError
 
 
 def register(app: typer.Typer) -> None:
@@ -22,17 +34,17 @@ def register(app: typer.Typer) -> None:
 
 def drop(
     scene: SceneArgument,
-    meshes: Annotated[list[Path], typer.Argument(metavar="MESH...", help="OBJ, PLY, STL, glTF or GLB.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A .mp4, or a folder of frames.")],
+    meshes: Annotated[list[Path], typer.Argument(metavar="MESH...", help=MESH_FILES)],
+    output: Annotated[Path, output_option("OUT", "A .mp4, or a folder of frames.")],
     at: Annotated[
         list[str], typer.Option("--at", metavar="X,Y", help="Over which pixel of the working size; one, or one each.")
     ],
     frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
-    fps: Annotated[int, typer.Option(help="Frames per second.")] = 24,
+    fps: FramesPerSecond = 24,
     height: Annotated[float, typer.Option(help="Over the ground, in longest sides.")] = 1.5,
     spin: Annotated[float, typer.Option(help="Turns per second about an axis that the seed chooses.")] = 0.3,
     scale: Annotated[float, typer.Option(help="Factor on the size; 1 is a sixth of the picture's width there.")] = 1.0,
-    material: Annotated[str, typer.Option(help="as-is, glass, mirror, R,G,B (linear) or #rrggbb.")] = "as-is",
+    material: MeshMaterial = "as-is",
     gravity: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="Its direction in the camera frame: X right, Y up, Z back.")
     ] = None,
@@ -53,16 +65,13 @@ def drop(
     from materialist.edit.composite import developed
     from materialist.edit.drop import drop as simulate
     from materialist.edit.film import filmed
-    from materialist.edit.frames import ensure_video_writable, write_frames
+    from materialist.edit.frames import write_frames
     from materialist.edit.meshes import read_model
     from materialist.io.package import load_scene, save_scene
     from materialist.io.target import ensure_writable
 
-    if not 2 <= spp <= 1_000_000:
-        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
-    if not 1 <= fps <= 120:
-        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
-    ensure_video_writable(output, force=force)
+    check_paths(spp)
+    check_video(output, fps, force)
     if save is not None:
         ensure_writable(save, force)
     start = time.monotonic()

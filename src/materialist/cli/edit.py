@@ -7,23 +7,25 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
-from materialist.cli.picture import (
+from materialist.cli.options import (
     Box,
     Clicks,
     Denoise,
+    Device,
+    DeviceOption,
+    Force,
     FullRender,
+    Json,
     MaskFile,
     Method,
     PictureOutput,
     Save,
     SceneArgument,
+    Seed,
     Spp,
     With,
-    check_before,
-    chosen_region,
-    write_result,
 )
+from materialist.cli.picture import check_before, chosen_region, write_result
 from materialist.errors import InputError
 
 

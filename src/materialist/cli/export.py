@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Force, Json
+from materialist.cli.options import Force, Json, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 
 
@@ -28,12 +28,10 @@ def register(app: typer.Typer) -> None:
 
 
 def export(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")],
+    scene: SceneArgument,
     output: Annotated[
         Path,
-        typer.Option(
-            "-o", "--output", metavar="OUT", help="NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba)."
-        ),
+        output_option("OUT", "NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba)."),
     ],
     to: Annotated[Format, typer.Option("--to", help="Format.")],
     max_triangles: Annotated[

@@ -7,27 +7,28 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
-from materialist.cli.picture import (
+from materialist.cli.options import (
     Background,
     Box,
     Clicks,
     Denoise,
+    Device,
+    DeviceOption,
+    Force,
     FullRender,
     Inpainter,
+    Json,
     MaskFile,
     Method,
     PictureOutput,
     Save,
     SceneArgument,
+    Seed,
     Shadow,
     Spp,
     With,
-    check_before,
-    chosen_inpainter,
-    chosen_region,
-    write_result,
 )
+from materialist.cli.picture import check_before, chosen_inpainter, chosen_region, write_result
 
 
 class Model(StrEnum):

@@ -7,18 +7,22 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
-from materialist.cli.picture import (
+from materialist.cli.options import (
+    MESH_FILES,
     Denoise,
+    Device,
+    DeviceOption,
+    Force,
     FullRender,
+    Json,
+    MeshMaterial,
     PictureOutput,
     Save,
     SceneArgument,
+    Seed,
     Spp,
-    check_before,
-    numbers,
-    write_result,
 )
+from materialist.cli.picture import check_before, numbers, write_result
 
 
 def register(app: typer.Typer) -> None:
@@ -28,14 +32,14 @@ def register(app: typer.Typer) -> None:
 
 def insert(
     scene: SceneArgument,
-    mesh: Annotated[Path, typer.Argument(metavar="MESH", help="OBJ, PLY, STL, glTF or GLB.")],
+    mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
     output: PictureOutput,
     at: Annotated[
         list[str], typer.Option("--at", metavar="X,Y", help="Where it stands, at working size; several: one each.")
     ],
     scale: Annotated[float, typer.Option(help="Factor on its size; 1 is a sixth of the picture's width there.")] = 1.0,
     turn: Annotated[float, typer.Option(metavar="DEG", help="Turn about its up axis.")] = 0.0,
-    material: Annotated[str, typer.Option(help="as-is, glass, mirror, R,G,B (linear) or #rrggbb.")] = "as-is",
+    material: MeshMaterial = "as-is",
     size: Annotated[float | None, typer.Option(help="Its longest side in scene units, in place of the sixth.")] = None,
     up: Annotated[str, typer.Option(help="Axis of the file that points up: y, z; auto: z for STL.")] = "auto",
     spp: Spp = 256,

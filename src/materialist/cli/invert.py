@@ -13,11 +13,14 @@ from materialist.cli.options import (
     Device,
     DeviceOption,
     Engine,
+    FieldOfView,
     Force,
     Json,
     Preset,
     Seed,
     Strategy,
+    WorkingSize,
+    output_option,
     parse_size,
 )
 from materialist.cli.outcome import report_success
@@ -32,7 +35,7 @@ def register(app: typer.Typer) -> None:
 
 def invert(
     photo: Annotated[str, typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...).")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE", help="The scene package, a folder.")],
+    output: Annotated[Path, output_option("SCENE", "The scene package, a folder.")],
     predictor: Annotated[
         str,
         typer.Option(
@@ -52,8 +55,8 @@ def invert(
         Engine.transport
     ),
     preset: Annotated[Preset, typer.Option(help="Our schedule, or the paper's to the letter.")] = Preset.default,
-    fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
-    size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
+    fov: FieldOfView = "auto",
+    size: WorkingSize = 512,
     envmap_size: Annotated[str, typer.Option(metavar="WxH", help="Size of the environment map.")] = "512x256",
     completion: Annotated[Completion, typer.Option(help="Continue planes beyond what is seen, give objects backs.")] = (
         Completion.planes_backs

@@ -1,52 +1,16 @@
-"""What the editing commands share: options, and the way from an edited scene to a file."""
+"""What the editing commands share: the way from their options to a region, and from an edited scene to a file."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
+from materialist.cli.options import Method
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
-
-
-class Method(StrEnum):
-    """How a region is found."""
-
-    grabcut = "grabcut"
-    sam2 = "sam2"
-
-
-SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
-PictureOutput = Annotated[
-    Path, typer.Option("-o", "--output", metavar="OUT", help="A .png (as deep as the photo) or .exr (linear, HDR).")
-]
-Clicks = Annotated[
-    list[str] | None,
-    typer.Option("--click", metavar="X,Y", help="A pixel of the object, at working size; more than one helps."),
-]
-Box = Annotated[str | None, typer.Option("--box", metavar="X0,Y0,X1,Y1", help="A box around the object.")]
-MaskFile = Annotated[Path | None, typer.Option("--mask", metavar="PNG", help="The region: white inside.")]
-With = Annotated[Method, typer.Option("--with", help="grabcut needs nothing; sam2 needs its weights.")]
-Spp = Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")]
-Denoise = Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")]
-FullRender = Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")]
-Save = Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")]
-
-Background = Annotated[
-    Path | None, typer.Option(metavar="PNG", help="The same view without the object, in place of inpainting.")
-]
-Inpainter = Annotated[
-    str | None, typer.Option("--inpaint", metavar="sd:MODEL", help="A diffusion model: a folder, or owner/name.")
-]
-Shadow = Annotated[
-    float, typer.Option(help="Repaint the ground around it by this share of its size: shadows that stayed there.")
-]
 
 
 def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
@@ -82,13 +46,27 @@ def chosen_inpainter(text: str | None, seed: int, device: str) -> Any:
     return inpainter(text, seed=seed, device=device)
 
 
+def check_paths(spp: int) -> None:
+    """Raises InputError unless two renderings of `spp` paths a pixel can be compared."""
+    if not 2 <= spp <= 1_000_000:
+        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
+
+
+def check_video(output: Path, fps: int, force: bool) -> None:
+    """Everything about a video that can be wrong, before the work starts."""
+    from materialist.edit.frames import ensure_video_writable
+
+    if not 1 <= fps <= 120:
+        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
+    ensure_video_writable(output, force=force)
+
+
 def check_before(output: Path, save: Path | None, spp: int, force: bool) -> None:
     """Everything about the output that can be wrong, before the work starts."""
     from materialist.io.image import ensure_image_writable
     from materialist.io.target import ensure_writable
 
-    if not 2 <= spp <= 1_000_000:
-        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
+    check_paths(spp)
     ensure_image_writable(output, force=force)
     if save is not None:
         ensure_writable(save, force)

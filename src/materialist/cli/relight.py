@@ -8,9 +8,22 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.options import (
+    Denoise,
+    Device,
+    DeviceOption,
+    Force,
+    FramesPerSecond,
+    FullRender,
+    Json,
+    Save,
+    SceneArgument,
+    Seed,
+    Spp,
+    output_option,
+)
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import Denoise, FullRender, Save, SceneArgument, Spp, check_before, numbers, write_result
+from materialist.cli.picture import check_before, check_paths, check_video, numbers, write_result
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
 
@@ -22,9 +35,7 @@ def register(app: typer.Typer) -> None:
 
 def relight(
     scene: SceneArgument,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="OUT", help="A .png or .exr; with --frames .mp4 or a folder.")
-    ],
+    output: Annotated[Path, output_option("OUT", "A .png or .exr; with --frames .mp4 or a folder.")],
     envmap: Annotated[Path | None, typer.Option(metavar="FILE", help="Another light: EXR or HDR, 2:1.")] = None,
     gain: Annotated[str, typer.Option(help="Factor on it; auto keeps the photo's mean light.")] = "auto",
     rotate: Annotated[float | None, typer.Option(metavar="DEG", help="Turn the light to the right.")] = None,
@@ -43,7 +54,7 @@ def relight(
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
     ] = None,
-    fps: Annotated[int, typer.Option(help="Frames per second.")] = 24,
+    fps: FramesPerSecond = 24,
     spp: Spp = 256,
     denoise: Denoise = True,
     full_render: FullRender = False,
@@ -68,7 +79,10 @@ def relight(
         if len(suns) > 1:
             raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
     else:
-        _check_video(output, save, fps, force)
+        if save is not None:
+            raise InputError("--save writes one scene; leave out --frames.")
+        check_paths(spp)
+        check_video(output, fps, force)
     options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient, "dim": dim}
     if envmap is not None:
         options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}
@@ -83,16 +97,6 @@ def relight(
         return
     edited = change(loaded, rotate=rotate or 0.0, sun=suns[0] if suns else None, lamps=lamps, **options)
     write_result("relight", loaded, edited, output, save=save, as_json=as_json, force=force, **shared)
-
-
-def _check_video(output: Path, save: Path | None, fps: int, force: bool) -> None:
-    from materialist.edit.frames import ensure_video_writable
-
-    if save is not None:
-        raise InputError("--save writes one scene; leave out --frames.")
-    if not 1 <= fps <= 120:
-        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
-    ensure_video_writable(output, force=force)
 
 
 def _video(

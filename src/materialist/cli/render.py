@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.options import Device, DeviceOption, Force, Json, SceneArgument, Seed, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
 
@@ -18,8 +18,8 @@ def register(app: typer.Typer) -> None:
 
 
 def render(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="A .png (sRGB) or .exr (linear).")],
+    scene: SceneArgument,
+    output: Annotated[Path, output_option("OUT", "A .png (sRGB) or .exr (linear).")],
     spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 64,
     denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
     seed: Seed = 0,

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Force, Json
+from materialist.cli.options import Box, Clicks, Force, Json, MaskFile, Method, SceneArgument, With, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import Box, Clicks, MaskFile, Method, SceneArgument, With, chosen_region
+from materialist.cli.picture import chosen_region
 from materialist.errors import InputError
 
 
@@ -20,7 +20,7 @@ def register(app: typer.Typer) -> None:
 
 def select(
     scene: SceneArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="MASK", help="A .png; white is inside.")],
+    output: Annotated[Path, output_option("MASK", "A .png; white is inside.")],
     click: Clicks = None,
     box: Box = None,
     mask: MaskFile = None,

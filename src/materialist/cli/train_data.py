@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.options import Device, DeviceOption, Json, Seed, output_option
 from materialist.cli.outcome import report_success
 
 
@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
 
 def data(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder of the data set.")],
+    output: Annotated[Path, output_option("DIR", "Folder of the data set.")],
     count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
     size: Annotated[int, typer.Option(help="Pixels on a side.")] = 256,
     seed: Seed = 0,

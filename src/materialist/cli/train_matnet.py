@@ -8,7 +8,18 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed
+from materialist.cli.options import (
+    CheckpointSeconds,
+    Device,
+    DeviceOption,
+    Force,
+    Json,
+    Minutes,
+    ResumeRun,
+    Seed,
+    Steps,
+    output_option,
+)
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
 
@@ -28,11 +39,11 @@ def register(app: typer.Typer) -> None:
 
 def matnet(
     data: Annotated[Path, typer.Option(help="A set made by `materialist train data`, or an InteriorVerse folder.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="Folder of the run.")],
+    output: Annotated[Path, output_option("RUN", "Folder of the run.")],
     config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False,
-    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None,
-    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None,
+    resume: ResumeRun = False,
+    steps: Steps = None,
+    minutes: Minutes = None,
     batch: Annotated[int | None, typer.Option(help="Pictures a step, on each device; default: the recipe's.")] = None,
     size: Annotated[
         int | None, typer.Option(help="Side of all crops, pixels; default: the recipe's, small ones first.")
@@ -41,7 +52,7 @@ def matnet(
     init: Annotated[
         Path | None, typer.Option(help="paper: a Depth Anything or DINOv2 checkpoint to begin from.")
     ] = None,
-    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 300,
+    every: CheckpointSeconds = 300,
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
     workers: Annotated[int, typer.Option(help="Processes that load data, for each training process.")] = 1,
     seed: Seed = 0,
@@ -82,7 +93,7 @@ def matnet(
 
 def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run of `train matnet`.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="A .safetensors file.")],
+    output: Annotated[Path, output_option("FILE", "A .safetensors file.")],
     as_json: Json = False,
     force: Force = False,
 ) -> None:

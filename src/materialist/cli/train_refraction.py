@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Json, Seed
+from materialist.cli.options import CheckpointSeconds, Json, Minutes, ResumeRun, Seed, Steps, output_option
 from materialist.cli.outcome import report_success
 
 
@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def refraction(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="Folder of the run and its views.")],
+    output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
     data: Annotated[
         Path | None, typer.Option(help="Folder for the views, used again by later runs; default: RUN/views.")
     ] = None,
@@ -25,12 +25,12 @@ def refraction(
     shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640,
     views: Annotated[int, typer.Option(help="Views of each.")] = 24,
     heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64,
-    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None,
-    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None,
+    steps: Steps = None,
+    minutes: Minutes = None,
     batch: Annotated[int, typer.Option(help="Views a step.")] = 32,
     rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 2e-3,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False,
-    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 180,
+    resume: ResumeRun = False,
+    every: CheckpointSeconds = 180,
     seed: Seed = 0,
     as_json: Json = False,
 ) -> None:
