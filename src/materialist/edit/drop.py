@@ -26,6 +26,30 @@ UPRIGHT = 0.5
 """Cosine to the camera's up from which a plane can be a floor or a table top."""
 
 
+@dataclass(frozen=True)
+class Release:
+    """How things are let go of. Raises InputError for a number out of its range."""
+
+    height: float = 1.5
+    """Of the lowest one over the ground, in multiples of its longest side, 0 to 100."""
+    spin: float = 0.3
+    """Turns a second about an axis that `seed` chooses, -20 to 20."""
+    scale: float = 1.0
+    """As in `insert`; so are `material` and `up`."""
+    material: str = "as-is"
+    gravity: tuple[float, float, float] | None = None
+    """Direction in the camera frame; None chooses as `drop` says."""
+    metres: float = METRES
+    """What the longest side is taken for, 0.001 to 100."""
+    seed: int = 0
+    up: str = "auto"
+
+    def __post_init__(self) -> None:
+        _check("height", self.height, 0, 100)
+        _check("spin", self.spin, -20, 20)
+        _check("metres", self.metres, 1e-3, 100)
+
+
 def drop(
     scene: Scene,
     meshes: Sequence[str | Path | Model],
@@ -33,14 +57,14 @@ def drop(
     *,
     frames: int = 48,
     fps: float = 24.0,
-    height: float = 1.5,
-    spin: float = 0.3,
-    scale: float = 1.0,
-    material: str = "as-is",
-    gravity: tuple[float, float, float] | None = None,
-    metres: float = METRES,
-    seed: int = 0,
-    up: str = "auto",
+    height: float = Release.height,
+    spin: float = Release.spin,
+    scale: float = Release.scale,
+    material: str = Release.material,
+    gravity: tuple[float, float, float] | None = Release.gravity,
+    metres: float = Release.metres,
+    seed: int = Release.seed,
+    up: str = Release.up,
 ) -> list[Scene]:
     """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
 
@@ -65,10 +89,8 @@ def drop(
     if not 2 <= frames <= MAX_FRAMES:
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
     _check("frame rate", fps, 1, 240)
-    falling = prepared(
-        scene, meshes, at, height=height, spin=spin, scale=scale, material=material, gravity=gravity, metres=metres,
-        seed=seed, up=up,
-    )  # fmt: skip
+    release = Release(height, spin, scale, material, gravity, metres, seed, up)
+    falling = prepared(scene, meshes, at, release)
     film, last = [], scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
@@ -111,34 +133,26 @@ class Falling:
 
 
 def prepared(
-    scene: Scene, meshes: Sequence[str | Path | Model], at: tuple[float, float] | Sequence[tuple[float, float]], *,
-    height: float, spin: float, scale: float, material: str, gravity: tuple[float, float, float] | None,
-    metres: float, seed: int, up: str,
-) -> Falling:  # fmt: skip
+    scene: Scene,
+    meshes: Sequence[str | Path | Model],
+    at: tuple[float, float] | Sequence[tuple[float, float]],
+    release: Release,
+) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
-    for name, value, low, high in (("height", height, 0, 100), ("spin", spin, -20, 20), ("metres", metres, 1e-3, 100)):
-        _check(name, value, low, high)
     load()
-    models = [repainted(m if isinstance(m, Model) else read_model(m, up=up), material) for m in meshes]
+    models = [repainted(m if isinstance(m, Model) else read_model(m, up=release.up), release.material) for m in meshes]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")
     places = _places(at, len(models))
-    stood = [put(scene, model, place, scale=scale) for model, place in zip(models, places)]
-    to_up = upright(down(scene, stood[0][1], gravity))
-    factor = metres / max(extent(bodies) for bodies, _ in stood)
-    starts = _raised(stood, to_up, factor, height * metres)
-    rng = np.random.default_rng(seed)
-    things = []
-    for bodies, shift in starts:
-        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
-        centre = (points.min(0) + points.max(0)) / 2
-        axis = rng.normal(size=3)
-        turning = 2 * np.pi * spin * axis / np.linalg.norm(axis)
-        things.append(Thing(tuple(p - centre for p in _pieces(bodies, to_up, factor, shift, seed)), centre, turning))
-    ground = ground_below(scene, things, to_up, factor, metres)
+    stood = [put(scene, model, place, scale=release.scale) for model, place in zip(models, places)]
+    to_up = upright(down(scene, stood[0][1], release.gravity))
+    factor = release.metres / max(extent(bodies) for bodies, _ in stood)
+    starts = _raised(stood, to_up, factor, release.height * release.metres)
+    things = _things(starts, to_up, factor, release)
+    ground = ground_below(scene, things, to_up, factor, release.metres)
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
-        "height": height, "spin": spin, "scale": scale, "material": material, "seed": seed,
+        **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "seed")},
     }  # fmt: skip
     notes = tuple(note for model in models for note in model.warnings)
     return Falling(scene, things, ground, starts, to_up, factor, notes, what)
@@ -206,6 +220,20 @@ def _raised(
         boxes.append((low + shift, high + shift))
         result.append((bodies, shift))
     return result
+
+
+def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, release: Release) -> list[Thing]:
+    """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
+    rng = np.random.default_rng(release.seed)
+    things = []
+    for bodies, shift in starts:
+        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
+        centre = (points.min(0) + points.max(0)) / 2
+        axis = rng.normal(size=3)
+        turning = 2 * np.pi * release.spin * axis / np.linalg.norm(axis)
+        pieces = _pieces(bodies, to_up, factor, shift, release.seed)
+        things.append(Thing(tuple(piece - centre for piece in pieces), centre, turning))
+    return things
 
 
 def _pieces(bodies: tuple[Body, ...], to_up: Array, factor: float, shift: Array, seed: int) -> list[Array]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.camera import project
-from materialist.edit.drop import METRES, Falling, moves, prepared
+from materialist.edit.drop import Falling, Release, moves, prepared
 from materialist.edit.meshes import Model
 from materialist.edit.physics import Pose, fall
 from materialist.errors import InputError
@@ -28,14 +28,14 @@ def settle(
     meshes: Sequence[str | Path | Model],
     at: tuple[float, float] | Sequence[tuple[float, float]],
     *,
-    height: float = 1.5,
-    spin: float = 0.3,
-    scale: float = 1.0,
-    material: str = "as-is",
-    gravity: tuple[float, float, float] | None = None,
-    metres: float = METRES,
-    seed: int = 0,
-    up: str = "auto",
+    height: float = Release.height,
+    spin: float = Release.spin,
+    scale: float = Release.scale,
+    material: str = Release.material,
+    gravity: tuple[float, float, float] | None = Release.gravity,
+    metres: float = Release.metres,
+    seed: int = Release.seed,
+    up: str = Release.up,
 ) -> Scene:
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
 
@@ -47,10 +47,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
-    falling = prepared(
-        scene, meshes, at, height=height, spin=spin, scale=scale, material=material, gravity=gravity, metres=metres,
-        seed=seed, up=up,
-    )  # fmt: skip
+    falling = prepared(scene, meshes, at, Release(height, spin, scale, material, gravity, metres, seed, up))
     poses, gone, rests = _rested(falling)
     names = falling.what["meshes"]
     if len(gone) == len(names):
