@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from materialist.geometry.slopes import slopes
+from materialist.geometry.slopes import between, least_squares_change, slopes
 from materialist.geometry.symmetry import border_distance
 from materialist.types import Array
 
@@ -29,37 +29,26 @@ def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smo
     Returns:
         [H, W] float64, scene units; `depth` outside the mask.
     """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import cg
-
     size = float(np.sqrt(inside.sum()))
     if inside.sum() < 9:
         return np.asarray(depth, np.float64)
-    slope_x, slope_y = slopes(_blurred_normals(normal, inside, smooth * size), rays)
+    demanded = slopes(_blurred_normals(normal, inside, smooth * size), rays)
     log_depth = np.log(np.where(inside, depth, 1).astype(np.float64))
     index = np.cumsum(inside.ravel()).reshape(inside.shape) - 1
-    first, second, wanted, weight = _pairs(inside, index, log_depth, slope_x, slope_y)
-    count = int(inside.sum())
-    ones = np.sqrt(weight)
-    rows = np.tile(np.arange(len(first)), 2)
-    step = coo_matrix((np.concatenate([-ones, ones]), (rows, np.concatenate([first, second]))), (len(first), count))
-    step = step.tocsr()
-    data = np.where(border_distance(inside)[inside] > RIM, 1.0, 0.02) / (REACH * size) ** 2
-    system = step.T @ step + diags(data + 1e-9)
-    change, _ = cg(system, step.T @ (ones * wanted), rtol=1e-4, maxiter=500, M=diags(1 / system.diagonal()))
+    pull = np.where(border_distance(inside)[inside] > RIM, 1.0, 0.02) / (REACH * size) ** 2 + 1e-9
+    change = least_squares_change(*_pairs(inside, index, log_depth, demanded), pull, rtol=1e-4, maxiter=500)
     out = np.asarray(depth, np.float64).copy()
     out[inside] = np.exp(log_depth[inside] + np.clip(change, -0.5, 0.5))
     return out
 
 
-def _pairs(inside: Array, index: Array, log_depth: Array, slope_x: Array, slope_y: Array):
+def _pairs(inside: Array, index: Array, log_depth: Array, demanded: tuple[Array, Array]):
     """Linked neighbours [P]: their unknowns, the step wanted on top of the depth's own, and its weight."""
     parts = []
-    for axis, slope in ((1, slope_x), (0, slope_y)):
-        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
+    for near, far, slope in between(demanded):
         both = inside[near] & inside[far]
         own = (log_depth[far] - log_depth[near])[both]
-        asked = ((slope[near] + slope[far]) / 2)[both]
+        asked = slope[both]
         # Where the depth jumps, one part of the object hides another, and no slope joins them.
         jump = np.abs(own) > np.maximum(6 * np.abs(asked), 0.05)
         parts.append((index[near][both], index[far][both], asked - own, np.where(jump, 1e-3, 1.0)))

@@ -11,7 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.geometry.slopes import slopes
+from materialist.geometry.slopes import between, least_squares_change, slopes
 from materialist.types import Array
 
 STEP = (0.02, 0.05)
@@ -41,9 +41,6 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     Returns:
         [H, W] float32, NaN where `coarse` is.
     """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import cg
-
     known = np.isfinite(coarse) & np.isfinite(sharp)
     if known.sum() < 9:
         return sharp
@@ -52,12 +49,8 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     edge = np.clip((change - STEP[0]) / (STEP[1] - STEP[0]), 0, 1) ** 2
     target = np.where(known, edge * np.nan_to_num(sharp) + (1 - edge) * np.nan_to_num(coarse), 0).astype(np.float64)
     index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    count = int(known.sum())
-    first, second, wanted, weight = _pairs(known, index, target, demanded, change)
-    rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
-    step = coo_matrix((np.r_[-root, root], (rows, np.r_[first, second])), (len(first), count)).tocsr()
-    system = (step.T @ step + diags(np.full(count, LENGTH**-2))).tocsr()
-    moved, _ = cg(system, step.T @ (root * wanted), rtol=1e-3, maxiter=100, M=diags(1 / system.diagonal()))
+    pairs = _pairs(known, index, target, demanded, change)
+    moved = least_squares_change(*pairs, np.full(int(known.sum()), LENGTH**-2), rtol=1e-3, maxiter=100)
     found = np.full(coarse.shape, np.nan, np.float32)
     found[known] = target[known] + moved
     return found
@@ -69,12 +62,11 @@ def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: in
     Infinite next to where the surface ends, whose outline stays as it is.
     """
     most = np.zeros(coarse.shape, np.float32)
-    for axis, slope in ((1, demanded[0]), (0, demanded[1])):
+    windows = (2 * reach + 1, 1), (1, 2 * reach + 1)
+    for window, (near, far, asked) in zip(windows, between(demanded), strict=True):
         own = np.zeros(coarse.shape, np.float32)
-        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
         both = known[near] & known[far]
-        own[near] = np.where(both, coarse[far] - coarse[near] - (slope[near] + slope[far]) / 2, 0)
-        window = (2 * reach + 1, 1) if axis else (1, 2 * reach + 1)
+        own[near] = np.where(both, coarse[far] - coarse[near] - asked, 0)
         within = np.abs(cv2.boxFilter(own, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT))
         most = np.maximum(most, within)
     ending = cv2.dilate((~known).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
@@ -84,10 +76,9 @@ def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: in
 def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> tuple[Any, ...]:
     """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
     parts = []
-    for axis, slope in ((1, demanded[0]), (0, demanded[1])):
-        near, far = (np.s_[:, :-1], np.s_[:, 1:]) if axis else (np.s_[:-1], np.s_[1:])
+    for near, far, asked in between(demanded):
         both = known[near] & known[far]
-        wanted = ((slope[near] + slope[far]) / 2 - (target[far] - target[near]))[both]
+        wanted = (asked - (target[far] - target[near]))[both]
         around = np.minimum(change[near], change[far])[both]
         least = np.where(np.isinf(around), BREAK, np.maximum(BREAK, PART * around))
         broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
