@@ -1,0 +1,209 @@
+"""The pages name what exists: commands and options, functions, tests, files."""
+
+import ast
+import inspect
+import re
+import shlex
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+from materialist.bench import BENCHMARKS
+from materialist.cli import app
+from materialist.cli.bench import parse_extra
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "materialist"
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAPER_MAP = ROOT / "docs" / "paper_map.md"
+PROGRAM = get_command(app)
+FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--nproc-per-node", "--maps"}
+"""Options of Blender, the script for it, torchrun and MoGe that the pages name."""
+
+
+def _page_id(page):
+    return page.name
+
+
+# Commands
+
+
+def _code_lines(text):
+    """Lines of fenced and of indented code."""
+    fenced = False
+    for line in text.splitlines():
+        if line.startswith("```"):
+            fenced = not fenced
+        elif fenced or line.startswith("    "):
+            yield line.strip()
+
+
+def _commands(text):
+    """(words after `materialist`, whether the command stands in a block and so is whole) of every command line."""
+    blocks = [line for line in _code_lines(text) if line.startswith("materialist ")]
+    spans = re.findall(r"`(materialist [^`]+)`", text)
+    for line in (*blocks, *spans):
+        words = shlex.split(line.replace("[", " ").replace("]", " "), comments=True)[1:]
+        whole = line in blocks and "..." not in words
+        yield ["1" if word == "N" else word for word in words if word != "..."], whole
+
+
+def _parsed(words, whole):
+    """The command line as the program takes it apart, without running it; every one of a|b|c."""
+    several = next((k for k, word in enumerate(words) if "|" in word), None)
+    if several is not None:
+        for choice in words[several].split("|"):
+            _parsed([*words[:several], choice, *words[several + 1 :]], whole)
+        return
+    command, name = PROGRAM, "materialist"
+    while hasattr(command, "commands") and words:
+        assert words[0] in command.commands, f"there is no command {name} {words[0]}"
+        command, name, words = command.commands[words[0]], f"{name} {words[0]}", words[1:]
+    if hasattr(command, "commands"):
+        return
+    try:
+        context = command.make_context(name, list(words))
+    except Exception as error:
+        if type(error).__name__ == "Exit" or (not whole and type(error).__name__ == "MissingParameter"):  # --help
+            return
+        raise AssertionError(f"{name} {' '.join(words)}: {error}") from error
+    if name == "materialist bench":
+        taken = inspect.signature(import_module(f"materialist.bench.{context.params['name']}").run).parameters
+        unknown = set(parse_extra(context.args)) - {*taken, "force"}
+        assert not unknown, f"{name} {context.params['name']} does not take {unknown}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_page_id)
+def test_every_command_line_parses(page):
+    for words, whole in _commands(page.read_text("utf-8")):
+        _parsed(words, whole)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("materialist invent PHOTO -o SCENE", "no command"),
+        ("materialist invert PHOTO -o SCENE --seeds 3", "--seeds"),
+        ("materialist invert PHOTO -o SCENE --engine fast", "fast"),
+        ("materialist models fetch NAME", "no command"),
+        ("materialist export SCENE --to glb|obj -o OUT", "obj"),
+        ("materialist bench light -o REPORT --scene 3", "does not take {'scene'}"),
+        ("materialist render SCENE", "output"),
+    ],
+)
+def test_what_does_not_parse_is_found(line, words):
+    ((given, whole),) = _commands(f"```\n{line}  # a comment --with-dashes\n```")
+    with pytest.raises(AssertionError, match=words):
+        _parsed(given, whole)
+
+
+@cache
+def _options():
+    """Every option of every command, and of every benchmark."""
+    found, waiting = {"--help"}, [PROGRAM]
+    while waiting:
+        command = waiting.pop()
+        found.update(name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts))
+        waiting.extend(getattr(command, "commands", {}).values())
+    for name in BENCHMARKS:
+        taken = inspect.signature(import_module(f"materialist.bench.{name}").run).parameters
+        found.update(f"--{parameter.replace('_', '-')}" for parameter in taken)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_page_id)
+def test_every_option_in_the_text_exists(page):
+    named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text("utf-8")))
+    assert not named - _options() - FOREIGN
+
+
+# Functions and tests
+
+
+@cache
+def _names(module):
+    """Names a module defines, and of its classes as Class.name; empty where there is no such module."""
+    path = SOURCE / Path(*module.split("."))
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    if not path.is_file():
+        return frozenset()
+    return frozenset(_defined(ast.parse(path.read_text("utf-8"))))
+
+
+def _defined(node, inside=""):
+    for item in node.body:
+        if isinstance(item, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield inside + item.name
+            if isinstance(item, ast.ClassDef):
+                yield from _defined(item, f"{inside}{item.name}.")
+        for target in getattr(item, "targets", [getattr(item, "target", None)]):
+            if isinstance(target, ast.Name):
+                yield inside + target.id
+        if isinstance(item, ast.ImportFrom):
+            yield from (inside + (alias.asname or alias.name) for alias in item.names)
+
+
+def _place(name):
+    """Module of a dotted name, or None where nothing is called so: `fit.loop`, `fit.loop.Schedule.keep_best`."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        path = SOURCE / Path(*parts[:count])
+        if path.is_dir() or path.with_suffix(".py").is_file():
+            rest = ".".join(parts[count:])
+            return ".".join(parts[:count]) if not rest or rest in _names(".".join(parts[:count])) else None
+    return None
+
+
+def _rows(text):
+    """Cells of the table rows: what of the paper, function, test, deviation."""
+    for line in text.splitlines():
+        if line.startswith("|") and not line.startswith(("|---", "| paper ")):
+            yield [cell.strip() for cell in line.strip("|").split(" | ")]
+
+
+def test_paper_map_names_functions_that_exist():
+    everything = {name for path in SOURCE.rglob("*.py") for name in _defined(ast.parse(path.read_text("utf-8")))}
+    missing = []
+    for _, functions, *_ in _rows(PAPER_MAP.read_text("utf-8")):
+        here = ""
+        for name in re.findall(r"`([A-Za-z_][\w.]*)(?:\([^`]*\))?`", functions):
+            # A name without a module is one of the module just named, or of a module beside it.
+            around = [f"{here.rsplit('.', k)[0]}.{name}" if k else f"{here}.{name}" for k in (0, 1)] if here else []
+            found = next((place for place in map(_place, (name, *around)) if place), None)
+            here = found or here
+            if not found and name not in everything:
+                missing.append(name)
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_page_id)
+def test_pages_name_functions_that_exist(page):
+    ours = {path.stem for path in SOURCE.iterdir()}
+    dotted = re.findall(r"`(?:materialist\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", page.read_text("utf-8"))
+    files = (".py", ".jsonl", ".txt")
+    assert not [n for n in dotted if n.split(".")[0] in ours and not n.endswith(files) and not _place(n)]
+
+
+def test_paper_map_names_tests_that_exist():
+    missing = []
+    for _, _, tests, *_ in _rows(PAPER_MAP.read_text("utf-8")):
+        folder = Path()
+        for name in re.findall(r"`([\w/.:]*test_[\w/.:]*)`", tests):
+            file, _, function = name.partition("::")
+            path = next((p for p in (ROOT / "tests" / file, ROOT / "tests" / folder / file) if p.is_file()), None)
+            if path is None or (function and function not in _defined(ast.parse(path.read_text("utf-8")))):
+                missing.append(name)
+            folder = Path(file).parent if "/" in file else folder
+    assert not missing
+
+
+# Links
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_page_id)
+def test_links_lead_to_files(page):
+    targets = re.findall(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)", page.read_text("utf-8"))
+    assert not [target for target in targets if not (page.parent / target).exists()]
