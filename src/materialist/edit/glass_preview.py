@@ -73,6 +73,16 @@ class GlassPreview:
         clean = _denoised(without_fireflies(traced), guide)
         return self._in_photo(purified(clean, guide.share), surface)
 
+    @property
+    def share(self) -> Array:
+        """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
+        return self._share
+
+    @property
+    def filled(self) -> Array:
+        """[H, W] bool: where a picture is not the photo, for the object stood there and the glass does not."""
+        return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
+
     def _look(self) -> None:
         """What of the body is seen where, at the sizes that pictures are traced at."""
         camera = self.scene.camera

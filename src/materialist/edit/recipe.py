@@ -223,6 +223,12 @@ def _removal(step: Step) -> dict[str, Any]:
 
 
 def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
+    region, options = glass_arguments(scene, step)
+    return glass(edited, region, **options)
+
+
+def glass_arguments(scene: Scene, step: Step):
+    """([H, W] bool region, options of `glass.glass`) of a glass step. Raises InputError."""
     given = step.options
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("ior", "transmission", "roughness") if k in given}
     if "tint" in given:
@@ -234,7 +240,7 @@ def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
     if "thickness" in given:
         known = str(given["thickness"]) in METHODS
         options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
-    return glass(edited, _region(scene, step), **options, **_removal(step))
+    return _region(scene, step), options | _removal(step)
 
 
 _MAKERS = {

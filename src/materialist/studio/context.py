@@ -39,7 +39,8 @@ class Context:
         """Sliders as the step in hand, or the selected object, has them."""
         if session.live is None:
             return {}
-        return {self[name]: value for name, value in {**material_values(session), **light_values(session)}.items()}
+        values = {**material_values(session), **light_values(session), **glass_values(session)}
+        return {self[name]: value for name, value in values.items()}
 
     @property
     def picture_parts(self) -> list[Any]:
@@ -47,11 +48,12 @@ class Context:
 
     @property
     def all_parts(self) -> list[Any]:
-        return [*self.picture_parts, *(self[name] for name in (*MATERIAL, *LIGHT))]
+        return [*self.picture_parts, *(self[name] for name in (*MATERIAL, *LIGHT, *GLASS))]
 
 
 MATERIAL = (*SLIDERS, "colour", "texture_scale")
 LIGHT = ("rotate", "ambient", "sun_on", "azimuth", "elevation", "sun_power")
+GLASS = ("glass_ior", "glass_transmission", "glass_roughness", "glass_tint", "glass_hollow")
 _DEFAULTS = {"rotate": 0.0, "ambient": 1.0, "azimuth": 45.0, "elevation": 40.0, "sun_power": 1.0}
 
 
@@ -92,4 +94,19 @@ def light_values(session: Session) -> dict[str, Any]:
     values["sun_on"] = sun is not None
     if isinstance(sun, list | tuple):
         values["azimuth"], values["elevation"] = (float(v) for v in sun)
+    return values
+
+
+def glass_values(session: Session) -> dict[str, Any]:
+    """Values of the controls of glass, where there is glass in hand; else they stay."""
+    from materialist.studio.tab_glass import tint_colour
+
+    stack = session.stack
+    if session.in_hand != "glass" or stack.current is None:
+        return {}
+    options = stack.steps[stack.current].options
+    numbers = {"ior": 1.5, "transmission": 1.0, "roughness": 0.0}
+    values: dict[str, Any] = {f"glass_{name}": float(options.get(name, plain)) for name, plain in numbers.items()}
+    values["glass_tint"] = tint_colour(options.get("tint", "1,1,1"))
+    values["glass_hollow"] = str(options.get("hollow", "")).lower() in ("true", "yes", "on", "1")
     return values

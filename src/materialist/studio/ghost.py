@@ -24,6 +24,35 @@ def with_bodies(picture: Array, scene: Scene) -> Array:
     return picture.astype(np.float32)
 
 
+def with_pane(picture: Array, region: Array, tint: tuple[float, float, float]) -> Array:
+    """[H, W, 3] with the object under a region [H, W] bool as a see-through shape, until its glass is traced.
+
+    Its surroundings carried on into it, smooth, with a rim and a little of the object's own form.
+    """
+    import cv2
+
+    if not region.any():
+        return picture
+    spread = max(2.0, 0.25 * float(np.sqrt(region.sum())))
+    outside = (~region).astype(np.float32)
+    blur = lambda v: cv2.GaussianBlur(v, (0, 0), spread, borderType=cv2.BORDER_REPLICATE)  # noqa: E731
+    around = blur(np.ascontiguousarray(picture * outside[..., None])) / np.maximum(blur(outside), 1e-3)[..., None]
+    depth = cv2.distanceTransform(region.astype(np.uint8), cv2.DIST_L2, 3)  # [H, W] pixels to the border
+    rim = np.exp(-depth / max(1.5, 0.12 * float(depth.max())))[..., None]
+    form = luminance(picture)[..., None]
+    inside = (0.8 * around + 0.2 * form) * np.asarray(tint, np.float32) * (1 - 0.4 * rim) + 0.12 * rim * around.max()
+    return np.where(region[..., None], inside, picture).astype(np.float32)
+
+
+def glazed(picture: Array, box: tuple[int, int, int, int], piece: Array, share: Array) -> Array:
+    """[H, W, 3] with a piece [h, w, 3] laid over the rows and columns of a box, by its share [h, w]."""
+    top, bottom, left, right = box
+    out = picture.copy()
+    under = out[top:bottom, left:right]
+    out[top:bottom, left:right] = under + share[..., None] * (piece - under)
+    return out
+
+
 def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
     import cv2

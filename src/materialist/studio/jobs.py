@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-import os
-import signal
 import subprocess
-import sys
 import threading
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from materialist.studio import child
+
+WORKER = "materialist.studio.worker"
 QUEUED, RUNNING, DONE, FAILED, STOPPED = "queued", "running", "done", "failed", "stopped"
 KEPT_SECONDS = 3600
 """How long a finished job is remembered, so that a page that was reloaded can ask for its outcome."""
@@ -99,7 +96,7 @@ class Jobs:
             job.state, job.ended = STOPPED, time.monotonic()
             process = job.process
         if process is not None:
-            _kill(process)
+            child.kill(process)
 
     def close(self) -> None:
         """Stop everything."""
@@ -115,45 +112,24 @@ class Jobs:
                 return
             job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
             try:
-                job.process = _start()
+                job.process = child.start(WORKER)
             except OSError as error:
                 job.state, job.message, job.ended = FAILED, f"The work cannot be started: {error}.", time.monotonic()
                 return
         process = job.process
         try:
-            assert process.stdin is not None
-            with contextlib.suppress(BrokenPipeError):
-                # The pipe stays open: the worker ends itself when the studio is gone and it breaks.
-                process.stdin.write(json.dumps(job.spec) + "\n")
-                process.stdin.flush()
-            for entry in _lines(process):
+            child.ask(process, job.spec)
+            for entry in child.lines(process):
                 _take(job, entry)
             code = process.wait()
         finally:
-            _close(process)
+            child.close(process)
             _sweep(job.folder, process.pid)
         with self._lock:
             if not job.over:
                 job.ended = time.monotonic()
                 job.state = DONE if job.result else FAILED
                 job.message = job.message or ("" if job.result else f"The work ended without a result (code {code}).")
-
-
-def _start() -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "materialist.studio.worker"]
-    return subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=None, text=True, start_new_session=True
-    )
-
-
-def _lines(process: subprocess.Popen[str]) -> Iterator[dict[str, Any]]:
-    """What the worker says, one JSON object a line; anything else on its stdout is not for us."""
-    assert process.stdout is not None
-    for line in process.stdout:
-        with contextlib.suppress(ValueError):
-            entry = json.loads(line)
-            if isinstance(entry, dict):
-                yield entry
 
 
 def _take(job: Job, entry: dict[str, Any]) -> None:
@@ -165,21 +141,6 @@ def _take(job: Job, entry: dict[str, Any]) -> None:
         job.result = entry["result"]
     elif "error" in entry:
         job.message = entry["error"]
-
-
-def _kill(process: subprocess.Popen[str]) -> None:
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-
-
-def _close(process: subprocess.Popen[str]) -> None:
-    for stream in (process.stdin, process.stdout):
-        if stream is not None:
-            with contextlib.suppress(OSError):
-                stream.close()
-    if process.poll() is None:
-        _kill(process)
-        process.wait()
 
 
 def _sweep(folder: Path, pid: int) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from materialist.edit.recipe import Step, apply
-from materialist.studio.ghost import with_bodies
+from materialist.studio import glass
+from materialist.studio.ghost import glazed, with_bodies, with_pane
 from materialist.types import Array, Scene
 
 
@@ -35,6 +36,7 @@ class Live:
     def __init__(self, scene: Scene):
         self.scene = scene
         self._edited: OrderedDict[str, Scene] = OrderedDict()
+        self._panes: OrderedDict[str, tuple[Array, glass.Tint]] = OrderedDict()
         self._preview: Future[Any] = _THREAD.submit(_build, scene)
 
     @property
@@ -46,7 +48,14 @@ class Live:
         self._preview.result()
 
     def edited(self, steps: tuple[Step, ...]) -> Scene:
-        """The scene after the steps. Raises InputError."""
+        """The scene after the steps, glass left out: its body takes long, and another process makes it.
+
+        Raises InputError, for values of glass that cannot be as well.
+        """
+        for step in steps:
+            if glass.traced(step):
+                self._glass(step)
+        steps = tuple(step for step in steps if not glass.traced(step))
         known, start = self.scene, 0
         for count in range(len(steps), 0, -1):
             hit = self._edited.get(_key(steps[:count]))
@@ -60,11 +69,15 @@ class Live:
             self._edited.popitem(last=False)
         return known
 
-    def picture(self, steps: tuple[Step, ...]) -> Array:
-        """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview."""
+    def picture(self, steps: tuple[Step, ...], tracer: glass.Tracer | None = None) -> Array:
+        """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
+
+        Glass is what the tracer has of it, else a sketch.
+        """
         if not steps:
             return self.scene.photo.linear
         preview, edited = self._preview.result(), self.edited(steps)
+        known = [(step, tracer.pane(step) if tracer else None) for step in steps if glass.traced(step)]
         shaded = edited
         if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
             shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
@@ -72,13 +85,33 @@ class Live:
         if edited.photo is not self.scene.photo:
             filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
             picture = np.where(filled, edited.photo.linear, picture)
-        return with_bodies(picture, edited) if edited.bodies else picture
+        for step, pane in known:
+            if pane is None:
+                picture = with_pane(picture, *self._glass(step))
+            else:
+                picture = glazed(picture, pane.box, pane.picture, pane.filled)
+        if edited.bodies:
+            picture = with_bodies(picture, edited)
+        for _, pane in known:
+            if pane is not None:
+                picture = glazed(picture, pane.box, pane.picture, pane.share)
+        return picture
 
     def close(self) -> None:
         """Give the memory back."""
         self._preview.cancel()
         self._preview = Future()
         self._edited.clear()
+        self._panes.clear()
+
+    def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
+        """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
+        key = _key((step,))
+        if key not in self._panes:
+            self._panes[key] = glass.checked(self.scene, step)
+            while len(self._panes) > _KEPT:
+                self._panes.popitem(last=False)
+        return self._panes[key]
 
 
 def _build(scene: Scene) -> Any:

@@ -14,6 +14,7 @@ from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.hub import Hub
 from materialist.studio.selection import read_pick, sam_missing
+from materialist.studio.session import Session
 from materialist.studio.showing import Final
 
 TITLE = "Materialist studio"
@@ -115,8 +116,9 @@ def _wire(context: Context) -> None:
     @guarded
     def act(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
-        session.act(str(event._data.get("what")), int(event._data.get("index", -1)))
-        return context.everything(session)
+        what = str(event._data.get("what"))
+        session.act(what, int(event._data.get("index", -1)))
+        return {**context.everything(session), **(_turned_to(context, session) if what == "choose" else {})}
 
     @guarded
     def undo(request: gr.Request) -> dict[Any, Any]:
@@ -133,10 +135,18 @@ def _wire(context: Context) -> None:
 
     every = {**quick, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
     context["stage"].pick(pick, context["sam"], context.all_parts, **every)
-    context["steps"].act(act, None, context.all_parts, **every)
+    context["steps"].act(act, None, [*context.all_parts, context["tabs"], context["glass_part"]], **every)
     context["undo"].click(undo, None, context.all_parts, **every)
     context["deselect"].click(deselect, None, context.all_parts, **quick)
     _wire_final(context)
+
+
+def _turned_to(context: Context, session: Session) -> dict[Any, Any]:
+    """The tab with the controls of the step in hand."""
+    tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
+    tab = tabs.get(session.in_hand or "")
+    found = {context["tabs"]: gr.Tabs(selected=tab)} if tab else {}
+    return found | ({context["glass_part"]: gr.update(open=True)} if session.in_hand == "glass" else {})
 
 
 def _wire_final(context: Context) -> None:

@@ -11,6 +11,7 @@ from materialist.edit.recipe import Step, write_recipe
 from materialist.errors import InputError
 from materialist.studio import views
 from materialist.studio.desk import keep, new_name, read_steps, write_mask
+from materialist.studio.glass import Tracer
 from materialist.studio.jobs import Job
 from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
@@ -32,6 +33,7 @@ class Session:
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.live: Live | None = None
+        self.glass: Tracer | None = None
         self.selection = Selection()
         self.thing: dict[str, str] = {}
         """Options of the next object."""
@@ -58,6 +60,12 @@ class Session:
             raise InputError("Open a photo first.")
         return self.project.desk(self.person)
 
+    @property
+    def in_hand(self) -> str | None:
+        """The kind of the step that sliders move, if there is one."""
+        k = self.stack.current
+        return self.stack.steps[k].kind if k is not None else None
+
     def open(self, project: Project) -> None:
         """Open a project where it was left."""
         from materialist.io.package import load_scene
@@ -65,7 +73,7 @@ class Session:
         loaded = load_scene(project.scene)
         with self.lock:
             self.close()
-            self.project, self.live = project, Live(loaded)
+            self.project, self.live, self.glass = project, Live(loaded), Tracer(project.scene)
             if (self.desk / EDITS).is_file():
                 self.stack = Stack(read_steps(self.desk, self.desk / EDITS))
 
@@ -74,7 +82,9 @@ class Session:
         with self.lock:
             if self.live is not None:
                 self.live.close()
-            self.project = self.live = self.final = None
+            if self.glass is not None:
+                self.glass.rest()
+            self.project = self.live = self.glass = self.final = None
             self.stack, self._past = Stack(), []
             self._select(Selection())
 
@@ -164,7 +174,7 @@ class Session:
                     raise InputError("Choose an object from the list, or upload one, first.")
                 step = Step("insert", {**self.thing, "at": at}, self.desk)
             before, trial = self.stack, replace(step, options={**step.options, "at": at})
-            self.stack = self.stack.add(trial) if before.current is None or step.kind != self._kind() else before
+            self.stack = self.stack.add(trial) if before.current is None or step.kind != self.in_hand else before
             self._check_or(before, trial)
 
     def thing_option(self, name: str, value: str | None) -> None:
@@ -241,10 +251,6 @@ class Session:
 
     # Within
 
-    def _kind(self) -> str | None:
-        k = self.stack.current
-        return self.stack.steps[k].kind if k is not None else None
-
     def _check_or(self, before: Stack, step: Step) -> None:
         """Put a step in hand; where it cannot be applied the stack is as before, and the error goes on."""
         assert self.stack.current is not None and self.live is not None
@@ -287,6 +293,8 @@ class Session:
         return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
 
     def _save(self) -> None:
+        if self.glass is not None:
+            self.glass.keep(self.stack.steps)
         if self.stack.steps:
             write_recipe(self.desk / EDITS, list(self.stack.steps))
         elif self.project is not None:

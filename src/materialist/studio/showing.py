@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from time import time
 from typing import TYPE_CHECKING, Any
 
 from materialist.edit.recipe import Step
-from materialist.studio import views
+from materialist.studio import glass, views
 from materialist.studio.live import LIVE
 from materialist.studio.stack import Stack
+from materialist.types import Array
 
 if TYPE_CHECKING:
     from materialist.studio.session import Session
@@ -34,19 +36,44 @@ class Final:
 def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
     """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
 
-    Without `edits` it is the photo, at once; with them it waits for the preview where there are any.
+    Without `edits` it is the photo, at once; with them it waits for the preview where there are any. Glass in hand is
+    asked for; `asked` counts these wishes, and `waiting` says whether the last is not fulfilled yet. The page ignores a
+    picture with an older `serial` than the one it shows.
     """
+    serial = time()
     with session.lock:
         live, stack, final = session.live, session.stack, session.final
-        masks = session.mask_urls
+        masks, tracer = session.mask_urls, session.glass
     if live is None:
-        return {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], **masks}
+        none = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False}
+        return {**none, "serial": serial, **masks}
     camera, steps = live.scene.camera, stack.active if edits else ()
-    shown = {"width": camera.width, "height": camera.height, "lamps": _lamps(stack), **masks}
+    shown = {"width": camera.width, "height": camera.height, "lamps": _lamps(stack), "serial": serial, **masks}
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel"
-        return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge}
-    return {**shown, "picture": views.jpeg_url(live.picture(steps)), "badge": _badge(steps)}
+        return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
+    state = _asked(tracer, stack) if edits and tracer is not None else None
+    linear, waiting = live.picture(steps, tracer), state is not None and state.waiting
+    shown |= {"asked": state.asked if state else 0, "waiting": waiting}
+    return {**shown, "picture": views.jpeg_url(linear), "badge": _badge(steps, tracer, waiting)}
+
+
+def picture(session: Session) -> Array:
+    """[H, W, 3] float32 linear: what the stage shows where nothing is path traced."""
+    assert session.live is not None
+    return session.live.picture(session.stack.active, session.glass)
+
+
+def _asked(tracer: glass.Tracer, stack: Stack) -> glass.State:
+    """Ask for the glass in hand, if there is any."""
+    step = stack.steps[stack.current] if stack.current is not None else None
+    if step is not None and glass.traced(step) and not step.skipped:
+        tracer.ask(_others(stack.active, step), step)
+    return tracer.state
+
+
+def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
+    return tuple(one for one in steps if one is not step)
 
 
 def _lamps(stack: Stack) -> list[list[float]]:
@@ -56,10 +83,17 @@ def _lamps(stack: Stack) -> list[list[float]]:
     return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
 
 
-def _badge(steps: tuple[Step, ...]) -> str:
+def _badge(steps: tuple[Step, ...], tracer: glass.Tracer | None = None, waiting: bool = False) -> str:
     """What a picture that is not path traced shows, and what it leaves out."""
     if not steps:
         return "Photo"
+    panes = [step for step in steps if glass.traced(step)]
+    if waiting:
+        return "Glass: tracing …" if all(tracer and tracer.pane(step) for step in panes) else "Glass: sketch, tracing …"
+    if panes and tracer and all(tracer.fresh(_others(steps, step), step) for step in panes):
+        return "Glass traced; its shadow and caustics come with the final picture"
+    if panes and tracer and all(tracer.pane(step) for step in panes):
+        return "Live preview; click the glass in the list to trace it anew"
     if any(step.kind not in LIVE for step in steps):
         return "Sketch: path tracing shows the rest"
     if any("lamps" in step.options for step in steps):

@@ -13,6 +13,7 @@ from materialist.studio.context import Context
 from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
 from materialist.studio.session import Session
+from materialist.studio.showing import picture
 from materialist.types import Array
 
 MESH = "mesh.glb"
@@ -90,7 +91,7 @@ def compared(session: Session) -> tuple[Array, Array]:
         native = _bytes(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)
-    return before, _bytes(live.picture(steps))
+    return before, _bytes(picture(session))
 
 
 def _bytes(linear: Array) -> Array:

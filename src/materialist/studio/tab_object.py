@@ -8,9 +8,8 @@ from typing import Any
 
 import gradio as gr
 
-from materialist.edit.material import parse_colour
 from materialist.errors import InputError
-from materialist.studio import uploads
+from materialist.studio import tab_glass, uploads
 from materialist.studio.context import Context
 from materialist.studio.follow import follow
 from materialist.studio.guard import guarded
@@ -19,11 +18,6 @@ from materialist.studio.tab_material import hex_colour
 
 LIBRARY = ("Ball", "Cube", "Cylinder", "Cone", "Ring", "Slab")
 _MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
-_GLASS = {
-    "ior": (1.0, 2.5, 1.5, 0.01, "Index of refraction"),
-    "transmission": (0.0, 1.0, 0.9, 0.01, "How much light goes through"),
-    "roughness": (0.0, 1.0, 0.0, 0.01, "Roughness: clear to frosted"),
-}
 
 
 def layout(context: Context) -> None:
@@ -42,12 +36,8 @@ def layout(context: Context) -> None:
             parts["made_of"] = gr.Dropdown(list(_MATERIALS), value="as-is", label="Material", min_width=120)
             parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
         gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
-        with gr.Accordion("Turn the selection to glass", open=False):
-            for name, (low, high, start, step, label) in _GLASS.items():
-                parts[f"glass_{name}"] = gr.Slider(low, high, start, step=step, label=label, buttons=[])
-            parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
-            parts["glass_hollow"] = gr.Checkbox(False, label="Hollow: a wall around air")
-            parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
+        with gr.Accordion("Turn the selection to glass", open=False) as parts["glass_part"]:
+            tab_glass.layout(context)
         with gr.Accordion("Take the selection away", open=False):
             parts["shadow"] = gr.Slider(0, 2, 0.5, step=0.05, label="How much of its shadow goes along", buttons=[])
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
@@ -66,6 +56,7 @@ def wire(context: Context) -> None:
         "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
     }  # fmt: skip
     _wire_things(context, live)
+    tab_glass.wire(context, live)
     _wire_regions(context, live)
     _wire_fall(context)
 
@@ -122,19 +113,8 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
 
 
 def _wire_regions(context: Context, live: dict[str, Any]) -> None:
-    """Glass, and things that go."""
+    """Things that go."""
     parts = context.parts
-
-    @guarded
-    def glass(ior: float, transmission: float, roughness: float, tint: str, hollow: bool, request: gr.Request) -> Any:
-        session = context.session(request)
-        linear = parse_colour(hex_colour(tint))
-        session.region_step(
-            "glass", ior=f"{float(ior):.4g}", transmission=f"{float(transmission):.4g}",
-            roughness=f"{float(roughness):.4g}" if roughness else None, hollow="true" if hollow else None,
-            tint=None if linear.min() >= 1 else ",".join(f"{v:.4g}" for v in linear),
-        )  # fmt: skip
-        return context.picture(session)
 
     @guarded
     def remove(shadow: float, request: gr.Request) -> Any:
@@ -142,9 +122,7 @@ def _wire_regions(context: Context, live: dict[str, Any]) -> None:
         session.region_step("remove", shadow=f"{float(shadow):.4g}" if shadow else None)
         return context.picture(session)
 
-    values = [parts[f"glass_{name}"] for name in (*_GLASS, "tint", "hollow")]
     slow = {k: v for k, v in live.items() if k not in ("queue", "trigger_mode")} | {"show_progress": "minimal"}
-    parts["glass"].click(glass, values, context.picture_parts, **slow)
     parts["remove"].click(remove, parts["shadow"], context.picture_parts, **slow)
 
 

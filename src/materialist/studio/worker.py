@@ -23,25 +23,16 @@ NICE = 5
 
 def main() -> None:
     """Do the one job that stdin describes."""
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever libraries say goes to stderr
+    tell = teller()
     spec = json.loads(sys.stdin.readline())
     threading.Thread(target=_until_alone, daemon=True).start()
     os.nice(NICE)
-    tell = _teller(out)
     from materialist.studio import tasks
 
     try:
         tell({"result": getattr(tasks, f"do_{spec.pop('kind')}")(Reporter(tell), **spec)})
-    except MaterialistError as error:
-        tell({"error": str(error)})
-    except MemoryError:
-        tell({"error": "There is not enough memory for this; try a smaller size."})
     except Exception as error:
-        import traceback
-
-        traceback.print_exc()
-        tell({"error": f"Something went wrong inside ({type(error).__name__}: {error}); the terminal has the details."})
+        tell({"error": sentence(error)})
     # Without the interpreter's own goodbye: libraries with threads take seconds over it.
     sys.stderr.flush()
     os._exit(0)
@@ -64,12 +55,28 @@ class Reporter:
         self._tell({"found": name, "file": file.name})
 
 
-def _teller(out: Any) -> Callable[[dict[str, Any]], None]:
+def teller() -> Callable[[dict[str, Any]], None]:
+    """What writes one JSON line to stdout, which nothing else reaches from then on."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # whatever libraries say goes to stderr
+
     def tell(entry: dict[str, Any]) -> None:
         out.write(json.dumps(entry, default=str) + "\n")
         out.flush()
 
     return tell
+
+
+def sentence(error: Exception) -> str:
+    """What went wrong, for the page; what we did not expect goes to the terminal as well."""
+    if isinstance(error, MaterialistError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "There is not enough memory for this; try a smaller size."
+    import traceback
+
+    traceback.print_exception(error)
+    return f"Something went wrong inside ({type(error).__name__}: {error}); the terminal has the details."
 
 
 def _until_alone() -> None:

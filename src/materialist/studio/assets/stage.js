@@ -6,10 +6,12 @@ const outline = element.querySelector(".outline");
 const badge = element.querySelector(".badge");
 const marks = element.querySelector(".marks");
 const cross = element.querySelector(".cross");
-let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null;
+let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0, asked = 0;
 
 function show() {
   const v = props.value || {};
+  if (v.serial && v.serial < serial) return;  // overtaken by a newer one
+  serial = v.serial || serial;
   if (v.width) { width = v.width; height = v.height; marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
     view.style.maxWidth = `calc(72vh * ${width / height})`; }  // a portrait must not push its tools out of sight
   view.classList.toggle("empty", !width);
@@ -27,6 +29,8 @@ function show() {
     fill.classList.toggle("seen", !!v.fill);
     view.dataset.selected = v.fill ? "yes" : "";
   }
+  if (v.waiting !== undefined) view.dataset.waiting = v.waiting ? "yes" : "";
+  if (v.asked && v.asked !== asked) { asked = v.asked; trigger("follow", { asked }); }
   if (v.lamps !== undefined) {
     const r = Math.max(width, height) / 60;
     marks.querySelectorAll(".lamp").forEach((n) => n.remove());
