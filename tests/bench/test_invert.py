@@ -55,7 +55,7 @@ def fake_inversion(monkeypatch):
         (scene / "scene.json").write_text(json.dumps({"camera": camera}))
         return 0, '{"ok": true}', 700.0
 
-    monkeypatch.setattr(invert, "_watched", watched)
+    monkeypatch.setattr(invert, "watched", watched)
     return seen
 
 
@@ -84,7 +84,7 @@ def test_stages_are_added_up_and_the_rest_is_told():
 def test_a_process_is_watched_to_its_end():
     program = "import sys; block = bytearray(120_000_000); block[::4096] = b'x' * len(block[::4096]); print('end')"
     program += "; import time; time.sleep(0.2); sys.exit(3)"
-    code, answer, peak = invert._watched([sys.executable, "-c", program])
+    code, answer, peak = invert.watched([sys.executable, "-c", program])
     assert code == 3 and answer.strip() == "end"
     if sys.platform == "linux":
         assert 115 < peak < 250

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tempfile
 import time
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from materialist.bench.process import message, watched
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
 from materialist.types import Photo
@@ -161,10 +161,10 @@ def inversion(case: Case, size: int, folder: Path, options: list[str]) -> dict[s
     command = [sys.executable, "-m", "materialist", "invert", str(photo), "-o", str(scene), "--json"]
     command += ["--predictor", case.predictor, "--fov", case.fov, "--size", str(size), *options]
     start = time.perf_counter()
-    code, answer, peak_mb = _watched(command)
+    code, answer, peak_mb = watched(command)
     seconds = time.perf_counter() - start
     if code != 0:
-        raise InputError(f"The inversion at size {size} ended with code {code}: {_message(answer)}")
+        raise InputError(f"The inversion at size {size} ended with code {code}: {message(answer)}")
     report = json.loads((scene / "report.json").read_text())
     camera = json.loads((scene / "scene.json").read_text())["camera"]
     pixels = camera["width"] * camera["height"]
@@ -202,43 +202,6 @@ def _photo(case: Case, size: int) -> Photo:
     from materialist.io.photo import read_photo
 
     return read_photo(case.photo, size=size, fov=case.fov)
-
-
-def _watched(command: list[str]) -> tuple[int, str, float | None]:
-    """Run a command: exit code, standard output and error, and the peak of its resident memory in MB."""
-    with tempfile.TemporaryFile() as out:
-        process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
-        peak_kb = 0
-        try:
-            while process.poll() is None:
-                # The kernel keeps the high-water mark itself: only growth in the last moment can be missed. The usage
-                # that it reports after the end is no substitute, since it begins with the memory of this process.
-                peak_kb = max(peak_kb, _high_water_kb(process.pid))
-                time.sleep(0.02)
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
-        out.seek(0)
-        return process.returncode, out.read().decode(errors="replace"), peak_kb / 1024 if peak_kb else None
-
-
-def _high_water_kb(pid: int) -> int:
-    """VmHWM of a process in KiB; 0 where the system does not tell."""
-    try:
-        status = Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return 0
-    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:")), 0)
-
-
-def _message(answer: str) -> str:
-    """The sentence in the last line of --json, or the last line itself."""
-    last = answer.strip().splitlines()[-1] if answer.strip() else "it said nothing; it may have run out of memory."
-    try:
-        return json.loads(last)["message"]
-    except (ValueError, KeyError, TypeError):
-        return last
 
 
 def _quality(report: dict[str, Any]) -> dict[str, float]:

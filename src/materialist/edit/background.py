@@ -15,6 +15,7 @@ from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
+from materialist.io.image import same_aspect
 from materialist.types import Array, Materials, Photo, Scene
 
 Inpaint = Callable[[Array, Array], Array]
@@ -202,11 +203,7 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Arr
         background = decode_photo(Path(background)).linear
     picture = np.asarray(background, np.float32)
     shape = hole.painted.shape
-    if (
-        picture.ndim != 3
-        or picture.shape[2] != 3
-        or abs(picture.shape[1] / picture.shape[0] - shape[1] / shape[0]) > 1.5 * shape[1] / shape[0] / min(shape)
-    ):
+    if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, shape):
         raise InputError(
             f"The background is {' x '.join(map(str, picture.shape[1::-1]))} pixels, the photo {shape[1]} x {shape[0]} "
             "at working size; give the same view at the same proportions."

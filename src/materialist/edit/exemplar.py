@@ -154,11 +154,11 @@ class _Level:
             best = self._from_coarser(before, rng)
             filled = self._averaged(self.features, best, np.ones(len(best), np.float32))
         cost = np.zeros(len(best), np.float32)
-        for k in range(rounds):
+        for _ in range(rounds):
             self._flat = filled.reshape(-1, filled.shape[-1])
             self._patch = self._flat[self.targets[:, None] + self.around]  # [P, n, F]
             cost = self._cost(best)
-            best, cost = self._searched(best, cost, rng, k)
+            best, cost = self._searched(best, cost, rng)
             spread = max(float(np.quantile(cost, 0.75)), 1e-8)
             filled = self._averaged(self.features, best, np.exp(-cost / spread))
         return _Match(self.factor, self.hole, filled, self.index, best, cost)
@@ -173,7 +173,7 @@ class _Level:
         strange = self.label.ravel()[source] != self.label.ravel()[self.targets]
         return (square * trust).sum(-1) / trust.sum(-1) + OTHER * strange + FAR * far.astype(np.float32)
 
-    def _searched(self, best: Array, cost: Array, rng: np.random.Generator, turn: int) -> tuple[Array, Array]:
+    def _searched(self, best: Array, cost: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """What neighbours found, moved along; then places near the best so far, ever nearer."""
         height, width = self.shape
         for step in (2, 1):

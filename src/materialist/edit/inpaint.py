@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,10 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
 
     try:
         folder, _ = hub.locate(where, DEFAULT)
-        pipeline = _pipeline(folder, hub.on_gpu(device))
+        pipeline = hub.pipeline(
+            "StableDiffusionInpaintPipeline", folder, hub.on_gpu(device), "inpainting pipeline",
+            safety_checker=None, requires_safety_checker=False,
+        )  # fmt: skip
     except SetupError as error:
         raise SetupError(
             f"Inpainting by diffusion needs diffusers and transformers; install them with: {hub.INSTALL}, or leave "
@@ -62,29 +64,3 @@ def diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int)
     ).images[0]  # fmt: skip
     large = cv2.resize(np.asarray(out, np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
     return np.where(hole[..., None], srgb_to_linear(np.clip(large, 0, 1)), photo).astype(np.float32)
-
-
-def _pipeline(folder: Path, gpu: bool) -> Any:
-    """Stable Diffusion's inpainting pipeline, every component whole."""
-    import torch
-
-    from materialist.predict import hub
-
-    diffusers, transformers = hub.library("diffusers"), hub.library("transformers")
-    components = {}
-    for name, cls in (
-        ("unet", diffusers.UNet2DConditionModel),
-        ("vae", diffusers.AutoencoderKL),
-        ("text_encoder", transformers.CLIPTextModel),
-    ):
-        variant = {"variant": "fp16"} if any((folder / name).glob("*.fp16.*")) else {}
-        components[name] = hub.load(cls, folder, name, **variant).to(torch.float16 if gpu else torch.float32)
-    try:
-        pipeline = diffusers.StableDiffusionInpaintPipeline.from_pretrained(
-            folder, local_files_only=True, safety_checker=None, requires_safety_checker=False, **components
-        )
-    except Exception as error:  # whatever its readers raise on a damaged configuration
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-        raise WeightsError(f"{folder} does not hold a whole inpainting pipeline ({reason}); fetch it again.") from error
-    pipeline.set_progress_bar_config(disable=True)
-    return pipeline.to("cuda" if gpu else "cpu")

@@ -161,7 +161,7 @@ def _built(scene: Scene, device: str):
 def add_lamps(target, lamps: tuple[Lamp, ...]) -> None:
     """Put lamps into a `RenderScene`: small glowing spheres, which the path tracer aims at."""
     mi = target.mi
-    shapes = {f"lamp{k}": _sphere(mi, lamp) for k, lamp in enumerate(lamps)}
+    shapes = {f"lamp{k}": _sphere(lamp) for k, lamp in enumerate(lamps)}
     shapes |= {name: shape for name, shape in _parts(target.mi_scene).items()}
     target.mi_scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **shapes})
     target.params = mi.traverse(target.mi_scene)
@@ -174,7 +174,7 @@ def _parts(scene) -> dict:
     return {"sensor": scene.sensors()[0], "light": scene.environment(), **shapes}
 
 
-def _sphere(mi, lamp: Lamp) -> dict:
+def _sphere(lamp: Lamp) -> dict:
     """A sphere whose radiant flux is the lamp's: its radiance L = power / (4 pi^2 r^2)."""
     radiance = np.asarray(lamp.power, np.float64) / (4 * np.pi**2 * lamp.radius**2)
     return {

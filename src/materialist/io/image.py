@@ -90,6 +90,14 @@ def read_map(path: str | Path) -> Array:
     return np.ascontiguousarray(array, np.float32) / np.float32(scale)
 
 
+def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
+    """Whether a picture of shape `a` (H, W, ...) has the proportions of one at working size `b`.
+
+    A pixel of slack on the shorter side of `b`: working sizes are rounded.
+    """
+    return abs(a[1] / a[0] - b[1] / b[0]) <= 1.5 * b[1] / b[0] / min(b[:2])
+
+
 def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None) -> Array:
     """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside.
 
@@ -102,8 +110,7 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
     mask = mask.max(-1) if mask.ndim == 3 else mask
     if mask.shape != shape:
         sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
-        # A pixel of slack on the shorter side: working sizes are rounded.
-        if abs(mask.shape[1] / mask.shape[0] - shape[1] / shape[0]) > 1.5 * shape[1] / shape[0] / min(shape):
+        if not same_aspect(mask.shape, shape):
             raise InputError(f"The mask {path} is {mask.shape[1]} x {mask.shape[0]} pixels, the photo {sizes}.")
         mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_AREA)
     inside = mask > 0.5

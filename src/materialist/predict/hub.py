@@ -56,10 +56,9 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
         model, info = cls.from_pretrained(folder, local_files_only=True, output_loading_info=True, **extra, **options)
     # The libraries raise whatever their readers raise on damaged files.
     except Exception as error:
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
         raise WeightsError(
-            f"{where} does not hold a {cls.__name__} that can be read ({reason}); fetch it again with: materialist "
-            f"models download NAME --force, or {INSTEAD}."
+            f"{where} does not hold a {cls.__name__} that can be read ({_reason(error)}); fetch it again with: "
+            f"materialist models download NAME --force, or {INSTEAD}."
         ) from error
     faults = []
     if names := sorted(map(str, info.get("missing_keys") or ())):
@@ -71,6 +70,37 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     if faults:
         raise WeightsError(f"{where} is not a whole {cls.__name__}: it {', '.join(faults)}; fetch it again.")
     return model
+
+
+def pipeline(name: str, folder: Path, gpu: bool, what: str | None = None, **options: Any) -> Any:
+    """The pipeline `name` of diffusers in a folder, every component whole; half precision on the GPU only.
+
+    `what` is what errors call it, by default its name. Raises SetupError, WeightsError.
+    """
+    import torch
+
+    diffusers, transformers = library("diffusers"), library("transformers")
+    components = {}
+    for part, cls in (
+        ("unet", diffusers.UNet2DConditionModel),
+        ("vae", diffusers.AutoencoderKL),
+        ("text_encoder", transformers.CLIPTextModel),
+    ):
+        variant = {"variant": "fp16"} if any((folder / part).glob("*.fp16.*")) else {}
+        components[part] = load(cls, folder, part, **variant).to(torch.float16 if gpu else torch.float32)
+    try:
+        made = getattr(diffusers, name).from_pretrained(folder, local_files_only=True, **components, **options)
+    except Exception as error:  # whatever its readers raise on a damaged configuration
+        raise WeightsError(
+            f"{folder} does not hold a whole {what or name} ({_reason(error)}); fetch it again."
+        ) from error
+    made.set_progress_bar_config(disable=True)
+    return made.to("cuda" if gpu else "cpu")
+
+
+def _reason(error: Exception) -> str:
+    """The first line of what a library says."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
 
 
 def on_gpu(device: str) -> bool:

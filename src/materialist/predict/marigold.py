@@ -89,7 +89,7 @@ class MarigoldPart:
         folder, label = hub.locate(self._where, "")
         source = f"marigold ({label}){hub.checked(folder)}"
         kind, gpu = _pipeline_class(folder), hub.on_gpu(self._device)
-        pipeline = _pipeline(folder, kind, gpu)
+        pipeline = hub.pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
         output = pipeline(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction
         notes: tuple[str, ...] = ()
@@ -145,27 +145,3 @@ def _pipeline_class(folder: Path) -> str:
     if kind not in GIVES:
         raise WeightsError(f"{folder} holds a {kind}; Marigold models are {', '.join(GIVES)}.")
     return kind
-
-
-def _pipeline(folder: Path, kind: str, gpu: bool):
-    """The pipeline, every component whole; half precision on the GPU only."""
-    import torch
-
-    diffusers, transformers = hub.library("diffusers"), hub.library("transformers")
-    dtype = torch.float16 if gpu else torch.float32
-    half = {"variant": "fp16"}
-    components = {}
-    for name, cls in (
-        ("unet", diffusers.UNet2DConditionModel),
-        ("vae", diffusers.AutoencoderKL),
-        ("text_encoder", transformers.CLIPTextModel),
-    ):
-        variant = half if any((folder / name).glob("*.fp16.*")) else {}
-        components[name] = hub.load(cls, folder, name, **variant).to(dtype)
-    try:
-        pipeline = getattr(diffusers, kind).from_pretrained(folder, local_files_only=True, **components)
-    except Exception as error:  # whatever its readers raise on a damaged configuration
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-        raise WeightsError(f"{folder} does not hold a whole {kind} ({reason}); fetch it again.") from error
-    pipeline.set_progress_bar_config(disable=True)
-    return pipeline.to("cuda" if gpu else "cpu")
