@@ -41,7 +41,7 @@ def session(opened):
     opened.stack, opened.thing = Stack(), {}
     opened.deselect()
     opened._past = []
-    opened._save()
+    opened.save()
     return opened
 
 

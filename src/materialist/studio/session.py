@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from materialist.edit.recipe import Step, write_recipe
-from materialist.errors import InputError
-from materialist.studio import views
+from materialist.errors import InputError, MaterialistError
+from materialist.studio import things, views
 from materialist.studio.desk import keep, new_name, read_steps, write_mask
 from materialist.studio.glass import Tracer
 from materialist.studio.jobs import Job
@@ -101,7 +101,7 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            self._remember("select")
+            self.remember("select")
             self._select(after)
             step = self._current("edit") or self._current("glass")
             if after.mask is None or mode not in (ADD, REMOVE) or step is None or self.stack.current is None:
@@ -111,7 +111,7 @@ class Session:
 
     def deselect(self) -> None:
         with self.lock:
-            self._remember("select")
+            self.remember("select")
             self._select(Selection())
             self.stack = self.stack.chosen(None)
 
@@ -128,11 +128,11 @@ class Session:
                     raise InputError("Click the object that you want to change first.")
                 if not (mask & (scene.depth > 0)).any():
                     raise InputError("The selection covers only sky; select a surface.")
-                self._remember("begin")
+                self.remember("begin")
                 self.stack = self.stack.add(Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk))
                 step = self.stack.steps[-1]
             else:
-                self._remember(f"{name} of {self.stack.current}")
+                self.remember(f"{name} of {self.stack.current}")
             self._put(step, **{name: value})
 
     def region_step(self, kind: str, **options: str | None) -> None:
@@ -142,59 +142,40 @@ class Session:
             if step is None and mask is None:
                 _ = self.scene
                 raise InputError("Click the object that you want to change first.")
-            self._remember(kind)
+            self.remember(kind)
             before = self.stack
             if step is None:
                 step = Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk)  # type: ignore[arg-type]
                 self.stack = before.add(step)
             merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
-            self._check_or(before, replace(step, options=merged))
+            self.check_or(before, replace(step, options=merged))
 
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light step; it is made when the first is set."""
         with self.lock:
             _ = self.scene
-            self._remember(f"light {sorted(options)}")
+            self.remember(f"light {sorted(options)}")
             place = self.stack.last("relight")
             self.stack = self.stack.add(Step("relight", {}, self.desk)) if place is None else self.stack.chosen(place)
             self._put(self.stack.steps[self.stack.current or 0], **options)
             if not self.stack.steps[self.stack.current or 0].options:
                 self.stack = self.stack.without(self.stack.current or 0)
-                self._save()
+                self.save()
 
     def place(self, x: float, y: float) -> None:
-        """Stand the object in hand at a pixel: the one of the list that is chosen, else a new one of the library."""
-        with self.lock:
-            _ = self.scene
-            at = [f"{x:.0f}", f"{y:.0f}"]
-            step = self._current("insert")
-            self._remember("place" if step is None else f"at of {self.stack.current}")
-            if step is None:
-                if "mesh" not in self.thing:
-                    raise InputError("Choose an object from the list, or upload one, first.")
-                step = Step("insert", {**self.thing, "at": at}, self.desk)
-            before, trial = self.stack, replace(step, options={**step.options, "at": at})
-            self.stack = self.stack.add(trial) if before.current is None or step.kind != self.in_hand else before
-            self._check_or(before, trial)
+        """See `things.place`."""
+        things.place(self, x, y)
 
     def thing_option(self, name: str, value: str | None) -> None:
-        """Set an option of the object in hand, or of the next one."""
-        with self.lock:
-            if name == "mesh":  # another object is a new one
-                self.stack = self.stack.chosen(None)
-            step = self._current("insert")
-            self.thing = {k: v for k, v in {**self.thing, name: value}.items() if v is not None}
-            if step is not None:
-                self._remember(f"{name} of {self.stack.current}")
-                merged = {k: v for k, v in {**step.options, name: value}.items() if v is not None}
-                self._check_or(self.stack, replace(step, options=merged))
+        """See `things.option`."""
+        things.option(self, name, value)
 
     def act(self, what: str, index: int) -> None:
         """One of the buttons of the list: toggle, up, down, remove, choose."""
         with self.lock:
             if not 0 <= index < len(self.stack.steps):
                 raise InputError("That edit is no longer there.")
-            self._remember(what)
+            self.remember(what)
             stack = self.stack
             changed = {
                 "toggle": lambda: stack.toggled(index), "up": lambda: stack.moved(index, -1),
@@ -206,7 +187,7 @@ class Session:
             self.stack = changed[what]()
             if what == "choose":
                 self._select(self._region_of(self.stack.current))
-            self._save()
+            self.save()
 
     def undo(self) -> bool:
         """Take back the last change; False where there is none."""
@@ -215,7 +196,7 @@ class Session:
                 return False
             _, self.stack, selection = self._past.pop()
             self._select(selection)
-            self._save()
+            self.save()
             return True
 
     def read_edits(self, file: Path) -> None:
@@ -225,9 +206,9 @@ class Session:
             steps = read_steps(desk, file)
             if self.live is not None and scene is not None:
                 self.live.edited(tuple(step for step in steps if not step.skipped))
-            self._remember("load")
+            self.remember("load")
             self.stack = Stack(steps)
-            self._save()
+            self.save()
 
     # Showing
 
@@ -238,7 +219,7 @@ class Session:
     def write_edits(self) -> str:
         """The recipe as a file for other commands; an empty text where no step is on."""
         with self.lock:
-            self._save()
+            self.save()
             return str(self.desk / EDITS) if self.stack.active else ""
 
     def keep(self, file: Path, stem: str, suffix: str) -> str:
@@ -251,17 +232,17 @@ class Session:
 
     # Within
 
-    def _check_or(self, before: Stack, step: Step) -> None:
+    def check_or(self, before: Stack, step: Step) -> None:
         """Put a step in hand; where it cannot be applied the stack is as before, and the error goes on."""
         assert self.stack.current is not None and self.live is not None
         self.stack = self.stack.put(self.stack.current, step)
         try:
             self.live.edited(self.stack.active)
-        except InputError:
+        except MaterialistError:
             self.stack = before
             self._past = self._past[:-1]
             raise
-        self._save()
+        self.save()
 
     def _current(self, kind: str) -> Step | None:
         k = self.stack.current
@@ -271,9 +252,9 @@ class Session:
         assert self.stack.current is not None
         merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
         self.stack = self.stack.put(self.stack.current, replace(step, options=merged))
-        self._save()
+        self.save()
 
-    def _remember(self, what: str) -> None:
+    def remember(self, what: str) -> None:
         """Keep the state for undo; a slider that moves on adds no further entry."""
         steady = what.startswith("light ") or " of " in what
         if not (steady and self._past and self._past[-1][0] == what):
@@ -292,7 +273,8 @@ class Session:
 
         return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Write edits.yaml, and let go of the glass that is no longer in it."""
         if self.glass is not None:
             self.glass.keep(self.stack.steps)
         if self.stack.steps:

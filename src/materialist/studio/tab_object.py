@@ -9,9 +9,9 @@ from typing import Any
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.studio import tab_glass, uploads
+from materialist.studio import tab_glass, things, uploads
 from materialist.studio.context import Context
-from materialist.studio.follow import follow
+from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.session import Session
 from materialist.studio.tab_material import hex_colour
@@ -41,9 +41,14 @@ def layout(context: Context) -> None:
         with gr.Accordion("Take the selection away", open=False):
             parts["shadow"] = gr.Slider(0, 2, 0.5, step=0.05, label="How much of its shadow goes along", buttons=[])
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
-        with gr.Accordion("Let it fall: a video", open=False):
-            gr.Markdown("The object of the list falls where it stands. Needs the physics extra.")
-            parts["fall"] = gr.Button("Make the video", size="sm")
+        with gr.Accordion("Let it fall", open=False):
+            gr.Markdown("The object falls where it stands. Needs the physics extra.")
+            parts["height"] = gr.Slider(
+                0, 5, 1.5, step=0.1, label="How high above, in its own sizes", buttons=[], elem_id="height"
+            )
+            parts["rest"] = gr.Button("Let it fall, and lie there", elem_id="rest", size="sm")
+            gr.Markdown("Once more, and it tumbles in another way.")
+            parts["fall"] = gr.Button("Make a video of the fall", size="sm")
             with gr.Row():
                 parts["fall_progress"] = gr.HTML("", js_on_load=None)
                 parts["fall_stop"] = gr.Button("Stop", variant="stop", size="sm", visible=False, min_width=70)
@@ -127,19 +132,20 @@ def _wire_regions(context: Context, live: dict[str, Any]) -> None:
 
 
 def _wire_fall(context: Context) -> None:
-    """The video of a falling object."""
+    """An object that falls: to lie there, or as a video."""
     parts, hub = context.parts, context.hub
     free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
 
     @guarded
-    def fall(request: gr.Request) -> Any:
+    def fall(height: float, request: gr.Request) -> Any:
         session = context.session(request)
         scene = str(session.project.scene) if session.scene and session.project else ""
-        place = session.stack.last("insert")
+        place = things.last(session)
         if place is None:
             raise InputError("Place an object first; it falls where it stands.")
         step, file = session.stack.steps[place], session.new_name("fall", ".mp4")
-        told = {k: step.options[k] for k in ("scale", "material") if k in step.options}
+        told = {k: step.options[k] for k in ("scale", "material", "height", "seed") if k in step.options}
+        told = {"height": f"{float(height):.3g}", **told}
         job = hub.jobs.submit(
             "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
             at=[float(v) for v in step.options["at"]], output=str(file), **told,
@@ -156,7 +162,20 @@ def _wire_fall(context: Context) -> None:
         if session.running is not None:
             hub.jobs.stop(session.running)
 
-    parts["fall"].click(fall, None, [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]], **free)
+    @guarded
+    def rest(height: float, request: gr.Request) -> Any:
+        session = context.session(request)
+        yield {parts["fall_progress"]: box("It falls …")}
+        try:
+            things.let_fall(session, float(height))
+        finally:
+            yield {parts["fall_progress"]: ""}
+        yield context.everything(session)
+
+    parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **free)
+    parts["fall"].click(
+        fall, parts["height"], [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]], **free
+    )
     parts["fall_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 

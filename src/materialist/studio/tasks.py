@@ -117,7 +117,7 @@ def do_take(
 
 def do_fall(
     progress: Progress, scene: str, mesh: str, at: list[float], output: str, scale: str = "1", material: str = "as-is",
-    frames: int = 36, spp: int = 32,
+    height: str = "1.5", seed: str = "0", frames: int = 36, spp: int = 32,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist drop`: a mesh falls onto the photo, as a video."""
     from materialist.edit.drop import drop
@@ -128,7 +128,10 @@ def do_fall(
     ensure_video_writable(output, force=True)
     progress("load", 0, 1)
     loaded = load_scene(scene)
-    film = drop(loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, scale=float(scale), material=material)
+    film = drop(
+        loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, scale=float(scale), material=material,
+        height=float(height), seed=int(seed),
+    )  # fmt: skip
     write_frames(output, filmed(loaded, film, spp=spp, progress=progress), fps=24, force=True)
     return {"file": output}
 

@@ -70,20 +70,30 @@ function trace() {
   } else if (tool() === "brush") {
     const l = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
     l.setAttribute("points", path.map((p) => p.join(",")).join(" "));
-    l.setAttribute("stroke-width", 2 * size()); l.setAttribute("class", "trace stroke"); marks.append(l);
+    l.setAttribute("stroke-width", 2 * size()); l.setAttribute("class", `trace stroke ${down}`); marks.append(l);
   }
+}
+// Where the brush is and how wide it paints; red where it rubs out.
+function ring(e) {
+  marks.querySelectorAll(".ring").forEach((n) => n.remove());
+  if (e && width && tool() === "brush") marks.append(circle(...at(e), size(), `ring ${down || mode(e)}`));
 }
 
 view.addEventListener("pointerdown", (e) => {
-  if (!width || e.button) return;
+  if (!width || e.button || !e.isPrimary) return;
   down = mode(e); path = [at(e)]; cross.style.display = "none"; cursor = null;
-  if (tool() === "box" || tool() === "brush") { view.setPointerCapture(e.pointerId); e.preventDefault(); trace(); }
+  if (tool() === "box" || tool() === "brush") { view.setPointerCapture(e.pointerId); e.preventDefault(); trace(); ring(e); }
 });
-view.addEventListener("pointermove", (e) => { if (down && tool() !== "click") { path.push(at(e)); trace(); } });
-view.addEventListener("pointercancel", () => { down = null; trace(); });
+view.addEventListener("pointermove", (e) => {
+  if (!e.isPrimary) return;
+  if (down && tool() !== "click") { path.push(at(e)); trace(); }
+  ring(e);
+});
+view.addEventListener("pointerleave", () => { if (!down) ring(null); });
+view.addEventListener("pointercancel", () => { down = null; trace(); ring(null); });
 view.addEventListener("pointerup", (e) => {
-  if (!down) return;
-  const how = down; path.push(at(e)); finish(tool(), how); down = null; trace();
+  if (!down || !e.isPrimary) return;
+  const how = down; path.push(at(e)); finish(tool(), how); down = null; trace(); ring(e.pointerType === "mouse" ? e : null);
 });
 function finish(kind, how) {
   const [x0, y0] = path[0], [x1, y1] = path[path.length - 1];

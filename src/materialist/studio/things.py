@@ -1,0 +1,89 @@
+"""Things that are put into the photo: placed, changed, and let fall; steps `insert` and `drop` of the list of edits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from materialist.edit.recipe import DROP, Step
+from materialist.errors import InputError
+
+if TYPE_CHECKING:
+    from materialist.studio.session import Session
+
+KINDS = ("insert", "drop")
+
+
+def in_hand(session: Session) -> Step | None:
+    """The thing of the list that is chosen."""
+    stack = session.stack
+    return stack.steps[stack.current] if stack.current is not None and session.in_hand in KINDS else None
+
+
+def last(session: Session) -> int | None:
+    """The place of the thing that is chosen, else of the last one in the list."""
+    stack = session.stack
+    if session.in_hand in KINDS:
+        return stack.current
+    return max((k for kind in KINDS if (k := stack.last(kind)) is not None), default=None)
+
+
+def place(session: Session, x: float, y: float) -> None:
+    """Stand the thing in hand at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
+    with session.lock:
+        _ = session.scene
+        at = [f"{x:.0f}", f"{y:.0f}"]
+        step = in_hand(session)
+        session.remember("place" if step is None else f"at of {session.stack.current}")
+        before = session.stack
+        if step is None:
+            if "mesh" not in session.thing:
+                raise InputError("Choose an object from the list, or upload one, first.")
+            step = Step("insert", {**session.thing, "at": at}, session.desk)
+            session.stack = before.add(step)
+        session.check_or(before, replace(step, options={**step.options, "at": at}))
+
+
+def option(session: Session, name: str, value: str | None) -> None:
+    """Set or clear (None) an option of the thing in hand, and of the next one. Raises InputError."""
+    with session.lock:
+        if name == "mesh":  # another object is a new one
+            session.stack = session.stack.chosen(None)
+        step = in_hand(session)
+        session.thing = {k: v for k, v in {**session.thing, name: value}.items() if v is not None}
+        if step is not None and (step.kind == "insert" or name in DROP):
+            session.remember(f"{name} of {session.stack.current}")
+            merged = {k: v for k, v in {**step.options, name: value}.items() if v is not None}
+            session.check_or(session.stack, replace(step, options=merged))
+
+
+def let_fall(session: Session, height: float) -> None:
+    """The thing in hand, else the last one, falls where it stands and lies where it comes to rest.
+
+    One that has fallen falls again, and tumbles in another way. The fall takes seconds, in which the page goes on.
+
+    Raises:
+        InputError: there is none, it falls beside everything, or the list was changed meanwhile. SetupError: the
+            physics is not installed.
+    """
+    with session.lock:
+        _ = session.scene
+        stack, live, index = session.stack, session.live, last(session)
+        if index is None or live is None:
+            raise InputError("Place an object first; it falls where it stands.")
+        step = fallen(stack.steps[index], height)
+        trial = stack.put(index, step)
+    live.edited(trial.active)  # kept there: the picture that follows finds it
+    with session.lock:
+        if session.stack != stack:
+            raise InputError("The list of edits was changed while the object fell; let it fall again.")
+        session.remember("fall")
+        session.stack = trial
+        session.save()
+
+
+def fallen(step: Step, height: float) -> Step:
+    """The `drop` that takes the place of an `insert`; of a `drop`, one with the next seed."""
+    options = {k: v for k, v in step.options.items() if k in (*DROP, "skip") and k not in ("height", "seed")}
+    seed = int(step.options.get("seed", 0)) + 1 if step.kind == "drop" else 0
+    return replace(step, kind="drop", options={**options, "height": f"{height:.3g}", "seed": str(seed)})

@@ -1,0 +1,229 @@
+"""Glass that follows its sliders: the tracing process, what is asked of it, and what the stage shows meanwhile."""
+
+import sys
+import time
+
+import numpy as np
+import pytest
+from studio_scenes import block, package, room
+
+from materialist.edit.recipe import Step
+from materialist.errors import InputError
+from materialist.studio import child, glass_worker
+from materialist.studio import glass as studio_glass
+from materialist.studio.glass import Pane, Tracer, checked, traced
+from materialist.studio.live import Live
+from materialist.studio.tab_glass import tint_colour, tint_text
+
+WORKER = """
+import base64, json, os, sys, time
+tell = lambda **entry: print(json.dumps(entry), flush=True)
+b64 = lambda data: base64.b64encode(data).decode()
+log = open(os.environ["GLASS_LOG"], "a")
+for line in sys.stdin:
+    asked = json.loads(line)
+    print(os.getpid(), asked["glass"].get("ior"), file=log, flush=True)
+    tell(ask=asked["ask"], stage="build")
+    ior = float(asked["glass"].get("ior", 1.5))
+    if ior == 1.9: time.sleep(60)
+    if ior == 1.8: sys.exit(1)
+    if ior == 1.7: tell(ask=asked["ask"], error="The camera sees nothing of the object; mark another one."); continue
+    time.sleep(0.2)
+    tell(ask=asked["ask"], stage="trace")
+    import struct
+    half = struct.pack("<6e", *([ior] * 6))
+    tell(ask=asked["ask"], pane={"box": [4, 5, 8, 10], "picture": b64(half), "share": b64(bytes([255, 51])),
+                                 "filled": b64(bytes([0, 1]))})
+"""
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    """A tracing process that answers at once; the file says what it was asked, and which process it was."""
+    script, written = tmp_path / "worker.py", tmp_path / "log.txt"
+    script.write_text(WORKER)
+    written.touch()
+    monkeypatch.setenv("GLASS_LOG", str(written))
+    real = child.subprocess.Popen
+    monkeypatch.setattr(child.subprocess, "Popen", lambda command, **more: real([sys.executable, str(script)], **more))
+    return written
+
+
+@pytest.fixture
+def tracer(log, tmp_path):
+    made = Tracer(tmp_path / "room.scene")
+    yield made
+    made.rest()
+
+
+def glass(ior, mask="mask-1.png", **more):
+    return Step("glass", {"mask": mask, "ior": str(ior), **more})
+
+
+def until(done, seconds=15.0):
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "took too long"
+        time.sleep(0.02)
+
+
+def test_the_last_value_wins_and_the_picture_is_kept(tracer, log):
+    for ior in (1.1, 1.2, 1.3):
+        tracer.ask((), glass(ior))
+    assert tracer.state.waiting and tracer.pane(glass(1.3)) is None
+    until(lambda: not tracer.state.waiting)
+    pane = tracer.pane(glass(1.3))
+    assert (
+        pane.box == (4, 5, 8, 10)
+        and pane.picture.shape == (1, 2, 3)
+        and pane.picture[0, 0, 0] == pytest.approx(1.3, abs=1e-3)
+    )
+    np.testing.assert_allclose(pane.share, [[1, 0.2]])
+    assert pane.filled.tolist() == [[False, True]]
+    assert tracer.fresh((), glass(1.3)) and not tracer.fresh((), glass(1.2))
+    assert not tracer.fresh((Step("relight", {"rotate": "9"}),), glass(1.3))
+    asked = len(log.read_text().splitlines())
+    tracer.ask((), glass(1.3))  # the same wish again
+    assert not tracer.state.waiting and len(log.read_text().splitlines()) == asked
+    assert len({line.split()[0] for line in log.read_text().splitlines()}) == 1  # one process for all
+
+
+def test_another_object_does_not_wait_for_a_body_in_the_making(tracer, log):
+    tracer.ask((), glass(1.9))
+    until(lambda: "1.9" in log.read_text() and tracer.state.words.startswith("Building"))
+    tracer.ask((), glass(1.4, "mask-2.png"))
+    until(lambda: not tracer.state.waiting)
+    assert tracer.pane(glass(1.4, "mask-2.png")) is not None and tracer.pane(glass(1.9)) is None
+
+
+def test_a_slider_while_the_body_is_in_the_making_does_not_begin_again(tracer, log):
+    tracer.ask((), glass(1.1))
+    until(lambda: "1.1" in log.read_text())
+    tracer.ask((), glass(1.2))
+    until(lambda: not tracer.state.waiting)
+    assert len({line.split()[0] for line in log.read_text().splitlines()}) == 1
+
+
+def test_failures_are_told_and_the_next_value_is_tried(tracer):
+    tracer.ask((), glass(1.7))
+    until(lambda: not tracer.state.waiting)
+    assert tracer.state.bad and "sees nothing" in tracer.state.words
+    tracer.ask((), glass(1.8))
+    until(lambda: not tracer.state.waiting)
+    assert tracer.state.bad and "ended by itself" in tracer.state.words
+    tracer.ask((), glass(1.8))  # asking again tries again
+    until(lambda: not tracer.state.waiting)
+    tracer.ask((), glass(1.4))
+    until(lambda: not tracer.state.waiting)
+    assert not tracer.state.bad and tracer.pane(glass(1.4)) is not None
+
+
+def test_nothing_stays_when_the_glass_is_gone(tracer):
+    tracer.ask((), glass(1.4))
+    until(lambda: not tracer.state.waiting)
+    process = tracer._process
+    tracer.keep((glass(1.2), Step("remove", {"mask": "mask-3.png"})))
+    assert tracer.pane(glass(1.4)) is not None and process.poll() is None
+    tracer.keep((Step("remove", {"mask": "mask-1.png"}),))
+    assert tracer.pane(glass(1.4)) is None and not tracer.state.waiting
+    until(lambda: process.poll() is not None)
+    tracer.ask((), glass(1.4))  # undone: it is made again
+    until(lambda: tracer.pane(glass(1.4)) is not None)
+
+
+def test_too_little_memory_is_a_sentence(tracer, monkeypatch):
+    monkeypatch.setattr(studio_glass, "LEAST_FREE", 1e18)
+    tracer.ask((), glass(1.4))
+    assert not tracer.state.waiting and tracer.state.bad and "too little memory" in tracer.state.words
+    assert tracer._process is None
+
+
+def test_bad_glass_is_refused_at_once(tmp_path):
+    from materialist.studio.desk import write_mask
+
+    name = write_mask(tmp_path, block())
+    good = Step("glass", {"mask": name, "tint": ["1", "0.5", "0.25"]}, tmp_path)
+    region, tint = checked(room(), good)
+    assert (region == block()).all() and tint == (1, 0.5, 0.25)
+    with pytest.raises(InputError, match="index of refraction"):
+        checked(room(), Step("glass", {"mask": name, "ior": "9"}, tmp_path))
+    sky = np.zeros_like(block())
+    sky[:3] = True
+    with pytest.raises(InputError, match="only sky"):
+        checked(room(), Step("glass", {"mask": write_mask(tmp_path, sky)}, tmp_path))
+    assert traced(good) and not traced(Step("glass", {"mask": name, "model": "two-interface"}))
+
+
+class _Told:
+    """A tracer that knows one pane."""
+
+    def __init__(self, pane):
+        self._pane = pane
+
+    def pane(self, step):
+        return self._pane
+
+
+def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
+    from materialist.studio.desk import write_mask
+
+    live = Live(room())
+    step = Step("glass", {"mask": write_mask(tmp_path, block()), "tint": "0.2,1,0.2"}, tmp_path)
+    sketch = live.picture((step,))
+    before = room().photo.linear
+    assert np.array_equal(sketch[~block()], before[~block()])
+    inner = sketch[20:28, 20:30]
+    assert inner[..., 1].min() > 1.5 * inner[..., 0].max()  # red block, green glass
+    filled = np.zeros((2, 3), bool)
+    filled[0, 0] = True
+    share = np.array([[0, 1, 0.5], [0, 0, 0]], np.float32)
+    pane = Pane("", (20, 22, 20, 23), np.full((2, 3, 3), 0.9, np.float32), share, filled)
+    dim = Step("relight", {"ambient": "0.5"}, tmp_path)
+    with_pane, alone = live.picture((step, dim), _Told(pane)), live.picture((dim,))
+    np.testing.assert_allclose(with_pane[20, 20:22], 0.9)
+    np.testing.assert_allclose(with_pane[20, 22], 0.5 * 0.9 + 0.5 * alone[20, 22], rtol=1e-5)
+    outside = np.ones(block().shape, bool)
+    outside[20, 20:23] = False
+    assert np.array_equal(with_pane[outside], alone[outside])
+    live.close()
+
+
+def test_the_process_answers_with_the_preview_of_the_edit_package(tmp_path):
+    from materialist.edit.glass_preview import GlassPreview
+    from materialist.studio.desk import write_mask
+
+    scene, told, bench = package(tmp_path), [], glass_worker.Bench()
+    request = {
+        "ask": 7, "scene": str(scene), "folder": str(tmp_path), "others": [["relight", {"ambient": "0.5"}]],
+        "glass": {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"},
+    }  # fmt: skip
+    glass_worker.answer(bench, request, told.append, lambda: True)
+    assert [entry.get("stage") for entry in told] == ["load", "build", "trace", None]
+    pane = studio_glass._pane(told[-1]["pane"], "")
+    from dataclasses import replace
+
+    dim = replace(room(), envmap=room().envmap * 0.5)
+    truth = GlassPreview(dim, block(), thickness="symmetry").picture(ior=1.2, tint=(1, 0.5, 0.5))
+    top, bottom, left, right = pane.box
+    np.testing.assert_allclose(pane.picture, truth[top:bottom, left:right], rtol=2e-3, atol=1e-4)
+    outside = np.ones(block().shape, bool)
+    outside[top:bottom, left:right] = False
+    assert np.array_equal(truth[outside], room().photo.linear[outside])
+    assert pane.share.max() == 1 and (pane.share > 0.5).sum() > 0.8 * block().sum()
+    told.clear()
+    changed = {**request, "ask": 8, "glass": {**request["glass"], "ior": "1.4"}}
+    glass_worker.answer(bench, changed, told.append, lambda: False)  # a newer one came
+    assert [entry.get("stage") for entry in told] == ["load"]  # the body is kept, and nothing is traced
+    glass_worker.answer(bench, {**request, "glass": {"ior": "1.4", "box": "0,0,9"}}, told.append, lambda: True)
+    assert "must be 4 numbers" in told[-1]["error"]
+
+
+def test_bodies_are_told_apart_by_what_they_depend_on():
+    key = lambda **glass: glass_worker.body_key("s", [], {"mask": "a.png", **glass})  # noqa: E731
+    assert key(ior="1.2", tint="1,1,0") == key(roughness="0.4", transmission="0.2")
+    assert key(hollow="true") != key() != glass_worker.body_key("s", [["relight", {}]], {"mask": "a.png"})
+
+
+@pytest.mark.parametrize("colour", ["#ffffff", "#80ff10", "#010203"])
+def test_tints_go_and_come_back(colour):
+    assert tint_colour(tint_text(colour) or "1,1,1") == colour
