@@ -1,10 +1,15 @@
-"""A running studio on a small scene, and a browser; both are skipped, with the reason, where they cannot be."""
+"""A session on a small scene; a studio that runs on it, and a browser (skipped, with the reason, where they fail)."""
 
 import shutil
 
 import pytest
 from studio_scenes import package
 from studio_server import start
+
+from materialist.studio.hub import Hub
+from materialist.studio.jobs import Jobs
+from materialist.studio.stack import Stack
+from materialist.studio.work import WorkFolder
 
 
 @pytest.fixture(scope="session")
@@ -42,3 +47,31 @@ def page(browser):
     made.set_default_timeout(40_000)
     yield made
     context.close()
+
+
+@pytest.fixture(scope="module")
+def hub(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studio")
+    work = WorkFolder(folder / "work")
+    made = Hub(work, Jobs(1))
+    made.start = work.new("Room", "me", scene=package(folder))
+    yield made
+    made.jobs.close()
+
+
+@pytest.fixture(scope="module")
+def opened(hub):
+    session = hub.session("page", "me")
+    hub.open(session, hub.start.name)
+    session.live.wait()
+    return session
+
+
+@pytest.fixture
+def session(opened):
+    """The open session without edits."""
+    opened.stack, opened.thing = Stack(), {}
+    opened.deselect()
+    opened._past = []
+    opened.save()
+    return opened

@@ -10,6 +10,7 @@ import numpy as np
 
 from materialist.geometry.build import build_geometry
 from materialist.io.package import save_scene
+from materialist.studio.selection import read_pick
 from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
 
 HEIGHT, WIDTH = 48, 64
@@ -53,3 +54,8 @@ def png_header(width: int, height: int) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))  # noqa: E731
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+
+
+def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:
+    """A click of the page at a working pixel; by default on the block."""
+    session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))

@@ -1,6 +1,5 @@
 """The studio in a real browser."""
 
-import io
 import json
 import re
 import subprocess
@@ -11,40 +10,9 @@ import urllib.request
 import numpy as np
 import pytest
 from PIL import Image
+from studio_browser import READY, click_photo, opened, pixels, slide
 from studio_scenes import png_header
 from studio_server import start
-
-READY = "text=Ready: click an object"
-PICTURE = "document.querySelector('#stage .photo').src"
-
-
-def opened(page, address):
-    page.goto(address)
-    page.wait_for_selector("#stage .photo[src]")
-    page.wait_for_selector(READY)
-
-
-def click_photo(page, x, y, modifiers=()):
-    """A click at a share of the stage's width and height."""
-    box = page.locator("#stage .view").bounding_box()
-    page.locator("#stage .view").click(
-        position={"x": x * box["width"], "y": y * box["height"]}, modifiers=list(modifiers)
-    )
-
-
-def slide(page, name, value):
-    """Move a slider, and wait for the next picture."""
-    before = page.evaluate(PICTURE)
-    script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
-        r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
-    page.evaluate(script, [name, value])
-    page.wait_for_function("(old) => document.querySelector('#stage .photo').src !== old", arg=before)
-
-
-def pixels(page):
-    """[H, W, 3] uint8 of the picture on the stage."""
-    url = page.evaluate(PICTURE)
-    return np.asarray(Image.open(io.BytesIO(urllib.request.urlopen(url).read())).convert("RGB"))
 
 
 def test_select_edit_undo(page, running):

@@ -2,51 +2,15 @@
 
 import numpy as np
 import pytest
-from studio_scenes import block, package, room
+from studio_scenes import block, click, room
 
 from materialist.edit.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.context import light_values, material_values
-from materialist.studio.hub import Hub
-from materialist.studio.jobs import Jobs
-from materialist.studio.selection import Selection, read_pick
-from materialist.studio.stack import Stack
+from materialist.studio.selection import Selection
 from materialist.studio.tab_light import place_lamp
 from materialist.studio.tab_object import LIBRARY, library_file, shape
 from materialist.studio.tab_take import commands
-from materialist.studio.work import WorkFolder
-
-
-@pytest.fixture(scope="module")
-def hub(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("studio")
-    work = WorkFolder(folder / "work")
-    made = Hub(work, Jobs(1))
-    made.start = work.new("Room", "me", scene=package(folder))
-    yield made
-    made.jobs.close()
-
-
-@pytest.fixture(scope="module")
-def opened(hub):
-    session = hub.session("page", "me")
-    hub.open(session, hub.start.name)
-    session.live.wait()
-    return session
-
-
-@pytest.fixture
-def session(opened):
-    """The open session without edits."""
-    opened.stack, opened.thing = Stack(), {}
-    opened.deselect()
-    opened._past = []
-    opened.save()
-    return opened
-
-
-def click(session, x=25, y=24, mode="new"):
-    session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))
 
 
 def test_an_edit_from_click_to_recipe(session):

@@ -79,7 +79,9 @@ def _left(parts: dict[str, Any]) -> None:
         parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
-        parts["brush"] = gr.Slider(2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[])
+        parts["brush"] = gr.Slider(
+            2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[], elem_id="brush"
+        )
     missing = sam_missing()
     parts["sam"] = gr.Checkbox(
         False, label="Find objects with SAM 2", interactive=missing is None, elem_id="sam",

@@ -167,10 +167,10 @@ def _wire_fall(context: Context) -> None:
         session = context.session(request)
         yield {parts["fall_progress"]: box("It falls …")}
         try:
-            things.let_fall(session, float(height))
+            notes = things.let_fall(session, float(height))
         finally:
             yield {parts["fall_progress"]: ""}
-        yield context.everything(session)
+        yield {**context.everything(session), parts["fall_progress"]: box(" ".join(notes)) if notes else ""}
 
     parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **free)
     parts["fall"].click(

@@ -57,10 +57,11 @@ def option(session: Session, name: str, value: str | None) -> None:
             session.check_or(session.stack, replace(step, options=merged))
 
 
-def let_fall(session: Session, height: float) -> None:
+def let_fall(session: Session, height: float) -> list[str]:
     """The thing in hand, else the last one, falls where it stands and lies where it comes to rest.
 
     One that has fallen falls again, and tumbles in another way. The fall takes seconds, in which the page goes on.
+    Returns sentences on what did not go as expected.
 
     Raises:
         InputError: there is none, it falls beside everything, or the list was changed meanwhile. SetupError: the
@@ -73,13 +74,15 @@ def let_fall(session: Session, height: float) -> None:
             raise InputError("Place an object first; it falls where it stands.")
         step = fallen(stack.steps[index], height)
         trial = stack.put(index, step)
-    live.edited(trial.active)  # kept there: the picture that follows finds it
+    known = set(live.edited(stack.active).report.warnings)
+    notes = live.edited(trial.active).report.warnings  # kept there: the picture that follows finds it
     with session.lock:
-        if session.stack != stack:
+        if session.stack.steps != stack.steps:
             raise InputError("The list of edits was changed while the object fell; let it fall again.")
         session.remember("fall")
         session.stack = trial
         session.save()
+    return [note for note in notes if note not in known]
 
 
 def fallen(step: Step, height: float) -> Step:

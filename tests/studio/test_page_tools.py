@@ -1,0 +1,149 @@
+"""The brush, falling objects and live glass in a real browser."""
+
+import pytest
+from studio_browser import click_photo, mask, opened, pixels, place, press, slide
+
+MASK = "getComputedStyle(document.querySelector('#stage .fill')).maskImage"
+
+
+def stroke(page, points, key=None):
+    """Paint through shares of the stage with the mouse, and wait for the selection that comes of it."""
+    before = page.evaluate(MASK)
+    if key:
+        page.keyboard.down(key)
+    page.mouse.move(*place(page, *points[0]))
+    page.mouse.down()
+    for point in points[1:]:
+        page.mouse.move(*place(page, *point), steps=4)
+    assert page.locator("#stage .trace.stroke").count() == 1
+    page.mouse.up()
+    if key:
+        page.keyboard.up(key)
+    page.wait_for_function(f"(old) => {MASK} !== old", arg=before)
+
+
+def touched(page, points):
+    """The same with a finger."""
+    before, finger = page.evaluate(MASK), page.context.new_cdp_session(page)
+    for kind, some in (("touchStart", points[:1]), *(("touchMove", [p]) for p in points[1:]), ("touchEnd", [])):
+        at = [dict(zip("xy", place(page, *point))) for point in some]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+    page.wait_for_function(f"(old) => {MASK} !== old", arg=before)
+
+
+def test_the_brush_paints_and_rubs_out(page, running):
+    opened(page, running[0])
+    press(page, "Brush")
+    page.locator("#brush input[type=range]").evaluate(
+        "(r) => { r.value = 3; r.dispatchEvent(new Event('input', {bubbles: true})); }"
+    )
+    page.mouse.move(*place(page, 0.5, 0.5))
+    assert page.locator("#stage .ring").get_attribute("r") == "3"
+    stroke(page, [(0.2, 0.75), (0.8, 0.75)])
+    painted = mask(page)
+    assert painted[36, 14:50].all() and painted[33:39, 30].all() and not painted[30].any() and not painted[42].any()
+    stroke(page, [(0.5, 0.25), (0.5, 0.6)])  # adds, in whatever mode
+    assert mask(page)[20, 32] and mask(page)[36, 20]
+    stroke(page, [(0.5, 0.6), (0.5, 0.95)], key="Alt")
+    rubbed = mask(page)
+    assert not rubbed[34:38, 31:34].any() and rubbed[36, 20] and rubbed[36, 44]
+    press(page, "Remove (Alt)")
+    stroke(page, [(0.1, 0.75), (0.4, 0.75)])
+    assert not mask(page)[36, 14:25].any() and mask(page)[36, 44]
+    slide(page, "hue", 120)  # what is painted can be edited
+    page.wait_for_selector("#steps >> text=hue 120")
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+    assert not page.errors
+
+
+def test_a_finger_paints(browser, running):
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    page = context.new_page()
+    opened(page, running[0])
+    press(page, "Brush")
+    page.locator("#stage").scroll_into_view_if_needed()
+    touched(page, [(0.3, 0.5), (0.5, 0.5), (0.7, 0.5)])
+    painted = mask(page)
+    assert painted[24, 22:43].all() and not painted[45].any()
+    press(page, "Remove (Alt)")
+    touched(page, [(0.6, 0.2), (0.7, 0.5), (0.7, 0.8)])
+    rubbed = mask(page)
+    assert rubbed is None or painted.sum() > rubbed.sum()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    context.close()
+
+
+def test_selecting_by_clicks(page, running):
+    opened(page, running[0])
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    first, one = mask(page), page.evaluate(MASK)
+    click_photo(page, 0.8, 0.8, ["Shift"])
+    page.wait_for_function(f"(old) => {MASK} !== old", arg=one)
+    assert mask(page).sum() > first.sum()
+    both = page.evaluate(MASK)
+    click_photo(page, 0.39, 0.5)  # again: taken away
+    page.wait_for_function(f"(old) => {MASK} !== old", arg=both)
+    assert not mask(page)[24, 25]
+
+
+@pytest.mark.slow
+def test_glass_follows_its_slider(page, running):
+    page.set_default_timeout(240_000)
+    opened(page, running[0])
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    page.get_by_role("tab", name="Objects").click()
+    page.get_by_role("button", name="Turn the selection to glass").click()
+    page.click("#glass")
+    page.wait_for_selector("#stage .view[data-waiting=yes]")
+    page.wait_for_selector("#progress >> text=/glass/")
+    sketch = pixels(page)
+    slide_glass(page, "glass_ior", 1.2)  # while the body is in the making
+    page.wait_for_selector("#stage .badge >> text=Glass traced")
+    assert "ior 1.2" in page.inner_text("#steps")
+    clear = pixels(page)
+    assert abs(clear[18:30, 18:32].astype(int) - sketch[18:30, 18:32]).max() > 10
+    slide_glass(page, "glass_transmission", 0.3)
+    page.wait_for_selector("#stage .view[data-waiting=yes]")
+    page.wait_for_selector("#stage .badge >> text=Glass traced")
+    coated = pixels(page)[20:28, 20:30].reshape(-1, 3).mean(0)
+    assert coated[0] - coated[1] > clear[20:28, 20:30, 0].mean() - clear[20:28, 20:30, 1].mean() + 10  # red again
+    page.locator("#steps .text").click()  # no longer in hand, and in hand again
+    page.wait_for_selector("#steps li:not(.current)")
+    page.locator("#steps .text").click()
+    page.wait_for_selector("#steps li.current")
+    value = page.locator("#glass_transmission input[type=range]").input_value()
+    assert float(value) == 0.3
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Photo'")
+    assert not page.errors
+
+
+def slide_glass(page, name, value):
+    """Move a slider without waiting for a picture."""
+    script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
+        r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
+    page.evaluate(script, [name, value])
+
+
+@pytest.mark.slow
+def test_an_object_falls_on_the_page(page, running):
+    pytest.importorskip("mujoco", reason="needs the physics extra")
+    page.set_default_timeout(120_000)
+    opened(page, running[0])
+    page.get_by_role("tab", name="Objects").click()
+    page.get_by_label("Object", exact=True).click()
+    page.get_by_role("option", name="Cube").click()
+    page.wait_for_function("document.body.dataset.tool === 'place'")
+    click_photo(page, 0.75, 0.8)
+    page.wait_for_selector("#steps >> text=Object: mesh thing-cube")
+    page.get_by_role("button", name="Let it fall").first.click()
+    page.click("#rest")
+    page.wait_for_selector("#steps >> text=/Fallen: mesh thing-cube/")
+    page.get_by_role("button", name="Undo").click()
+    page.wait_for_selector("#steps >> text=Object: mesh thing-cube")
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+    assert not page.errors

@@ -1,0 +1,137 @@
+"""What falls, what is glass and what is painted, on a small scene with a real preview."""
+
+import numpy as np
+import pytest
+from made_meshes import floor_scene
+from studio_scenes import click
+
+from materialist.edit.recipe import apply, read_recipe
+from materialist.errors import InputError, SetupError
+from materialist.studio import things
+from materialist.studio.context import glass_values
+from materialist.studio.glass import State
+from materialist.studio.live import Live
+from materialist.studio.selection import read_pick
+from materialist.studio.stack import Stack
+from materialist.studio.tab_object import library_file
+
+
+def test_an_object_falls_and_lies_there(session, monkeypatch):
+    pytest.importorskip("mujoco", reason="needs the physics extra")
+    floor = Live(floor_scene(64, 48))
+    monkeypatch.setattr(session, "live", floor)
+    with pytest.raises(InputError, match="Place an object first"):
+        things.let_fall(session, 1.0)
+    session.thing_option("mesh", library_file(session, "Cube"))
+    session.thing_option("scale", "0.5")
+    session.place(32, 34)
+    stands = session.live.edited(session.stack.active).bodies[0]
+    assert things.let_fall(session, 0.5) == []
+    step = session.stack.steps[0]
+    assert [s.kind for s in session.stack.steps] == ["drop"] and session.in_hand == "drop"
+    assert step.options["at"] == ["32", "34"] and step.options["scale"] == "0.5" and step.options["seed"] == "0"
+    lies = session.live.edited(session.stack.active).bodies[0]
+    assert lies.vertices.shape == stands.vertices.shape and np.abs(lies.vertices - stands.vertices).max() > 0.01
+    replayed = apply(floor.scene, read_recipe(session.desk / "edits.yaml")).bodies[0]
+    np.testing.assert_allclose(replayed.vertices, lies.vertices, atol=1e-6)
+    things.let_fall(session, 0.5)
+    assert session.stack.steps[0].options["seed"] == "1" and len(session.stack.steps) == 1
+    again = session.live.edited(session.stack.active).bodies[0]
+    assert np.abs(again.vertices - lies.vertices).max() > 1e-3
+    assert session.undo() and session.undo()
+    assert [s.kind for s in session.stack.steps] == ["insert"]
+    floor.close()
+
+
+def test_what_rolls_out_of_the_picture_is_told(session):
+    pytest.importorskip("mujoco", reason="needs the physics extra")
+    session.thing_option("mesh", library_file(session, "Cube"))
+    session.place(50, 40)  # at a wall, with no floor below
+    assert "where the camera does not look" in things.let_fall(session, 0.5)[-1]
+
+
+def test_what_falls_beside_everything_changes_nothing(session, monkeypatch):
+    session.thing_option("mesh", library_file(session, "Ball"))
+    session.place(50, 40)
+    before = session.stack
+    for error in (InputError("it falls beside everything"), SetupError("pip install it")):
+
+        def refuse(steps, error=error):
+            raise error
+
+        monkeypatch.setattr(session.live, "edited", refuse)
+        with pytest.raises(type(error)):
+            things.let_fall(session, 1.0)
+        assert session.stack == before
+    scene = session.scene
+
+    def meanwhile(steps):
+        session.stack = Stack()
+        return scene
+
+    monkeypatch.setattr(session.live, "edited", meanwhile)
+    with pytest.raises(InputError, match="changed while"):
+        things.let_fall(session, 1.0)
+
+
+class _Tracer:
+    """Notes what it is asked, and lets things go."""
+
+    def __init__(self):
+        self.asked, self.kept = [], None
+        self.state = State(0, False, "")
+
+    def ask(self, others, step):
+        self.asked.append((others, step.options["ior"]))
+        self.state = State(len(self.asked), True, "Tracing")
+
+    def pane(self, step):
+        return None
+
+    def keep(self, steps):
+        self.kept = steps
+
+    def rest(self):
+        self.kept = ()
+
+
+def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
+    tracer = _Tracer()
+    monkeypatch.setattr(session, "glass", tracer)
+    click(session)
+    session.material("hue", "90")
+    with pytest.raises(InputError, match="index of refraction"):
+        session.region_step("glass", ior="9")
+    session.region_step("glass", ior="1.3", transmission="1")
+    shown = session.stage()
+    assert session.in_hand == "glass" and shown["waiting"] and shown["asked"] == 1 and "sketch" in shown["badge"]
+    assert [(len(others), ior) for others, ior in tracer.asked] == [(1, "1.3")]
+    session.material("ior", "1.4", "glass")
+    session.stage()
+    assert tracer.asked[-1][1] == "1.4" and glass_values(session)["glass_ior"] == 1.4
+    session.act("choose", 0)
+    session.material("hue", "100")
+    session.stage()
+    assert len(tracer.asked) == 2 and glass_values(session) == {}  # another edit is in hand
+    session.act("remove", 1)
+    assert [step.kind for step in tracer.kept] == ["edit"]
+
+
+def stroke(session, points, mode="add", radius=3.0):
+    session.pick(read_pick({"tool": "brush", "mode": mode, "points": points, "radius": radius}))
+
+
+def test_the_brush_adds_and_rubs_out(session):
+    stroke(session, [[10, 20], [30, 20]])
+    mask = session.selection.mask
+    rows, columns = np.nonzero(mask)
+    assert (rows.min(), rows.max()) == (17, 23) and columns.min() in (7, 8) and columns.max() in (32, 33)
+    stroke(session, [[50, 20]], radius=4.0)  # a dab
+    assert session.selection.mask[20, 50] and session.selection.mask[20, 20]
+    stroke(session, [[20, 10], [20, 30]], "remove", 2.0)
+    after = session.selection.mask
+    assert not after[18:23, 19:22].any() and after[20, 12] and after[20, 28]
+    session.undo()
+    assert session.selection.mask[20, 20]
+    with pytest.raises(InputError, match="paint again"):
+        stroke(session, [])
