@@ -9,6 +9,7 @@ from PIL import Image
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
+from materialist.edit.glass_preview import GlassPreview
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
 
@@ -50,6 +51,24 @@ def test_glass_is_written_saved_and_loaded_again(run, folder):
     np.testing.assert_array_equal(scene.photo.original, picture)
     (body,) = scene.bodies
     assert body.surface.ior == pytest.approx(1.4) and body.surface.tint[1] == pytest.approx(1)
+
+
+def test_a_preview_is_a_picture_that_says_so(run, folder):
+    command = ("glass", folder / "a.scene", "--mask", folder / "block.png", "--ior", 1.4, "--thickness", "symmetry")
+    out = folder / "p.exr"
+    code, shown, err = run(*command, "--preview", "--tint", "1,0.5,0.5", "-o", out)
+    assert code == 0, err
+    assert "A preview: 48 x 36" in shown and "without the shadow" in shown and "thickness: symmetry" in shown
+    picture, scene = read_exr(out), load_scene(folder / "a.scene")
+    truth = GlassPreview(scene, MASK, thickness="symmetry").picture(ior=1.4, tint=(1, 0.5, 0.5), spp=96)
+    np.testing.assert_allclose(picture, truth, rtol=1e-5)
+    code, shown, _ = run(*command, "--preview", "--json", "--force", "-o", out)
+    told = json.loads(shown.splitlines()[-1])
+    assert code == 0 and told["preview"] is True and told["scene"] is None and told["ior"] == 1.4
+    for wrong in (("--save", folder / "s.scene"), ("--full-render",), ("--model", "two-interface")):
+        code, _, err = run(*command, "--preview", *wrong, "-o", folder / "x.exr")
+        assert code == 2 and ("--preview" in err or "closed" in err)
+    assert not (folder / "x.exr").exists() and not (folder / "s.scene").exists()
 
 
 def test_remove_with_a_background_shows_it(run, folder):

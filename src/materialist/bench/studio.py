@@ -29,6 +29,11 @@ COLUMNS = (
     Column("p95_ms", "p95 ms", "lower", 0),
     Column("cpu_ms", "processor ms a move", "lower", 0),
     Column("light_ms", "other light ms", "lower", 0),
+    Column("body_s", "glass, first picture s", "lower", 1),
+    Column("glass_s", "glass slider to picture s", "lower", 2),
+    Column("glass_worst_s", "worst s", "lower", 2),
+    Column("glass_cpu_s", "processor s a picture", "lower", 2),
+    Column("beside_ms", "p95 ms beside glass", "lower", 0),
     Column("idle_mb", "idle MB", "lower", 0),
     Column("scene_mb", "MB more with a scene", "lower", 0),
     Column("after_mb", "MB more after it was left", "lower", 0),
@@ -38,7 +43,10 @@ of five fresh pages, from the address to a stage that can be seen. Drop to first
 the page to the first live picture of a moved slider: reading, fit, preview, a click that selects, a move. Slider to
 preview is the time in the browser from the event of a slider (hue, saturation, brightness, roughness and metallic in
 turn) to the decoded picture on the page; processor milliseconds are the server's for one move, which other work on the
-machine hardly changes. Memory is the resident set of the server."""
+machine hardly changes. Glass: from the button to the first traced picture, which includes its process, its body and the
+background behind it; then the time from the event of a slider (index of refraction, roughness) to the decoded picture
+of that value, median and worst, and the processor seconds of all processes; then sliders of an edit
+elsewhere, with the glass in the picture. Memory is the resident set of the server."""
 
 _MOVE = """([name, value]) => new Promise((done, fail) => {
   const picture = document.querySelector('#stage .photo'), before = picture.src;
@@ -51,6 +59,24 @@ _MOVE = """([name, value]) => new Promise((done, fail) => {
   };
   look();
 })"""
+_GLASS_MOVE = """([name, value]) => new Promise((done, fail) => {
+  const view = document.querySelector('#stage .view'), picture = view.querySelector('.photo');
+  const slider = document.querySelector(`#${name} input[type=range]`), start = performance.now();
+  let asked = false;
+  slider.value = value; slider.dispatchEvent(new Event('input', {bubbles: true}));
+  const look = () => {
+    asked = asked || view.dataset.waiting === 'yes';
+    if (asked && view.dataset.waiting !== 'yes')
+      picture.decode().then(() => done((performance.now() - start) / 1000), fail);
+    else if (performance.now() - start > 300000) fail(new Error('no picture'));
+    else requestAnimationFrame(look);
+  };
+  look();
+})"""
+_GLASS_VALUES = (
+    ("glass_ior", 1.3), ("glass_ior", 1.7), ("glass_ior", 1.15), ("glass_roughness", 0.2), ("glass_roughness", 0.4),
+    ("glass_roughness", 0.1), ("glass_roughness", 0.0), ("glass_ior", 1.45),
+)  # fmt: skip
 _RANGES = {"hue": (-180, 180), "saturation": (-1, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
 
 
@@ -95,6 +121,7 @@ def _measured(
     row["reopen_s" if open_already else "drop_s"] = time.perf_counter() - start
     row |= _moved(server, page, moves, seed)
     row["scene_mb"] = _resident(server) - row["idle_mb"]
+    row |= _glass(server, page, moves, click, seed)
     page.close()
     time.sleep(5)
     row["after_mb"] = _resident(server) - row["idle_mb"]
@@ -131,19 +158,66 @@ def _select(page: Any, click: tuple[float, float]) -> None:
 
 def _moved(server: psutil.Process, page: Any, moves: int, seed: int) -> dict[str, float]:
     """Times of slider moves in milliseconds, one slider after the other, each to a random value."""
-    rng = np.random.default_rng(seed)
     before = sum(server.cpu_times()[:2])
-    times = []
-    for k in range(moves):
-        name = list(_RANGES)[k % len(_RANGES)]
-        times.append(page.evaluate(_MOVE, [name, round(float(rng.uniform(*_RANGES[name])), 2)]))
+    times = _material_moves(page, moves, seed)
     spent = sum(server.cpu_times()[:2]) - before
     page.get_by_role("tab", name="Light").click()
     light = [page.evaluate(_MOVE, ["rotate", 30 * k]) for k in (1, 2, 3)]
+    page.evaluate(_MOVE, ["rotate", 0])
     return {
         "median_ms": float(np.median(times)), "p95_ms": float(np.quantile(times, 0.95)), "cpu_ms": 1000 * spent / moves,
         "light_ms": float(np.median(light)),
     }  # fmt: skip
+
+
+def _material_moves(page: Any, moves: int, seed: int) -> list[float]:
+    rng = np.random.default_rng(seed)
+    times = []
+    for k in range(moves):
+        name = list(_RANGES)[k % len(_RANGES)]
+        times.append(page.evaluate(_MOVE, [name, round(float(rng.uniform(*_RANGES[name])), 2)]))
+    return times
+
+
+def _glass(server: psutil.Process, page: Any, moves: int, click: tuple[float, float], seed: int) -> dict[str, float]:
+    """The selection as glass: its first picture, its sliders, and those of an edit elsewhere, beside it."""
+    page.get_by_role("tab", name="Objects").click()
+    page.get_by_role("button", name="Turn the selection to glass").click()
+    start = time.perf_counter()
+    page.click("#glass")
+    for state in ("[data-waiting=yes]", ":not([data-waiting=yes])"):
+        page.wait_for_selector(f"#stage .view{state}")
+    body = time.perf_counter() - start
+    page.evaluate(_GLASS_MOVE, ["glass_roughness", 0.3])  # kernels of another kind are compiled once
+    before = _all_spent(server)
+    times = [page.evaluate(_GLASS_MOVE, list(move)) for move in _GLASS_VALUES]
+    spent = (_all_spent(server) - before) / len(times)
+    _paint(page, 1 - click[0], 1 - click[1])
+    page.get_by_role("tab", name="Material").click()
+    beside = _material_moves(page, max(5, moves // 2), seed + 1)
+    return {
+        "body_s": body, "glass_s": float(np.median(times)), "glass_worst_s": max(times), "glass_cpu_s": spent,
+        "beside_ms": float(np.quantile(beside, 0.95)),
+    }  # fmt: skip
+
+
+def _paint(page: Any, x: float, y: float) -> None:
+    """Select a strip with the brush around a share of the stage, and nothing else."""
+    page.get_by_role("button", name="Select nothing").click()
+    page.wait_for_selector("#stage .view:not([data-selected=yes])")
+    page.get_by_role("radio", name="Brush", exact=True).check()
+    page.locator("#stage .view").scroll_into_view_if_needed()
+    box = page.locator("#stage .view").bounding_box()
+    page.mouse.move(box["x"] + (x - 0.08) * box["width"], box["y"] + y * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + (x + 0.08) * box["width"], box["y"] + y * box["height"], steps=5)
+    page.mouse.up()
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+
+
+def _all_spent(server: psutil.Process) -> float:
+    """Processor seconds of the server and of the processes that it runs."""
+    return sum(sum(process.cpu_times()[:2]) for process in (server, *server.children(recursive=True)))
 
 
 @contextlib.contextmanager

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -63,6 +64,9 @@ def glass(
     background: Background = None,
     inpaint: Inpainter = None,
     shadow: Shadow = 0.0,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Sooner: working size, without its shadow and caustics.")
+    ] = False,
     spp: Spp = 96,
     denoise: Denoise = True,
     full_render: FullRender = False,
@@ -73,22 +77,64 @@ def glass(
     force: Force = False,
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
+    from materialist.edit.glass import check_glass
     from materialist.edit.glass import glass as change
     from materialist.edit.material import parse_colour
+    from materialist.errors import InputError
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force)
+    if preview and (save is not None or full_render or not denoise):
+        raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
     r, g, b = (float(c) for c in parse_colour(tint))
+    look: dict[str, Any] = {"ior": ior, "transmission": transmission, "tint": (r, g, b), "roughness": roughness}
+    check_glass(**look)
     loaded = load_scene(scene)
     region = chosen_region(loaded, click, box, mask, method)
-    edited = change(
-        loaded, region, ior=ior, transmission=transmission, tint=(r, g, b), roughness=roughness, hollow=hollow,
-        model=model.value, thickness=thickness, background=background,
-        inpaint=chosen_inpainter(inpaint, seed, device.value), shadow=shadow, seed=seed,
-    )  # fmt: skip
+    options: dict[str, Any] = {
+        "hollow": hollow, "model": model.value, "thickness": thickness, "background": background,
+        "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": shadow, "seed": seed,
+    }  # fmt: skip
+    if preview:
+        _preview(loaded, region, look, options, output, spp, device.value, as_json, force)
+        return
+    edited = change(loaded, region, **look, **options)
     source = edited.provenance["edits"][-1]["thickness"]
     write_result(
         "glass", loaded, edited, output, save=save, spp=spp, seed=seed, denoise=denoise, full_render=full_render,
         device=device.value, as_json=as_json, force=force,
         lines=[f"{int(region.sum())} pixels are glass; thickness: {source}."],
+    )  # fmt: skip
+
+
+def _preview(
+    loaded: Any, region: Any, look: dict[str, Any], options: dict[str, Any], output: Path, spp: int, device: str,
+    as_json: bool, force: bool,
+) -> None:  # fmt: skip
+    """Write what the studio shows while its sliders move, and say what it leaves out."""
+    import time
+
+    from materialist.cli.outcome import report_success
+    from materialist.cli.progress import StageProgress
+    from materialist.edit.glass_preview import GlassPreview
+    from materialist.edit.output import write_composite
+
+    start = time.monotonic()
+    with StageProgress(quiet=as_json) as progress:
+        progress("body", 0, 1)
+        made = GlassPreview(loaded, region, device=device, **options)
+        progress("render", 0, 1)
+        picture = made.picture(**look, spp=spp, seed=options["seed"])
+    write_composite(output, picture, loaded.photo, force=force)
+    size, source = f"{picture.shape[1]} x {picture.shape[0]}", made.edited.provenance["edits"][-1]["thickness"]
+    warnings = [note for note in made.edited.report.warnings if note not in loaded.report.warnings]
+    lines = [
+        f"{int(region.sum())} pixels are glass; thickness: {source}.",
+        f"A preview: {size}, the size that the scene was worked out at, without the shadow and caustics of the glass.",
+        *(f"Note: {note}" for note in warnings),
+        f"Look at {output}",
+    ]
+    report_success(
+        "glass", as_json, lines, image=str(output), scene=None, preview=True, seconds=time.monotonic() - start,
+        thickness=source, warnings=warnings, **look,
     )  # fmt: skip

@@ -74,6 +74,11 @@ class GlassPreview:
         return self._in_photo(purified(clean, guide.share), surface)
 
     @property
+    def edited(self) -> Scene:
+        """The scene that is traced, as `glass.glass` gives it, with clear glass of index 1.5."""
+        return self._edited
+
+    @property
     def share(self) -> Array:
         """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
         return self._share

@@ -92,6 +92,7 @@ class Tracer:
         self._process: subprocess.Popen[str] | None = None
         self._number, self._answered, self._since = 0, 0, 0.0
         self._key, self._body, self._stage, self._message = "", "", "", ""
+        self._next: dict[str, Any] | None = None
         self._panes: dict[str, Pane] = {}
 
     def ask(self, others: tuple[Step, ...], step: Step) -> None:
@@ -169,7 +170,7 @@ class Tracer:
             self._since = time.monotonic()
         if body != self._body:
             self._body, self._stage = body, "load"
-        child.ask(self._process, {"ask": self._number, **request})
+        self._next = {"ask": self._number, **request}
 
     def _start(self) -> None:
         import psutil
@@ -179,7 +180,18 @@ class Tracer:
                 "This machine has too little memory free to trace glass while sliders move; press Quick look instead."
             )
         self._process, self._stage = child.start(WORKER), "load"
-        threading.Thread(target=self._listen, args=(self._process,), name="glass", daemon=True).start()
+        for work in (self._speak, self._listen):
+            threading.Thread(target=work, args=(self._process,), name="glass", daemon=True).start()
+
+    def _speak(self, process: subprocess.Popen[str]) -> None:
+        """Hand a process the newest request, however long it takes to read it."""
+        while True:
+            with self.changed:
+                self.changed.wait_for(lambda: process is not self._process or self._next is not None)
+                if process is not self._process or self._next is None:
+                    return
+                request, self._next = self._next, None
+            child.ask(process, request)
 
     def _listen(self, process: subprocess.Popen[str]) -> None:
         """Take what a process says until it ends."""
