@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.types import Array, FitReport, Geometry, Materials, Photo, Prediction, Scene
+from materialist.types import Array, FitReport, Photo, Prediction, Scene
+
+if TYPE_CHECKING:
+    from materialist.fit.attempt import Attempt
 
 FINAL_SPP = 36
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
+COMPLETIONS = ("auto", "planes,backs", "planes", "none")
 
 
 def invert(
@@ -36,7 +39,7 @@ def invert(
     fov: float | str | None = "auto",
     size: int = 512,
     envmap_size: tuple[int, int] = (512, 256),
-    completion: str = "planes,backs",
+    completion: str = "auto",
     tau: float = 6.0,
     mask: Array | None = None,
     strategy: str = "default",
@@ -58,7 +61,8 @@ def invert(
         size: longer side of the working image, pixels.
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
-            `planes` leaves objects open behind, `none` does neither.
+            `planes` leaves objects open behind, `none` does neither. `auto` is the first, and the last where the
+            re-rendering is poor and far better without: a continued plane can shut out light that the photo shows.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).
@@ -75,7 +79,7 @@ def invert(
     preset = "paper" if engine == "path" else preset
     tick = progress or (lambda *_: None)
     found = overrides.get("found") or (lambda *_: None)
-    _check(engine, strategy, envmap_size, seed)
+    _check(engine, strategy, completion, envmap_size, seed)
     tick("read", 0, 1)
     picture = _read(photo, size=size, fov=fov)
     tick("predict", 0, 1)
@@ -85,48 +89,32 @@ def invert(
         parts = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal, "depth": depth}
         source = _predictor(predictor, parts, device)
         picture = _seen_by(source, picture)
-        prior = _timed(stages, "predict", lambda: _predict(picture, source, seed))
+        begun = time.perf_counter()
+        prior = _predict(picture, source, seed)
+        stages.append({"name": "predict", "seconds": round(time.perf_counter() - begun, 3)})
     _check_mask(mask, picture)
     found("prior", prior)
 
     from materialist.render.variant import setup
 
     setup(device)
-    from materialist.fit.inverse import Fit
+    from materialist.fit.attempt import Job
     from materialist.fit.settings import preset as named
-    from materialist.geometry.build import build_geometry
-    from materialist.render.scene import RenderScene
 
-    tick("geometry", 0, 1)
-    geometry = _timed(
-        stages,
-        "geometry",
-        lambda: build_geometry(prior.depth, prior.normal, picture.camera, tau=tau, completion=completion, seed=seed),
-    )
-    renderer = _timed(stages, "scene", lambda: RenderScene(geometry, picture.camera, device=device))
-    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
-    judge = _judge(renderer)
-    problem = _timed(
-        stages, "engine", lambda: _engine(engine, renderer, geometry, picture, settings, envmap_size[1], seed, progress)
-    )
-    fit = Fit(
-        picture, prior.materials, problem, settings, envmap_height=envmap_size[1], judge=judge, mask=mask,
-        strategy=strategy, seed=seed, progress=progress,
-    )  # fmt: skip
-    state = fit.run()
-    materials = fit.materials(state)
-    found("light", state.envmap)
-    found("materials", materials)
-    tick("rerender", 0, 1)
     spp = overrides.get("spp", FINAL_SPP)
-    rerender = _timed(stages, "rerender", lambda: judge(materials, state.envmap, spp, seed + 1))
-    report = _report(picture, prior, materials, rerender, (*stages[:-1], *state.stages, stages[-1]), start)
+    job = Job(
+        picture, prior, overrides.get("settings") or named(preset, hdr=picture.hdr), engine, envmap_size[1], tau, mask,
+        strategy, seed, device, spp, progress, found,
+    )  # fmt: skip
+    # The paper's schedule is followed once, however well it does.
+    best, notes = job.best("planes,backs" if completion == "auto" and preset == "paper" else completion)
+    report = _report(picture, prior, best, (*stages, *best.stages), notes, start)
     return Scene(
-        camera=picture.camera, photo=picture, prior=prior, materials=materials, normal=prior.normal, depth=prior.depth,
-        geometry=geometry, envmap=state.envmap, rerender=rerender, report=report,
+        camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
+        depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": completion, "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
+            "completion": best.completion, "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
     )  # fmt: skip
@@ -149,32 +137,10 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return image
 
 
-def _judge(renderer) -> Callable[..., Array]:
-    """The path tracer as a function (materials, envmap, spp, seed) -> [H, W, 3]."""
-
-    def judge(materials: Materials, envmap: Array, spp: int, seed: int = 0) -> Array:
-        renderer.set_materials(materials)
-        renderer.set_envmap(envmap)
-        return renderer.render(spp=spp, seed=seed)
-
-    return judge
-
-
-def _engine(name: str, renderer, geometry: Geometry, picture: Photo, settings, envmap_height: int, seed: int, progress):
-    from materialist.fit.engine import PathEngine, TransportEngine
-
-    camera = picture.camera
-    if name == "path":
-        surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
-        return PathEngine(renderer, camera, surface, envmap_height=envmap_height, seed=seed)
-    return TransportEngine(
-        geometry, camera, picture.linear, seed=seed, light_height=settings.light_grid, progress=progress
-    )
-
-
 def _report(
-    picture: Photo, prior: Prediction, materials: Materials, rerender: Array, stages, start: float
+    picture: Photo, prior: Prediction, found: Attempt, stages: tuple[dict, ...], told: tuple[str, ...], start: float
 ) -> FitReport:
+    materials, rerender = found.materials, found.rerender
     surface = prior.depth > 0
     distance = {
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
@@ -182,7 +148,7 @@ def _report(
     }
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
     clipped = float((picture.linear >= 0.99).any(-1).mean())
-    notes = [*picture.warnings, *prior.warnings]
+    notes = [*picture.warnings, *prior.warnings, *told]
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
     measured = next((s for s in stages if "prior_trust" in s), {"prior_trust": None})
@@ -192,7 +158,7 @@ def _report(
     if poor > 0.05:
         notes.append(f"The re-rendering is off by more than 0.1 (sRGB) on {poor:.0%} of the pixels; see overview.png.")
     return FitReport(
-        stages=tuple(stages),
+        stages=stages,
         metrics={
             "rerender_psnr_path": metrics.psnr(rerender, picture.linear),
             "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
@@ -204,13 +170,6 @@ def _report(
         },
         warnings=tuple(notes),
     )
-
-
-def _timed(stages: list[dict], name: str, work):
-    start = time.perf_counter()
-    result = work()
-    stages.append({"name": name, "seconds": round(time.perf_counter() - start, 3)})
-    return result
 
 
 def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
@@ -245,11 +204,13 @@ def _predict(picture: Photo, source, seed: int) -> Prediction:
     return prediction
 
 
-def _check(engine: str, strategy: str, envmap_size: tuple[int, int], seed: int) -> None:
+def _check(engine: str, strategy: str, completion: str, envmap_size: tuple[int, int], seed: int) -> None:
     if engine not in ENGINES:
         raise InputError(f"Engine is '{engine}'; choose one of {', '.join(ENGINES)}.")
     if strategy not in STRATEGIES:
         raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
+    if completion not in COMPLETIONS:
+        raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
     width, height = envmap_size
     if width != 2 * height or not 8 <= height <= 4096:
         raise InputError(

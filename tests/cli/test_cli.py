@@ -76,7 +76,7 @@ def test_invert_defaults_are_the_contract(run, photo, tmp_path, monkeypatch):
         "fov": "auto",
         "size": 512,
         "envmap_size": (512, 256),
-        "completion": "planes,backs",
+        "completion": "auto",
         "tau": 6.0,
         "mask": None,
         "strategy": "default",

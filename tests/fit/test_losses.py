@@ -71,6 +71,19 @@ def test_log_total_variation_equals_a_loop():
     assert float(log_total_variation(log_map)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
 
 
+def test_weighted_variation_takes_the_heavier_texel_of_each_pair():
+    log_map = torch.randn(3, 6, 3, generator=torch.Generator().manual_seed(2))
+    weight = 1 + torch.rand(3, 6, generator=torch.Generator().manual_seed(3))
+
+    def price(a: tuple[int, int], b: tuple[int, int]) -> float:
+        return float((log_map[a] - log_map[b]).abs().mean() * max(weight[a], weight[b]))
+
+    down = [price((i + 1, j), (i, j)) for i in range(2) for j in range(6)]
+    right = [price((i, (j + 1) % 6), (i, j)) for i in range(3) for j in range(6)]
+    assert float(log_total_variation(log_map, weight)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
+    assert float(log_total_variation(log_map, torch.ones(3, 6))) == pytest.approx(float(log_total_variation(log_map)))
+
+
 def test_grey_has_no_chroma():
     grey = torch.randn(4, 8, 1, generator=torch.Generator().manual_seed(1)).expand(4, 8, 3)
     assert float(log_chroma(grey)) == pytest.approx(0, abs=1e-7)

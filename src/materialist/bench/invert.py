@@ -78,7 +78,7 @@ def run(
     photo: str | None = None,
     step_size: int = 512,
     preset: str = "default",
-    completion: str = "planes,backs",
+    completion: str = "auto",
     seed: int = 0,
     device: str = "auto",
 ) -> Report:

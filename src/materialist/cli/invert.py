@@ -58,9 +58,10 @@ def invert(
     fov: FieldOfView = "auto",
     size: WorkingSize = 512,
     envmap_size: Annotated[str, typer.Option(metavar="WxH", help="Size of the environment map.")] = "512x256",
-    completion: Annotated[Completion, typer.Option(help="Continue planes beyond what is seen, give objects backs.")] = (
-        Completion.planes_backs
-    ),
+    completion: Annotated[
+        Completion,
+        typer.Option(help="Continue planes beyond what is seen, give objects backs; auto: unless that ruins the fit."),
+    ] = (Completion.auto),
     tau: Annotated[float, typer.Option(help="Grazing angle below which the surface is cut, degrees.")] = 6.0,
     mask: Annotated[Path | None, typer.Option(metavar="PNG", help="Region with one roughness and metallic.")] = None,
     strategy: Annotated[Strategy, typer.Option(help="The paper's per-image strategies.")] = Strategy.default,

@@ -37,6 +37,7 @@ class Preset(StrEnum):
 class Completion(StrEnum):
     """How what the picture does not show is continued."""
 
+    auto = "auto"
     planes_backs = "planes,backs"
     planes = "planes"
     none = "none"

@@ -1,0 +1,1 @@
+"""Light and materials fitted to the photo (paper, Progressive Differentiable Rendering)."""

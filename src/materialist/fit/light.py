@@ -13,9 +13,14 @@ from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels
 from materialist.fit.loop import Progress, StageResult, optimise
 from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual
 from materialist.fit.settings import LightSettings
+from materialist.transport.light import LightMatrix
 
 START_RADIANCE = 0.6
 """Grey level at which plain texels start."""
+SEEN = 0.5
+"""Share of its light that must reach the scene for a texel to be free to differ from its neighbours."""
+STIFFEST = 10.0
+"""Largest factor on the smoothness of texels that are hidden."""
 
 
 def envmap_field(settings: LightSettings, *, seed: int = 0) -> nn.Module:
@@ -59,6 +64,8 @@ def fit_light(
         slack = nn.Parameter(given.clone())
         parameters.append({"params": [slack], "lr": 0.02})
 
+    weight = None if problem.matrix is None else stiffness(problem.matrix)
+
     def loss(_: int) -> torch.Tensor:
         # The full map is costly to evaluate: a coarser light matrix is served by random points of its texels.
         full = problem.height >= settings.height or settings.field == "texels"
@@ -69,7 +76,7 @@ def fit_light(
             value = value + price * (slack - given).abs().mean()
         if settings.smooth or settings.chroma:
             log = envmap.clamp_min(1e-6).log()
-            value = value + settings.smooth * log_total_variation(log) + settings.chroma * log_chroma(log)
+            value = value + settings.smooth * log_total_variation(log, weight) + settings.chroma * log_chroma(log)
         return value
 
     def into_range() -> None:
@@ -77,3 +84,12 @@ def fit_light(
             slack.clamp_(0, 1)
 
     return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)
+
+
+def stiffness(matrix: LightMatrix) -> torch.Tensor:
+    """[h, 2h] weight of each texel in the smoothness of the light: 1 where it is seen, more where it is hidden.
+
+    A light that reaches the scene through slits of the geometry alone can be made to explain anything by making it
+    bright enough, and a path tracer finds it by luck.
+    """
+    return (SEEN / matrix.open.clamp_min(1e-6)).clamp(1, STIFFEST).view(matrix.shape)

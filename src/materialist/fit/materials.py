@@ -19,6 +19,9 @@ from materialist.types import Camera
 
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 
+DIELECTRIC = 0.2
+"""Predicted metallic below which a surface counts as a dielectric, the surer the lower."""
+
 
 def remapped(prior: torch.Tensor) -> torch.Tensor:
     """Roughness and metallic of [P, 5] maps moved to 0.7 x + 0.2, where gradients live (paper, Initialization)."""
@@ -56,7 +59,8 @@ def better_start(
 ) -> torch.Tensor:
     """[P, 5] maps to start from: `start`, or where it fits better after `steps` steps, another metallic.
 
-    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide.
+    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide. Where the prior says
+    dielectric, the other start must win by `settings.doubt`: what fits either way stays what it was.
     """
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
@@ -72,7 +76,8 @@ def better_start(
             cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
-    return torch.where(costs[1] < costs[0], candidates[1], candidates[0])
+    sure = smooth(1 - (prior[:, 4:] / DIELECTRIC).clamp(0, 1))
+    return torch.where(costs[1] < costs[0] - settings.doubt * sure, candidates[1], candidates[0])
 
 
 def fit_materials(

@@ -52,6 +52,9 @@ class LightMatrix:
     """[Q, 3]."""
     metallic: torch.Tensor
     """[Q, 1]."""
+    open: torch.Tensor
+    """[h * 2h] in [0, 1]: share of the light that each texel would send to the pixels that nothing holds back; 1 for
+    texels that no pixel faces."""
 
     def direct(self, envmap: torch.Tensor) -> torch.Tensor:
         """[3, Q, 3] light of each lobe straight from `envmap` [h * 2h, 3]; differentiable in it."""
@@ -86,18 +89,23 @@ def light_matrix(
     albedo, metallic = materials.albedo.reshape(-1, 3)[pixels], materials.metallic.reshape(-1, 1)[pixels]
     shape = (height, 2 * height)
     matrices, hits = [], []
+    free, faced = torch.zeros(2, height * 2 * height)
     for diffuse in (True, False):
         count = diffuse_samples if diffuse else specular_samples
         direction, slot, weights = _samples(cache, rows, rough, count, diffuse)
         row = np.tile(np.arange(len(rows)), count)
         matrices += [_scatter(direction, slot, w, row, len(rows), shape) for w in weights]
         hits.append(_hits(slot, weights, row, diffuse))
+        if diffuse:
+            free += matrices[0].sum(0)
+            faced += _scatter(direction, np.full_like(slot, MISS), weights[0], np.zeros_like(row), 1, shape)[0]
     index = np.concatenate([h[0] for h in hits], 1)
     weight = np.concatenate([h[1] for h in hits])
     return LightMatrix(
         torch.from_numpy(pixels.astype(np.int64)), shape, torch.stack(matrices),
         torch.from_numpy(index), torch.from_numpy(weight),
         torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
+        torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0),
     )  # fmt: skip
 
 

@@ -1,0 +1,142 @@
+"""A fit from the prior to the re-rendering, on one geometry; and whether to do without what completion has added."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from materialist import metrics
+from materialist.fit.engine import Engine, PathEngine, TransportEngine
+from materialist.fit.inverse import Fit
+from materialist.fit.settings import FitSettings
+from materialist.geometry.build import build_geometry
+from materialist.render.scene import RenderScene
+from materialist.types import Array, Geometry, Materials, Photo, Prediction
+
+AUTO, FULL = "auto", "planes,backs"
+POOR = 28.0
+"""dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
+CLEARLY = 2.0
+"""dB by which that must be better to be kept: what completion adds helps every other light."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What a fit on one geometry came to."""
+
+    completion: str
+    geometry: Geometry
+    materials: Materials
+    envmap: Array
+    """[h, 2h, 3] linear radiance."""
+    rerender: Array
+    """[H, W, 3] linear, path traced."""
+    stages: tuple[dict, ...]
+
+
+@dataclass(frozen=True)
+class Job:
+    """Everything about an inversion but how its geometry is completed; see `pipeline.invert` for the fields."""
+
+    picture: Photo
+    prior: Prediction
+    settings: FitSettings
+    engine: str
+    envmap_height: int
+    tau: float
+    mask: Array | None
+    strategy: str
+    seed: int
+    device: str
+    spp: int
+    progress: Any
+    found: Callable[[str, Any], Any]
+    """Told "light" and "materials" as soon as each is there."""
+
+    def run(self, completion: str) -> Attempt:
+        """Mesh, light, materials, path-traced re-rendering."""
+        stages: list[dict] = []
+        self._tick("geometry")
+        geometry = timed(
+            stages,
+            "geometry",
+            lambda: build_geometry(
+                self.prior.depth, self.prior.normal, self.picture.camera, tau=self.tau, completion=completion,
+                seed=self.seed,
+            ),
+        )  # fmt: skip
+        renderer = timed(stages, "scene", lambda: RenderScene(geometry, self.picture.camera, device=self.device))
+        judge = _judge(renderer)
+        engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
+        fit = Fit(
+            self.picture, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
+            mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
+        )  # fmt: skip
+        state = fit.run()
+        materials = fit.materials(state)
+        self.found("light", state.envmap)
+        self.found("materials", materials)
+        self._tick("rerender")
+        stages += state.stages
+        rerender = timed(stages, "rerender", lambda: judge(materials, state.envmap, self.spp, self.seed + 1))
+        return Attempt(completion, geometry, materials, state.envmap, rerender, tuple(stages))
+
+    def best(self, completion: str) -> tuple[Attempt, tuple[str, ...]]:
+        """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
+
+        A continued plane can shut out light that the photo shows. `auto` therefore tries again without where the
+        re-rendering is poor, and keeps that where it is clearly better.
+        """
+        if completion != AUTO:
+            return self.run(completion), ()
+        full = self.run(FULL)
+        before = metrics.psnr(full.rerender, self.picture.linear)
+        if before >= POOR or not (full.geometry.mesh.face_plane >= 0).any():
+            return full, ()
+        bare = self.run("none")
+        after = metrics.psnr(bare.rerender, self.picture.linear)
+        stages = (*full.stages, *bare.stages)
+        if after < before + CLEARLY:
+            return replace(full, stages=stages), ()
+        note = (
+            f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
+            f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
+        )
+        return replace(bare, stages=stages), (note,)
+
+    def _tick(self, stage: str) -> None:
+        if self.progress is not None:
+            self.progress(stage, 0, 1)
+
+    def _engine(self, renderer: RenderScene, geometry: Geometry) -> Engine:
+        camera = self.picture.camera
+        if self.engine == "path":
+            surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
+            return PathEngine(renderer, camera, surface, envmap_height=self.envmap_height, seed=self.seed)
+        return TransportEngine(
+            geometry, camera, self.picture.linear, seed=self.seed, light_height=self.settings.light_grid,
+            progress=self.progress,
+        )  # fmt: skip
+
+
+def _judge(renderer: RenderScene) -> Callable[..., Array]:
+    """The path tracer as a function (materials, envmap, spp, seed) -> [H, W, 3]."""
+
+    def judge(materials: Materials, envmap: Array, spp: int, seed: int = 0) -> Array:
+        renderer.set_materials(materials)
+        renderer.set_envmap(envmap)
+        return renderer.render(spp=spp, seed=seed)
+
+    return judge
+
+
+def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:
+    """The result of `work`; its seconds are added to `stages`."""
+    start = time.perf_counter()
+    result = work()
+    stages.append({"name": name, "seconds": round(time.perf_counter() - start, 3)})
+    return result

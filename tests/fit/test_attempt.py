@@ -1,0 +1,67 @@
+"""`--completion auto`: what completion adds stays, unless the photo is matched clearly better without."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.fit.attempt import FULL, Attempt, Job
+
+PHOTO = np.full((8, 8, 3), 0.5, np.float32)
+
+
+def picture_at(decibel: float) -> np.ndarray:
+    """A rendering whose PSNR against PHOTO is about `decibel`."""
+    return srgb_to_linear(linear_to_srgb(PHOTO) - np.float32(10 ** (-decibel / 20)))
+
+
+def job(monkeypatch, results: dict[str, float], *, planes: bool = True) -> tuple[Job, list[str]]:
+    """A job whose attempts come to the given PSNR by completion, and the list of those made."""
+    made: list[str] = []
+
+    def run(self, completion: str) -> Attempt:
+        made.append(completion)
+        mesh = SimpleNamespace(face_plane=np.array([-1, 0 if planes else -1]))
+        stages = ({"name": completion},)
+        return Attempt(completion, SimpleNamespace(mesh=mesh), None, None, picture_at(results[completion]), stages)
+
+    monkeypatch.setattr(Job, "run", run)
+    rest = (None, None, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
+    return Job(SimpleNamespace(linear=PHOTO), *rest), made
+
+
+def test_the_pictures_of_this_test_are_as_far_off_as_they_say():
+    assert metrics.psnr(picture_at(25), PHOTO) == pytest.approx(25, abs=0.1)
+    assert metrics.psnr(picture_at(35), PHOTO) == pytest.approx(35, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("full", "none", "kept", "tried"),
+    [
+        (35, 45, FULL, [FULL]),
+        (24, 35, "none", [FULL, "none"]),
+        (24, 25, FULL, [FULL, "none"]),
+        (24, 12, FULL, [FULL, "none"]),
+    ],
+)
+def test_auto_leaves_completion_out_only_where_that_is_clearly_better(monkeypatch, full, none, kept, tried):
+    task, made = job(monkeypatch, {FULL: full, "none": none})
+    best, notes = task.best("auto")
+    assert (best.completion, made) == (kept, tried)
+    assert [stage["name"] for stage in best.stages] == tried
+    assert bool(notes) == (kept == "none")
+    if notes:
+        assert "dB" in notes[0] and f"--completion {FULL}" in notes[0]
+
+
+def test_without_planes_there_is_nothing_to_leave_out(monkeypatch):
+    task, made = job(monkeypatch, {FULL: 20, "none": 40}, planes=False)
+    assert task.best("auto")[0].completion == FULL and made == [FULL]
+
+
+def test_a_completion_that_was_asked_for_is_kept(monkeypatch):
+    task, made = job(monkeypatch, {FULL: 20, "none": 40})
+    best, notes = task.best(FULL)
+    assert (best.completion, notes, made) == (FULL, (), [FULL])
