@@ -83,7 +83,7 @@ def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
 
 
 def sh_error(a: Array, b: Array, degree: int = 3) -> float:
-    """RMS over RGB of the Euclidean distance of the SH coefficients of two envmaps (sizes may differ)."""
+    """RMS over RGB of the Euclidean distance of the SH coefficients of envmaps [h, 2h, 3], whose sizes may differ."""
     return _rms_norm(sh_coefficients(a, degree) - sh_coefficients(b, degree))
 
 

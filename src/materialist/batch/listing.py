@@ -9,8 +9,9 @@ from pathlib import Path
 from materialist.batch.ledger import LEDGER
 from materialist.batch.remote import is_url, list_url, shown
 from materialist.errors import InputError
-from materialist.io.decode import FORMATS, RAW_SUFFIXES
+from materialist.io.decode import FORMATS
 from materialist.io.examples import PREFIX
+from materialist.io.raw import RAW_SUFFIXES
 from materialist.io.target import MARKER
 
 SUFFIXES = RAW_SUFFIXES | frozenset(

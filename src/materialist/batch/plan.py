@@ -17,7 +17,7 @@ from materialist.batch.names import unique_names
 from materialist.batch.packages import file_hash, whole_size
 from materialist.batch.remote import is_url, version
 from materialist.errors import InputError, MaterialistError
-from materialist.io.decode import MIN_SIDE
+from materialist.io.decoded import MIN_SIDE
 from materialist.predict.base import CHOICES
 
 LARGEST = 8192

@@ -73,7 +73,7 @@ def pictures(
     scene: Scene, edits: Sequence[Scene], *, spp: int = 64, seed: int = 0, full_render: bool = False,
     denoise: bool = True, device: str = "auto", progress=None,
 ) -> Iterator[Array]:  # fmt: skip
-    """The composites of many edits of one scene, as for `composite`; what they share is rendered once."""
+    """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once."""
     tick = progress or (lambda *_: None)
     studio, lights = Studio(scene, device=device), None
     for k, edited in enumerate(edits):

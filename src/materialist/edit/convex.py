@@ -63,7 +63,10 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
 
 
 def thinned(vertices: Array, faces: Array) -> tuple[Array, Array]:
-    """The mesh with the vertices of each cell of a grid of `COARSE` put together at their mean."""
+    """Vertices [V', 3] and faces [F', 3] int32 of a mesh [V, 3], [F, 3], coarser.
+
+    The vertices of each cell of a grid of `COARSE` are put together at their mean.
+    """
     extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
     cell = np.floor((vertices - vertices.min(0)) / extent * COARSE).astype(np.int64)
     return _merged(vertices, faces, np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1))

@@ -148,7 +148,10 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
 
 
 def denoised(base: Array, edited: Array, guides: tuple[Array, ...]) -> tuple[Array, Array]:
-    """Both pictures without noise; as they are where the denoiser is not installed."""
+    """Both pictures [H, W, 3] without noise; as they are where the denoiser is not installed.
+
+    guides: [H, W, 3] each, as for `difference`.
+    """
     from materialist.errors import SetupError
     from materialist.render.denoise import denoise
 

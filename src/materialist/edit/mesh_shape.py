@@ -52,7 +52,10 @@ def places(vertices: Array) -> Array:
 
 
 def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
-    """(edges with one face, edges with three or more) of a mesh whose vertices at one place count as one."""
+    """(edges with one face, edges with three or more) of a mesh of vertices [V, 3] and faces [F, 3].
+
+    Vertices at one place count as one.
+    """
     place = places(vertices)[faces]
     place = place[(place[:, 0] != place[:, 1]) & (place[:, 1] != place[:, 2]) & (place[:, 2] != place[:, 0])]
     edges = np.sort(place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -61,7 +64,10 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
 
 
 def volume(vertices: Array, faces: Array) -> float:
-    """Signed volume of a closed mesh: > 0 where faces run counter-clockwise seen from outside."""
+    """Signed volume of a closed mesh of vertices [V, 3] and faces [F, 3], in cubes of their unit.
+
+    It is > 0 where faces run counter-clockwise seen from outside.
+    """
     a, b, c = (vertices[faces[:, k]].astype(np.float64) - vertices.mean(0) for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 

@@ -83,7 +83,14 @@ def geodesic(edges: Array, seeds: Sequence[tuple[int, int]]) -> Array:
 
 
 def outline_score(region: Array, edges: Array, lab: Array) -> float:
-    """How much a region looks like an object: edges along its outline, other colours outside, little on the frame."""
+    """How much a region looks like an object: edges along its outline, other colours outside, little on the frame.
+
+    Args:
+        region: [H, W] bool. edges: [H, W] of `edge_map`. lab: [H, W, 3] with L in [0, 100].
+
+    Returns:
+        The larger the better; -inf for a region that is tiny or most of the picture.
+    """
     import cv2
 
     area = region.mean()

@@ -9,8 +9,8 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import ensure_image_writable, write_image
+from materialist.io.raw import RAW_SUFFIXES
 from materialist.types import Array, Photo
 
 

@@ -79,7 +79,10 @@ def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
 
 
 def tidy(mask: Array, points: Sequence[tuple[int, int]] | None) -> Array:
-    """The parts of a mask that hold a point (without points, all that are not crumbs), holes below 2 % filled."""
+    """[H, W] bool: the parts of a mask that hold a point (column, row), with holes below 2 % filled.
+
+    Without points all parts are kept that are not crumbs.
+    """
     import cv2
     from scipy import ndimage
 

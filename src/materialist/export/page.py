@@ -17,7 +17,8 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.export import pictures
 from materialist.export.parts import Part
-from materialist.export.textures import jpeg, to_bytes
+from materialist.export.textures import jpeg
+from materialist.io.display import to_bytes
 from materialist.types import Array, Camera, Scene
 
 _VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)])

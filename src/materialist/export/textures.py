@@ -7,6 +7,7 @@ import io
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.io.display import to_bytes
 from materialist.types import Array, Materials
 
 
@@ -18,11 +19,6 @@ def base_color(materials: Materials) -> Array:
 def metallic_roughness(materials: Materials) -> Array:
     """[H, W, 3] uint8, not encoded, as glTF packs it: red 0 (unused), green roughness, blue metallic."""
     return to_bytes(np.stack([np.zeros_like(materials.roughness), materials.roughness, materials.metallic], -1))
-
-
-def to_bytes(values: Array) -> Array:
-    """[...] in [0, 1] to uint8."""
-    return np.round(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
 def png(pixels: Array) -> bytes:

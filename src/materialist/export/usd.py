@@ -13,7 +13,8 @@ from materialist.errors import SetupError
 from materialist.export.parts import Part
 from materialist.export.run import Exported
 from materialist.export.target import whole_files, whole_folder
-from materialist.export.textures import base_color, png, to_bytes
+from materialist.export.textures import base_color, png
+from materialist.io.display import to_bytes
 from materialist.io.exr import write_exr
 from materialist.types import Camera, Scene
 

@@ -33,7 +33,7 @@ def between(demanded: tuple[Array, Array]) -> Iterator[tuple[Any, Any, Array]]:
     """Neighbours in a row, then in a column: index of the one, index of the other, and the slope midway.
 
     Args:
-        demanded: what `slopes` gives; the slope midway has a column, then a row less.
+        demanded: [H, W] both, what `slopes` gives; the slope midway is [H, W - 1], then [H - 1, W].
     """
     for slope, near, far in (
         (demanded[0], np.s_[:, :-1], np.s_[:, 1:]),

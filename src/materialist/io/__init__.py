@@ -1,0 +1,1 @@
+"""Files in and out: photos, maps, scene packages. Knows nothing of rendering."""

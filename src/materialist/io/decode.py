@@ -5,51 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from materialist.color import srgb_to_linear
-from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.errors import InputError, MaterialistError
+from materialist.io.decoded import Decoded, check_size
+from materialist.io.exif import image_tags
 from materialist.io.exr import read_exr
 from materialist.io.icc import matrix_profile
+from materialist.io.raw import RAW_SUFFIXES, read_raw
 from materialist.types import Array
 
 if TYPE_CHECKING:
     from PIL import Image
 
-MAX_PIXELS = 200_000_000
-"""Largest photo accepted, pixels: the largest phone sensors; 2.4 GB as float32."""
-MIN_SIDE = 8
-"""Shortest side accepted, pixels."""
-MAX_ASPECT = 8
-"""Longest shape accepted, long side over short side."""
-
-RAW_SUFFIXES = frozenset(
-    f".{name}"
-    for name in (
-        *("3fr", "ari", "arw", "cr2", "cr3", "crw", "dcr", "dng", "erf", "fff", "iiq", "k25", "kdc", "mef", "mos"),
-        *("mrw", "nef", "nrw", "orf", "pef", "raf", "raw", "rw2", "rwl", "sr2", "srf", "srw", "x3f"),
-    )
-)
-"""File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
-
 FORMATS = "PNG, JPEG, HEIC, TIFF, WEBP, EXR, HDR or camera RAW"
-
-
-@dataclass
-class Decoded:
-    """A decoded file."""
-
-    linear: Array
-    """[H, W, 3] float32 linear Rec.709, upright; display files in [0, 1], scene-linear ones (EXR, HDR) as stored."""
-    scene_linear: bool = False
-    """True for files that hold light rather than display values: EXR, HDR, float TIFF."""
-    tags: dict[str, Any] = field(default_factory=dict)
-    """EXIF by name."""
-    warnings: list[str] = field(default_factory=list)
 
 
 def decode(path: Path) -> Decoded:
@@ -61,7 +34,7 @@ def decode(path: Path) -> Decoded:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from error
     try:
         if path.suffix.lower() in RAW_SUFFIXES:
-            return _raw(path)
+            return read_raw(path)
         if head.startswith(b"\x76\x2f\x31\x01"):
             return _exr(path)
         if head.startswith((b"#?RADIANCE", b"#?RGBE")):
@@ -75,21 +48,6 @@ def decode(path: Path) -> Decoded:
         raise
     except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
-
-
-def check_size(width: int, height: int, name: object) -> None:
-    """Refuse photos that are too small, too large or too long, before their pixels are decoded."""
-    if width * height > MAX_PIXELS:
-        raise InputError(
-            f"{name} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the limit is "
-            f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
-        )
-    if min(width, height) < MIN_SIDE:
-        raise InputError(f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed.")
-    if max(width, height) > MAX_ASPECT * min(width, height):
-        raise InputError(
-            f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to the part of interest."
-        )
 
 
 def _picture(path: Path) -> Decoded:
@@ -110,7 +68,7 @@ def _picture(path: Path) -> Decoded:
             frames = getattr(image, "n_frames", 1)
             if frames > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
                 warnings.append(f"The file holds {frames} pictures; the first is used.")
-            tags = _exif(image)
+            tags = image_tags(image)
             if _is_deep(image, path):
                 linear, scene_linear = _deep(image, path, warnings)
             else:
@@ -245,50 +203,6 @@ def _hdr(path: Path) -> Decoded:
     if pixels is None or pixels.dtype != np.float32:
         raise InputError(f"{path} is damaged or truncated; export it again.")
     return Decoded(np.ascontiguousarray(pixels[..., ::-1]), True)
-
-
-def _raw(path: Path) -> Decoded:
-    """Camera RAW: demosaiced with the camera's white balance, linear Rec.709, no automatic brightening."""
-    try:
-        import rawpy
-    except ImportError as error:
-        raise SetupError(f"Camera RAW needs one more package to read {path.name}: pip install rawpy") from error
-    try:
-        with rawpy.imread(str(path)) as raw:
-            check_size(raw.sizes.width, raw.sizes.height, path)
-            pixels = raw.postprocess(gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16)
-    except rawpy.LibRawError as error:
-        raise InputError(f"{path} is not a RAW file this program can read ({error}); export it as TIFF.") from error
-    return Decoded(pixels.astype(np.float32) / np.float32(65535), False, _raw_tags(path))
-
-
-def _raw_tags(path: Path) -> dict[str, Any]:
-    """EXIF of a RAW file; most are TIFF inside, the others give none."""
-    from PIL import Image
-
-    exif = Image.Exif()
-    try:
-        with path.open("rb") as file:
-            exif.load_from_fp(file)
-            return _named(exif)
-    except Exception:  # no EXIF is no error: the field of view then falls back
-        return {}
-
-
-def _exif(image: Image.Image) -> dict[str, Any]:
-    """EXIF tags of an image by name."""
-    try:
-        return _named(image.getexif())
-    except Exception:  # damaged EXIF does not make a photo unreadable
-        return {}
-
-
-def _named(exif: Image.Exif) -> dict[str, Any]:
-    """Tags by name, of the main and the Exif directory."""
-    from PIL import ExifTags
-
-    tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
-    return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}
 
 
 def _srgb(pixels: Array) -> Array:

@@ -1,16 +1,41 @@
-"""From EXIF tags to the field of view (derivation: docs/inputs.md)."""
+"""EXIF tags of a file, and the field of view that they tell (derivation: docs/inputs.md)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 FILM_WIDTH = 36.0
 """Long side of a 35 mm film frame, millimetres."""
 
 _UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
 """Millimetres in a FocalPlaneResolutionUnit: inch, centimetre, millimetre, micrometre."""
+
+
+def image_tags(image: Image.Image) -> dict[str, Any]:
+    """EXIF tags of an image by name; {} where they are damaged."""
+    try:
+        return _named(image.getexif())
+    except Exception:  # damaged EXIF does not make a photo unreadable
+        return {}
+
+
+def file_tags(path: Path) -> dict[str, Any]:
+    """EXIF of a RAW file; most are TIFF inside, the others give none."""
+    from PIL import Image
+
+    exif = Image.Exif()
+    try:
+        with path.open("rb") as file:
+            exif.load_from_fp(file)
+            return _named(exif)
+    except Exception:  # no EXIF is no error: the field of view then falls back
+        return {}
 
 
 def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | None:
@@ -57,3 +82,11 @@ def _number(value: Any) -> float | None:
     except (TypeError, ValueError, ZeroDivisionError):
         return None
     return number if math.isfinite(number) and number > 0 else None
+
+
+def _named(exif: Image.Exif) -> dict[str, Any]:
+    """Tags by name, of the main and the Exif directory."""
+    from PIL import ExifTags
+
+    tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+    return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from materialist.color import linear_to_srgb, luminance
+from materialist.color import linear_to_srgb
+from materialist.io import display
 from materialist.io.relief import relief
 from materialist.metrics import psnr
 from materialist.types import Array, Scene
@@ -69,20 +70,22 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
         return _Tile(title, note, pixels, shape)
 
     pictures = [
-        tile("Photo", "as given", _bytes(photo)),
-        tile("Re-rendering", f"path traced, {quality:.1f} dB", _bytes(again)),
+        tile("Photo", "as given", display.to_bytes(photo)),
+        tile("Re-rendering", f"path traced, {quality:.1f} dB", display.to_bytes(again)),
         tile(
-            "Error", f"mean |difference| of sRGB x {_ERROR_GAIN}", _heat(_ERROR_GAIN * np.abs(photo - again).mean(-1))
+            "Error",
+            f"mean |difference| of sRGB x {_ERROR_GAIN}",
+            display.ramp(_ERROR_GAIN * np.abs(photo - again).mean(-1)),
         ),
     ]
     maps = [
-        tile("Albedo", _mean(materials.albedo), _bytes(linear_to_srgb(materials.albedo))),
-        tile("Roughness", _mean(materials.roughness), _grey(materials.roughness)),
-        tile("Metallic", _mean(materials.metallic), _grey(materials.metallic)),
-        tile("Normal", "camera frame", _normals(scene.normal)),
+        tile("Albedo", _mean(materials.albedo), display.to_bytes(linear_to_srgb(materials.albedo))),
+        tile("Roughness", _mean(materials.roughness), display.grey(materials.roughness)),
+        tile("Metallic", _mean(materials.metallic), display.grey(materials.metallic)),
+        tile("Normal", "camera frame", display.normals(scene.normal)),
         tile("Depth", _range(scene.depth), _depth(scene.depth)),
     ]
-    light = tile("Environment map", f"brightest {scene.envmap.max():.3g}", _tonemapped(scene.envmap), 2.0)
+    light = tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0)
     mesh = scene.geometry.mesh
     shape = [
         tile("Geometry", f"{len(mesh.faces):,} triangles, turned", relief(mesh, scene.camera)),
@@ -170,27 +173,6 @@ def _shortened(text: str, font: ImageFont.FreeTypeFont, width: float) -> str:
     return text + "…" if text else ""
 
 
-def _bytes(display: Array) -> Array:
-    """[..., 3] display values in [0, 1] to uint8."""
-    return np.round(np.clip(np.nan_to_num(display), 0, 1) * 255).astype(np.uint8)
-
-
-def _grey(values: Array) -> Array:
-    return np.repeat(_bytes(values)[..., None], 3, -1)
-
-
-def _heat(values: Array) -> Array:
-    """[H, W] in [0, 1] to a perceptually even colour ramp."""
-    import cv2
-
-    return cv2.applyColorMap(_bytes(values), cv2.COLORMAP_INFERNO)[..., ::-1]
-
-
-def _normals(normal: Array) -> Array:
-    """Usual colours of camera-frame normals; black where there is none."""
-    return np.where(np.any(normal != 0, -1, keepdims=True), _bytes(normal * 0.5 + 0.5), 0).astype(np.uint8)
-
-
 def _depth(depth: Array) -> Array:
     """Near bright, far dark, by rank-safe inverse depth; sky in the frame's grey."""
     import cv2
@@ -200,7 +182,7 @@ def _depth(depth: Array) -> Array:
         return np.full((*depth.shape, 3), _FRAME, np.uint8)
     inverse = np.where(seen, 1 / np.where(seen, depth, 1), 0)
     low, high = np.percentile(inverse[seen], (1, 99))
-    ramp = cv2.applyColorMap(_bytes((inverse - low) / max(high - low, 1e-12)), cv2.COLORMAP_MAGMA)[..., ::-1]
+    ramp = cv2.applyColorMap(display.to_bytes((inverse - low) / max(high - low, 1e-12)), cv2.COLORMAP_MAGMA)[..., ::-1]
     return np.where(seen[..., None], ramp, np.array(_FRAME, np.uint8))
 
 
@@ -211,16 +193,7 @@ def _labels(label: Array, photo: Array) -> Array:
     hue = (label.astype(np.int32) * 67 + 100) % 180
     colour = cv2.cvtColor(np.stack([hue, hue * 0 + 130, hue * 0 + 255], -1).astype(np.uint8), cv2.COLOR_HSV2RGB)
     dim = 0.25 + 0.6 * photo.mean(-1, keepdims=True)
-    return _bytes(np.where(label[..., None] >= 0, colour / 255 * dim, 0.6 * dim))
-
-
-def _tonemapped(envmap: Array) -> Array:
-    """HDR to display: exposed so that the median is mid-grey, highlights rolled off (Reinhard on luminance)."""
-    light = luminance(envmap)[..., None]
-    key = max(float(np.median(light)), float(light.mean()) * 0.1, 1e-8)
-    exposed = light * (0.22 / key)
-    shown = exposed * (1 + exposed / 16) / (1 + exposed)
-    return _bytes(linear_to_srgb(envmap * (shown / np.maximum(light, 1e-8))))
+    return display.to_bytes(np.where(label[..., None] >= 0, colour / 255 * dim, 0.6 * dim))
 
 
 def _mean(values: Array) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.io.decode import MIN_SIDE, Decoded, decode
+from materialist.io.decode import decode
+from materialist.io.decoded import MIN_SIDE, Decoded
 from materialist.io.examples import PREFIX, example_path
 from materialist.io.exif import horizontal_fov
 from materialist.types import Array, Camera, Photo

@@ -164,7 +164,7 @@ def _read_png(path: Path) -> Array:
 
 
 def check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:
-    """Raises InputError unless the map has the photo's aspect ratio, up to rounding of the smaller one."""
+    """Raises InputError unless a map [h, w, ...] has the aspect ratio of the photo's `size` (H, W), up to rounding."""
     (h, w), (height, width) = values.shape[:2], size
     slack = 1.5 * max(1.0, height / h, width / w)
     if abs(w * height / h - width) > slack and abs(h * width / w - height) > slack:

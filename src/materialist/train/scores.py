@@ -63,7 +63,7 @@ def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, fl
 def ordinal_accuracy(
     predicted: Array, true: Array, *, pairs: int = 50_000, tolerance: float = 0.02, seed: int = 0
 ) -> float:
-    """Part of random pixel pairs whose order in depth is right; pairs truly closer than `tolerance` do not count.
+    """Part of random pixel pairs whose order in depth [H, W] is right; those closer than `tolerance` do not count.
 
     A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out.
     """
