@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.geometry.membrane import membrane
 from materialist.geometry.symmetry import border_distance, object_size, spacing, surface_in
+from materialist.geometry.turning import Axis, turned_thickness
 from materialist.types import Array, Camera
 
 COARSE = 40
@@ -34,8 +34,6 @@ GAP = 0.4
 """Largest error that is told from larger ones, as a part of the object's size."""
 FITS, FAILS = 0.06, 0.14
 """Misfit up to which an object is taken to be its own image, and from which it is not."""
-FINE = 3
-"""Points along a pixel when the turned front is drawn."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +71,11 @@ def half_turn(
     """
     inside = surface_in(mask, depth, camera)
     rays = pixel_rays(camera).astype(np.float64)
-    fit = _Fit(depth, normal, inside, guess, rays, None if up is None else np.asarray(up, np.float64))
+    fit = Fit(depth, normal, inside, guess, rays, None if up is None else np.asarray(up, np.float64))
     misfit, _ = fit.search(fit.strangeness)
     _, axis = fit.search(fit.difference)
-    return HalfTurn(_thickness(np.asarray(depth, np.float64), inside, rays, axis), misfit, axis.up, axis.foot)
+    solid = turned_thickness(np.asarray(depth, np.float64), normal, inside, rays, axis)
+    return HalfTurn(solid, misfit, axis.up, axis.foot)
 
 
 def upright(depth: Array, normal: Array, plane: Array, camera: Camera) -> Array | None:
@@ -98,29 +97,8 @@ def upright(depth: Array, normal: Array, plane: Array, camera: Camera) -> Array 
     return best
 
 
-@dataclass(frozen=True)
-class _Axis:
-    up: Array
-    """[3] unit."""
-    foot: Array
-    """[3] scene units."""
-    base: bool
-    """Whether the object ends at a plane through `foot`."""
-
-    def turned(self, points: Array) -> Array:
-        """[N, 3] points after half a turn."""
-        offset = points - self.foot
-        return 2 * (offset @ self.up)[:, None] * self.up - offset + self.foot
-
-    def base_depth(self, rays: Array) -> Array:
-        """[...] planar depth at which rays [..., 3] (z = -1) pass the base downwards; inf where they do not."""
-        falling = rays @ self.up
-        reached = float(self.foot @ self.up) / np.where(falling < -1e-6, falling, -1e-6)
-        return np.where(self.base & (falling < -1e-6) & (reached > 0), reached, np.inf)
-
-
-class _Fit:
-    """The object at few pixels, and how well an axis fits it."""
+class Fit:
+    """The object at few pixels, and how well an axis fits it; parameters as of `half_turn`."""
 
     def __init__(self, depth: Array, normal: Array, inside: Array, guess: Array, rays: Array, up: Array | None):
         rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
@@ -149,7 +127,7 @@ class _Fit:
         before = border * self.depth * self.step * self.facing / (1 - np.sqrt(1 - self.facing**2) + 1e-6)
         self.widest = np.minimum(2 * before, GAP * self.size)  # [h, w] gap next to the silhouette, at most
 
-    def axis(self, values: Array) -> _Axis:
+    def axis(self, values: Array) -> Axis:
         """The axis of parameters (right, behind) in units of the object's size, and the tilt in radians."""
         up = np.array([0, np.cos(values[2]), np.sin(values[2])]) if self.up is None else self.up
         centre = np.array([*self.points[:, :2].mean(0), np.median(self.points[:, 2])])
@@ -158,22 +136,26 @@ class _Fit:
         low = float(np.percentile(height, 1))
         bottom = height < low + 0.06 * np.ptp(height)
         base = bool(np.median(self.facing[self.inside][bottom]) > EDGED)
-        return _Axis(up, foot + (low - foot @ up) * up, base)
+        return Axis(up, foot + (low - foot @ up) * up, base)
 
-    def strangeness(self, axis: _Axis) -> float:
+    def strangeness(self, axis: Axis) -> float:
         """How little the turned front goes with the mask and the front, as a part of the object's size."""
         wrong, gap = self._against(axis)
         more = np.clip((gap - self.widest) / self.size, 0, GAP)[self.rim]
         return 2 * wrong + (float(np.where(np.isfinite(more), more, GAP).mean()) if len(more) else 0.0)
 
-    def difference(self, axis: _Axis) -> float:
+    def astray(self, axis: Axis) -> float:
+        """What of the turned front lies outside the mask or before the front, as a part of the object's size."""
+        return self._against(axis)[0]
+
+    def difference(self, axis: Axis) -> float:
         """The same, but for the guess in place of the silhouette: relative to the guessed thickness."""
         wrong, gap = self._against(axis)
         told = self.inside & np.isfinite(gap)
         off = np.abs(np.maximum(gap, 0) - self.guess)[told].sum() / max(float(self.guess[told].sum()), 1e-9)
         return 2 * wrong + min(off, 3.0) + 0.3 * float((self.inside & ~told).sum() / self.inside.sum())
 
-    def _against(self, axis: _Axis) -> tuple[float, Array]:
+    def _against(self, axis: Axis) -> tuple[float, Array]:
         """What of the turned front lies outside the mask or before the front, and [h, w] the gap between the two."""
         back = axis.turned(self.points)
         z = np.maximum(-back[:, 2], 1e-9)
@@ -190,13 +172,13 @@ class _Fit:
         exits = np.minimum(_spread(exits), axis.base_depth(self.rays))
         return float(outside.mean() + 2 * before.mean()), (exits - self.depth) * self.length
 
-    def _unturned(self, axis: _Axis) -> float:
+    def unturned(self, axis: Axis) -> float:
         """How far normals are from meeting the axis, as those of a lathed body do; it tells the tilt of such a one."""
         across = np.cross(axis.up, self.points - axis.foot)
         across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
         return float(np.abs((self.normals * across).sum(-1)).mean())
 
-    def search(self, measure: Callable[[_Axis], float]) -> tuple[float, _Axis]:
+    def search(self, measure: Callable[[Axis], float]) -> tuple[float, Axis]:
         """The axis at which a measure is least, and its value there, by simplex searches from a few places."""
         from scipy.optimize import minimize
 
@@ -205,7 +187,7 @@ class _Fit:
             if self.up is not None:
                 return measure(axis)
             usual, price = LOOKING_DOWN
-            return measure(axis) + price * (values[2] - usual) ** 2 + min(self._unturned(axis), LATHED)
+            return measure(axis) + price * (values[2] - usual) ** 2 + min(self.unturned(axis), LATHED)
 
         starts = [np.array([0.0, b, t]) for b in (0.1, 0.3, 0.5) for t in (TILTS if self.up is None else (0.0,))]
         steps = np.diag([0.08, 0.12, 0.12])
@@ -228,40 +210,3 @@ def _spread(exits: Array) -> Array:
     from scipy.ndimage import maximum_filter
 
     return np.where(np.isfinite(exits), exits, maximum_filter(exits, 3))
-
-
-def _thickness(depth: Array, inside: Array, rays: Array, axis: _Axis) -> Array:
-    """[H, W] float32: the turned front drawn pixel by pixel, its gaps spanned, cut at the base."""
-    exits = _drawn(depth, inside, rays, axis)
-    drawn = inside & (exits > 0)
-    length = np.linalg.norm(rays, axis=-1)
-    if axis.base:
-        # The walls go on down to the base.
-        exits = np.minimum(membrane(exits, drawn), axis.base_depth(rays))
-        squared = np.maximum((exits - depth) * length, 0) ** 2
-    else:
-        # At a silhouette that turns away the thickness ends; squares change evenly there.
-        squared = membrane(np.maximum((exits - depth) * length, 0) ** 2, drawn | ~inside)
-    return np.where(inside, np.sqrt(np.maximum(squared, 0)), 0).astype(np.float32)
-
-
-def _drawn(depth: Array, inside: Array, rays: Array, axis: _Axis) -> Array:
-    """[H, W] largest planar depth of the turned front in each pixel, 0 for none."""
-    import cv2
-
-    log_depth = membrane(np.log(np.where(inside, depth, 1)), inside).astype(np.float32)
-    large = np.exp(cv2.resize(log_depth, None, fx=FINE, fy=FINE, interpolation=cv2.INTER_LINEAR))
-    kept = cv2.resize(inside.astype(np.uint8), None, fx=FINE, fy=FINE, interpolation=cv2.INTER_NEAREST) > 0
-    i, j = np.nonzero(kept)
-    step = spacing(rays)
-    right = rays[0, 0, 0] + ((j + 0.5) / FINE - 0.5) * step
-    above = rays[0, 0, 1] - ((i + 0.5) / FINE - 0.5) * step
-    own = np.stack([right, above, -np.ones(len(i))], -1) * large[i, j][:, None].astype(np.float64)
-    back = axis.turned(own)
-    z = np.maximum(-back[:, 2], 1e-9)
-    column = np.round((back[:, 0] / z - rays[0, 0, 0]) / step).astype(int)
-    row = np.round((rays[0, 0, 1] - back[:, 1] / z) / step).astype(int)
-    there = (column >= 0) & (column < depth.shape[1]) & (row >= 0) & (row < depth.shape[0])
-    exits = np.zeros(depth.shape)
-    np.maximum.at(exits, (row[there], column[there]), z[there])
-    return exits

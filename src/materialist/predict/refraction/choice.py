@@ -1,4 +1,6 @@
-"""Which estimate of an object's thickness to believe: its front turned half around, RefractionNet's, or the mirror's.
+"""Which estimate of an object's thickness to believe: its front swept or turned around, RefractionNet's, the mirror's.
+
+What was turned on a lathe is known by its normals, and its back with it.
 
 RefractionNet knows how deep things are, but its maps are soft: what is seen through a soft back is blurred and moved.
 The turned front has the object's own edges. Where both say about the same, or the turn fits very well, it is taken;
@@ -15,6 +17,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
 from materialist.geometry.front import smooth_front
 from materialist.geometry.half_turn import half_turn
+from materialist.geometry.lathe import lathed
 from materialist.geometry.symmetry import surface_in, symmetric_thickness
 from materialist.predict.refraction.thickness import Thickness, thickness
 from materialist.types import Array, Camera
@@ -33,7 +36,7 @@ class Choice:
 
     thickness: Thickness
     method: str
-    """`half-turn`, `network` or `symmetry`."""
+    """`lathe`, `half-turn`, `network` or `symmetry`."""
 
 
 def best_thickness(
@@ -60,10 +63,16 @@ def best_thickness(
     except WeightsError:
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
+    if prefer == "auto" and (swept := lathed(front, normal, inside, camera, up=up)) is not None:
+        return Choice(_as_thick(guess, swept.thickness), "lathe")
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)
     away = float(np.abs(turn.thickness - guess.solid)[inside].sum() / max(float(guess.solid[inside].sum()), 1e-9))
     believed = away < AGREE or (turn.misfit < CERTAIN and away < FAR)
     if not (believed or prefer == "half-turn"):
         return Choice(guess, method)
-    solid = turn.thickness
-    return Choice(replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid)), "half-turn")
+    return Choice(_as_thick(guess, turn.thickness), "half-turn")
+
+
+def _as_thick(guess: Thickness, solid: Array) -> Thickness:
+    """The guess with another solid thickness [H, W]."""
+    return replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid))

@@ -1,0 +1,81 @@
+"""Thickness of what was turned on a lathe: the visible front, swept around the axis that all its normals meet.
+
+Bottles, bulbs, vases, balls, cups without their handles. The normals alone say where the axis stands and how it leans;
+no guess of the thickness is needed, and exact maps give it exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.geometry.half_turn import LOOKING_DOWN, TILTS, Fit
+from materialist.geometry.symmetry import surface_in
+from materialist.geometry.turning import Axis, turned_thickness
+from materialist.types import Array, Camera
+
+ROUND = 0.035
+"""Mean sine between normals and the planes through the axis up to which an object counts as turned on a lathe."""
+ASTRAY = 0.02
+"""How little the turned front may go with the mask and the front, as a part of the object's size."""
+BEHIND = (0.1, 0.3, 0.5)
+"""Where the axis is first looked for, behind the middle of the front, in units of the object's size."""
+REACH = 1.5
+"""Farthest place of the axis, in the same units: normals of one plane all meet at infinity."""
+LEVEL = 0.02
+"""What the square of a deviation from the usual tilt costs: for balls any tilt will do."""
+SWEEP = np.radians(np.linspace(90, 270, 9))
+"""Turns of the front. From a camera that is near, a half turn alone leaves out a strip at either side."""
+
+
+@dataclass(frozen=True)
+class Lathed:
+    """The back of an object as if turned on a lathe."""
+
+    thickness: Array
+    """[H, W] float32 along the camera ray, scene units; 0 outside the mask."""
+    misfit: float
+    """Mean sine between the visible normals and the planes through the axis."""
+    axis: Axis
+
+
+def lathed(depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None) -> Lathed | None:
+    """The thickness of an object that was turned on a lathe, or None where its normals do not meet one axis.
+
+    Args:
+        depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
+        up: [3] unit, the axis' direction in the camera's frame, where a support tells it; else the camera is taken
+            not to lean sideways, and the angle at which it looks down is found with the axis.
+
+    Raises:
+        InputError: maps of different sizes, or a mask without any surface.
+    """
+    inside = surface_in(mask, depth, camera)
+    rays = pixel_rays(camera).astype(np.float64)
+    fit = Fit(depth, normal, inside, depth, rays, None if up is None else np.asarray(up, np.float64))
+    axis = _axis(fit)
+    misfit = fit.unturned(axis)
+    if misfit > ROUND or fit.astray(axis) > ASTRAY:
+        return None
+    return Lathed(turned_thickness(np.asarray(depth, np.float64), normal, inside, rays, axis, SWEEP), misfit, axis)
+
+
+def _axis(fit: Fit) -> Axis:
+    """The axis that the normals meet best."""
+    from scipy.optimize import minimize
+
+    def cost(values: Array) -> float:
+        far = np.maximum(np.abs(values[:2]) - REACH, 0).sum()
+        lean = 0 if fit.up is not None else LEVEL * (values[2] - LOOKING_DOWN[0]) ** 2
+        return fit.unturned(fit.axis(values)) + far + lean
+
+    tilts = TILTS if fit.up is None else (0.0,)
+    starts = [np.array([0.0, behind, tilt]) for behind in BEHIND for tilt in tilts]
+    found = []
+    for start in sorted(starts, key=cost)[:3]:
+        first = np.stack([start, *(start + np.diag([0.08, 0.12, 0.12]))])
+        options = {"maxfev": 200, "xatol": 1e-3, "fatol": 1e-6, "initial_simplex": first}
+        found.append(minimize(cost, start, method="Nelder-Mead", options=options))
+    return fit.axis(min(found, key=lambda one: one.fun).x)

@@ -1,0 +1,81 @@
+"""Planes fitted to small windows of a map: its slopes, what it is just beyond where it is known, its normals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.geometry.symmetry import spacing
+from materialist.types import Array
+
+SHARP = 0.5
+"""Least standard deviation of a window, pixels: hardly more than the four neighbours, so that edges stay sharp."""
+FAR = 1.5
+"""Pixels over which values go on along their plane; farther out they stay."""
+
+
+def slopes_of(values: Array, known: Array, sigma: float = SHARP) -> tuple[Array, Array]:
+    """[H, W] change of a map [H, W] from one pixel to the next, to the right and downwards, where it is known.
+
+    Least squares over a window with Gaussian weights of `sigma` pixels, of known [H, W] bool pixels alone: next to
+    where the map ends the window is one-sided.
+    """
+    from scipy.ndimage import correlate
+
+    reach = int(np.ceil(2 * max(sigma, SHARP)))
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
+    weight = np.exp(-(x**2 + y**2) / (2 * max(sigma, SHARP) ** 2))
+    basis = np.ones_like(x), x, y
+    total = lambda a, kernel: correlate(a, kernel * weight, mode="constant")  # noqa: E731
+    # Numbers near 1 keep the sums exact.
+    mean, spread = values[known].mean(), max(float(values[known].std()), 1e-30)
+    own = np.where(known, (values - mean) / spread, 0)
+    inside = known.astype(np.float64)
+    moments = np.stack([np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2)  # [H, W, 3, 3]
+    # A window without a spread in some direction says that the map is level along it.
+    moments = moments + np.diag([1e-9, 1e-4, 1e-4]) + np.eye(3) * ~known[..., None, None]
+    found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[..., 0]
+    return found[..., 1] * spread, found[..., 2] * spread
+
+
+def continued(values: Array, known: Array) -> Array:
+    """[H, W] float64: a map carried on along the planes of its last known pixels."""
+    from scipy.ndimage import distance_transform_edt
+
+    right, down = slopes_of(values, known)
+    away, (i, j) = distance_transform_edt(~known, return_indices=True)
+    rows, columns = np.indices(known.shape)
+    part = np.minimum(1, FAR / np.maximum(away, 1e-9))
+    beyond = values[i, j] + part * (right[i, j] * (columns - j) + down[i, j] * (rows - i))
+    return np.where(known, values, beyond).astype(np.float64)
+
+
+def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -> Array:
+    """[H, W, 3] unit normals, away from the camera, of a surface that is seen from within.
+
+    Planes are planes in 1/z, too, whatever the perspective, so that slopes of that are exact on flat backs.
+
+    Args:
+        back: [H, W] planar depth, scene units. known: [H, W] bool; 0 is returned elsewhere.
+        rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
+        sigma: of the window of `slopes_of`, pixels.
+    """
+    depth = np.where(known, back, 1).astype(np.float64)
+    right, down = slopes_of(1 / depth, known, sigma)
+    step = spacing(rays)
+    # d log z = -z d(1/z); the tangents of z r are z (r d log z + dr).
+    across = -(right * depth)[..., None] * rays + np.array([step, 0, 0])
+    upright = -(down * depth)[..., None] * rays - np.array([0, step, 0])
+    normal = np.cross(upright, across)
+    normal *= np.sign((normal * rays).sum(-1, keepdims=True))
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-30)
+    return np.where(known[..., None], normal, 0)
+
+
+def sampled(values: Array, place: Array, order: int = 3) -> Array:
+    """[V, ...] of a map [H, W, ...] at places [V, 2] (x, y), by splines: with cubic ones normals turn evenly."""
+    from scipy.ndimage import map_coordinates
+
+    flat = np.asarray(values, np.float64).reshape(*values.shape[:2], -1)
+    where = place.T[::-1]
+    read = [map_coordinates(flat[..., k], where, order=order, mode="nearest") for k in range(flat.shape[-1])]
+    return np.stack(read, -1).reshape(len(place), *values.shape[2:])
