@@ -49,3 +49,15 @@ def sky(height: int = 16) -> np.ndarray:
     red = 0.6 + 1.5 * np.clip(right, 0, 1) * (1 + up)
     green, blue = 0.5 + 0.5 * np.clip(up, 0, 1), 0.7 + np.clip(-ahead, 0, 1)
     return np.stack([red, green, blue], -1).astype(np.float32)
+
+
+def load_xml(mi, path, **options):
+    """Mitsuba's scene of an XML file. Its reader waits for ever where Dr.Jit has one thread (OMP_NUM_THREADS=1)."""
+    import drjit as dr
+
+    count = dr.thread_count()
+    dr.set_thread_count(max(count, 2))
+    try:
+        return mi.load_file(str(path), **options)
+    finally:
+        dr.set_thread_count(count)

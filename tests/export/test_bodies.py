@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from export_scenes import room
+from export_scenes import load_xml, room
 
 from materialist.edit.mesh_material import constant
 from materialist.export import body_parts
@@ -86,7 +86,7 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     target.set_envmap(scene.envmap)
     expected = target.render_path(spp=64, seed=1, max_depth=GLASS_DEPTH)
     done = export(scene, tmp_path / "scene", to="mitsuba")
-    loaded = target.mi.load_file(str(done.path), bsdf="materialist_disney", spp=64, max_depth=GLASS_DEPTH)
+    loaded = load_xml(target.mi, done.path, bsdf="materialist_disney", spp=64, max_depth=GLASS_DEPTH)
     picture = np.array(target.mi.render(loaded, seed=2))[..., :3]
     plate = np.s_[16:24, 14:26]
     np.testing.assert_allclose(picture[plate].mean((0, 1)), expected[plate].mean((0, 1)), rtol=0.05, atol=0.01)

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from export_scenes import room
+from export_scenes import load_xml, room
 
 from materialist.export.mitsuba_xml import write_mitsuba
 from materialist.export.parts import scene_parts
@@ -27,7 +27,7 @@ def test_it_renders_as_ours_does(written, capfd):
     renderer.set_materials(scene.materials)
     renderer.set_envmap(scene.envmap)
     mi = renderer.mi
-    loaded = mi.load_file(str(folder / "scene.xml"), spp=64, bsdf="materialist_disney", max_depth=3)
+    loaded = load_xml(mi, folder / "scene.xml", spp=64, bsdf="materialist_disney", max_depth=3)
     ours = [renderer.render_path(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
     theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
     # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
@@ -45,7 +45,7 @@ def test_the_portable_material_is_close(written):
 
     mi = setup("auto")
     images = [
-        np.array(mi.render(mi.load_file(str(folder / "scene.xml"), spp=64, **options), seed=1))
+        np.array(mi.render(load_xml(mi, folder / "scene.xml", spp=64, **options), seed=1))
         for options in ({}, {"bsdf": "materialist_disney"})
     ]
     assert np.mean(images[0]) == pytest.approx(np.mean(images[1]), rel=0.03)

@@ -9,6 +9,8 @@ import numpy as np
 
 from materialist.types import Array
 
+Pairs = tuple[Array, Array, Array, Array]
+"""Linked neighbours, [P] each: the one, the other, the step wanted between them, and its weight."""
 STEEPEST = 0.12
 """Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
 

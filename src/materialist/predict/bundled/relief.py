@@ -6,12 +6,10 @@ shades itself with tiny steps.
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 
-from materialist.geometry.slopes import between, least_squares_change, slopes
+from materialist.geometry.slopes import Pairs, between, least_squares_change, slopes
 from materialist.types import Array
 
 STEP = (0.02, 0.05)
@@ -73,7 +71,7 @@ def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: in
     return np.where(ending, np.inf, most).astype(np.float32)
 
 
-def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> tuple[Any, ...]:
+def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> Pairs:
     """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
     parts = []
     for near, far, asked in between(demanded):
@@ -83,4 +81,5 @@ def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Arr
         least = np.where(np.isinf(around), BREAK, np.maximum(BREAK, PART * around))
         broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
         parts.append((index[near][both], index[far][both], wanted, np.where(broken, OPEN, 1.0)))
-    return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+    first, second, wanted, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return first, second, wanted, weight
