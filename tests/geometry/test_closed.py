@@ -64,6 +64,31 @@ def test_a_ball_has_the_volume_and_the_normals_of_a_ball():
     assert np.mean(cosine) > 0.985 and np.quantile(cosine, 0.02) > 0.85
 
 
+def test_normals_follow_the_map_in_front_and_the_thickness_behind():
+    depth, normal, mask, thick = ball()
+    shell = closed_proxy(depth, normal, mask, thick, CAMERA, smooth=0.0)
+    out = (shell.vertices - [0.1, 0, -3]) / 0.6
+    inner = np.linalg.norm(out[:, :2], axis=-1) < 0.9
+    front = out[:, 2] > 0
+    for side in (front, ~front):
+        assert np.quantile((shell.normals * out).sum(-1)[inner & side], 0.01) > 0.999
+
+
+def test_an_object_ends_in_a_wall_where_its_thickness_does_not_end():
+    rows, columns = np.mgrid[:48, :64]
+    depth, normal, mask, thick, camera = plate((np.abs(rows - 24) < 12) & (np.abs(columns - 32) < 16))
+    shell = closed_proxy(depth, normal, mask, thick, camera)
+    # A box of 24 - 1 by 32 - 1 pixels at depth 2, 0.3 deep, which widens with the rays; its corners are a little round.
+    pixel = 1 / camera.focal
+    true = 23 * 31 * pixel**2 * (2.3**3 - 2**3) / 3
+    assert volume(shell) == pytest.approx(true, rel=0.04)
+    # The wall looks sideways: nothing of it faces the camera or away from it.
+    between = (-shell.vertices[:, 2] > 2.05) & (-shell.vertices[:, 2] < 2.2)
+    assert between.sum() > 100
+    ray = shell.vertices / np.linalg.norm(shell.vertices, axis=-1, keepdims=True)
+    assert np.abs((shell.normals * ray).sum(-1))[between].max() < 0.01
+
+
 def test_hollow_is_a_wall_around_a_cavity():
     solid, hollow = (closed_proxy(*ball(), CAMERA, wall=wall) for wall in (None, 0.1))
     assert_watertight(hollow)

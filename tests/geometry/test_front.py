@@ -25,6 +25,16 @@ def test_exact_depth_and_normals_stay():
     np.testing.assert_array_equal(front[~inside], depth[~inside])
 
 
+def test_an_edge_stays_where_it_is():
+    """A roof: neither side is moved by the mean of the two slopes at its ridge."""
+    roof = [np.array([0.6, 0, 0.8]), np.array([-0.8, 0, 0.6])]
+    left, right = (float(n @ [0, 0, -3]) / (RAYS @ n) for n in roof)
+    depth = np.maximum(left, right)
+    normal = np.where((left > right)[..., None], roof[0], roof[1])
+    front = smooth_front(depth, normal, np.ones(depth.shape, bool), RAYS, smooth=0.0)
+    assert np.abs(front / depth - 1)[4:-4, 4:-4].max() < 1e-4
+
+
 def test_normals_take_away_the_noise_of_the_depth():
     depth, normal, inside = _ball()
     noisy = depth * np.exp(np.random.default_rng(0).normal(0, 0.005, depth.shape))

@@ -32,7 +32,7 @@ def slopes_of(values: Array, known: Array, sigma: float = SHARP) -> tuple[Array,
     inside = known.astype(np.float64)
     moments = np.stack([np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2)  # [H, W, 3, 3]
     # A window without a spread in some direction says that the map is level along it.
-    moments = moments + np.diag([1e-9, 1e-4, 1e-4]) + np.eye(3) * ~known[..., None, None]
+    moments = moments + np.diag([1e-9, 1e-6, 1e-6]) + np.eye(3) * ~known[..., None, None]
     found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[..., 0]
     return found[..., 1] * spread, found[..., 2] * spread
 
