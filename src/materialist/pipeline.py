@@ -22,7 +22,7 @@ FINAL_SPP = 36
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
-COMPLETIONS = ("auto", "planes,backs", "planes", "none")
+COMPLETIONS = ("auto", "planes,backs", "floors,backs", "planes", "none")
 
 
 def invert(
@@ -61,8 +61,8 @@ def invert(
         size: longer side of the working image, pixels.
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
-            `planes` leaves objects open behind, `none` does neither. `auto` is the first, and the last where the
-            re-rendering is poor and far better without: a continued plane can shut out light that the photo shows.
+            `floors,backs` continues no walls, `planes` leaves objects open behind, `none` adds nothing. `auto` is the
+            first, or one with less where the first shuts out light that the photo shows; the report then says so.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).

@@ -7,7 +7,7 @@ import pytest
 
 from materialist import metrics
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.fit.attempt import FULL, Attempt, Job
+from materialist.fit.attempt import FLOORS, FULL, Attempt, Begun, Job
 
 PHOTO = np.full((8, 8, 3), 0.5, np.float32)
 
@@ -17,19 +17,32 @@ def picture_at(decibel: float) -> np.ndarray:
     return srgb_to_linear(linear_to_srgb(PHOTO) - np.float32(10 ** (-decibel / 20)))
 
 
-def job(monkeypatch, results: dict[str, float], *, planes: bool = True) -> tuple[Job, list[str]]:
-    """A job whose attempts come to the given PSNR by completion, and the list of those made."""
-    made: list[str] = []
+def job(
+    monkeypatch, results: dict[str, float], *, planes: bool = True, walls: bool = False, errors: tuple = (0.1, 0.1)
+) -> tuple[Job, list[str]]:
+    """A job whose attempts come to the given PSNR by completion, and the list of those finished.
 
-    def run(self, completion: str) -> Attempt:
-        made.append(completion)
-        mesh = SimpleNamespace(face_plane=np.array([-1, 0 if planes else -1]))
-        stages = ({"name": completion},)
-        return Attempt(completion, SimpleNamespace(mesh=mesh), None, None, picture_at(results[completion]), stages)
+    `errors`: what the prior leaves unexplained with and without walls.
+    """
+    finished: list[str] = []
 
-    monkeypatch.setattr(Job, "run", run)
-    rest = (None, None, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
-    return Job(SimpleNamespace(linear=PHOTO), *rest), made
+    def begin(self, completion: str) -> Begun:
+        normals = np.array([[0, 0.0 if walls and completion == FULL else 1.0, 0]] * 3)
+        faces = np.array([[0, 1, 2]])
+        mesh = SimpleNamespace(face_plane=np.array([0 if planes else -1]), faces=faces, normals=normals)
+        fit = SimpleNamespace(prior_error=lambda: errors[completion != FULL])
+        return Begun(completion, SimpleNamespace(mesh=mesh), fit, None, [])
+
+    def finish(self, begun: Begun) -> Attempt:
+        finished.append(begun.completion)
+        picture = picture_at(results[begun.completion])
+        return Attempt(begun.completion, begun.geometry, None, None, picture, ({"name": begun.completion},))
+
+    monkeypatch.setattr(Job, "begin", begin)
+    monkeypatch.setattr(Job, "finish", finish)
+    settings = SimpleNamespace(trust=0.08)
+    rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
+    return Job(SimpleNamespace(linear=PHOTO), *rest), finished
 
 
 def test_the_pictures_of_this_test_are_as_far_off_as_they_say():
@@ -65,3 +78,18 @@ def test_a_completion_that_was_asked_for_is_kept(monkeypatch):
     task, made = job(monkeypatch, {FULL: 20, "none": 40})
     best, notes = task.best(FULL)
     assert (best.completion, notes, made) == (FULL, (), [FULL])
+
+
+@pytest.mark.parametrize(("errors", "kept"), [((0.05, 0.03), FLOORS), ((0.05, 0.045), FULL), ((0.03, 0.05), FULL)])
+def test_walls_stay_unless_the_prior_explains_the_photo_much_better_without(monkeypatch, errors, kept):
+    task, made = job(monkeypatch, {FULL: 35, FLOORS: 35}, walls=True, errors=errors)
+    best, notes = task.best("auto")
+    assert (best.completion, made) == (kept, [kept])
+    assert bool(notes) == (kept == FLOORS)
+    if notes:
+        assert "0.030 in place of 0.050" in notes[0]
+
+
+def test_only_walls_are_asked_about(monkeypatch):
+    task, made = job(monkeypatch, {FULL: 35, FLOORS: 35}, errors=(0.05, 0.01))
+    assert task.best("auto")[0].completion == FULL and made == [FULL]

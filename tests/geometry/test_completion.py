@@ -8,8 +8,8 @@ from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
 
 from materialist.errors import InputError
 from materialist.geometry.boundary import depth_to_mesh
-from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import complete
+from materialist.geometry.build import build_geometry, completion_of
+from materialist.geometry.completion import complete, walled
 from materialist.geometry.planes import Plane
 from materialist.types import Camera
 
@@ -136,6 +136,18 @@ def test_completion_can_be_switched_off_and_its_extent_chosen(furnished):
     assert sizes[1] == pytest.approx(4 * sizes[0], rel=0.05)
     with pytest.raises(InputError, match="'walls'"):
         build_geometry(depth, normal, CAMERA, completion="walls")
+
+
+def test_walls_can_be_left_out(furnished):
+    geometry, depth, _, floor, wall = furnished
+    _, normal, _ = room(CAMERA)
+    bare = build_geometry(depth, normal, CAMERA, completion="floors,backs")
+    continued = bare.mesh.face_plane[bare.mesh.face_plane >= 0]
+    assert set(continued) == {floor} and set(geometry.mesh.face_plane) >= {floor, wall}
+    assert walled(geometry) and not walled(bare)
+    np.testing.assert_array_equal(bare.plane_label, geometry.plane_label)
+    assert completion_of(bare, "floors,backs") == "floors,backs"
+    assert completion_of(bare, "something older") in ("planes", "planes,backs")
 
 
 def test_faces_of_continuations_are_well_formed(furnished):

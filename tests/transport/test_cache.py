@@ -202,8 +202,11 @@ def test_light_is_linear(walled_floor):
 
 def test_progress_counts_every_lobe():
     told = []
-    TransportCache(
+    cache = TransportCache(
         quads(floor(), pixels=[0], planes=[-1]), CAMERA, diffuse_samples=4, specular_samples=4,
         progress=lambda *a: told.append(a),
     )  # fmt: skip
+    assert told == []  # a light fit traces none of them
+    cache.trace()
+    cache.trace()
     assert told == [("trace", k, 9) for k in range(1, 10)]

@@ -30,13 +30,14 @@ NOTE = """Light fitted to synthetic photographs whose materials, geometry and li
 linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `mesh` the
 depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
 `ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
-whole inversion by the default preset, light and materials, with the true maps as its prior. `w/o backs`: with objects
-open behind (`--completion planes`); `w/o planes`: without continued planes, either (`none`). `w/o mat`: albedo and
-roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit with its ray
-tracing, without the mesh, and for `inversion` those of all of it; CPU seconds add up all processors and hardly depend
-on what else the computer does. The first sample's hold the compilation of kernels that the computer has not met before.
-`128x64`: the paper's MLP is evaluated on a map of that size inside the fit instead of 512x256, which makes its steps
-cheaper."""
+whole inversion by the default preset, light and materials, with the true maps as its prior; it and `default` leave
+continued walls out where they keep out the light of the photograph (`--completion auto`), the ceiling has them. `w/o
+backs`: with objects open behind (`--completion planes`); `w/o planes`: without continued planes, either (`none`). `w/o
+mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit and
+its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds add up all
+processors and hardly depend on what else the computer does. The first sample's hold the compilation of kernels that the
+computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that size inside the fit instead of
+512x256, which makes its steps cheaper."""
 
 COLUMNS = (
     Column("envmap_ssim", "envmap SSIM", "higher"),
@@ -97,7 +98,7 @@ def run(
     lights: int = 2,
     size: int = 96,
     methods: str = "default,paper",
-    completion: str = "planes,backs",
+    completion: str = "auto",
     relight: bool = True,
     spp: int = 256,
     seed: int = 0,
@@ -106,9 +107,9 @@ def run(
     """Fit the light of scenes x views x lights samples of `size` pixels with each of the `methods`.
 
     `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
-    begins with another light, so that small runs meet several. `completion` is that of `invert` under the methods;
-    with `relight`, whole inversions with and without continued planes and backs are relit. `spp` are the samples a
-    pixel of all pictures that are compared. The report is written after every row.
+    begins with another light, so that small runs meet several. `completion` is that of `invert` for the methods; for
+    the paper's, `auto` is `planes,backs`. With `relight`, whole inversions with and without continued planes and backs
+    are relit. `spp` are the samples a pixel of all pictures that are compared. The report is written after every row.
     """
     chosen = _methods(methods)
     from rich.console import Console
@@ -144,7 +145,7 @@ def _methods(names: str) -> dict[str, Method]:
     return chosen
 
 
-ADDED = {"planes,backs": "", "planes": " w/o backs", "none": " w/o planes"}
+ADDED = {"auto": "", "planes": " w/o backs", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
 
 
@@ -186,7 +187,7 @@ class _Stage:
 
         truth = self.sample.truth
         for completion, suffix in ADDED.items():
-            yield {"method": CEILING + suffix, **self._on_mesh(completion, truth.materials, self.sample.envmap)}
+            yield {"method": CEILING + suffix, **self._on_mesh(_all(completion), truth.materials, self.sample.envmap)}
             clock = _Clock()
             found = pipeline.invert(
                 self.sample.photo, prior=truth, completion=completion, seed=self.seed, device=self.device
@@ -196,19 +197,22 @@ class _Stage:
             yield {
                 "method": "inversion" + suffix,
                 **self._of_light(found.envmap),
-                **self._on_mesh(completion, found.materials, found.envmap),
+                **self._on_mesh(found.provenance["completion"], found.materials, found.envmap),
                 "albedo_l1": float(np.abs(found.materials.albedo - truth.materials.albedo)[surface].mean()),
                 **cost,
             }
 
     def fitted(self, methods: dict[str, Method], completion: str) -> Iterator[dict[str, Any]]:
         """A row for every method of fitting the light."""
-        geometry, mesh = self.mesh(completion)
         for name, method in methods.items():
+            taken, mesh = completion, None
+            if method.preset == "paper":
+                taken = _all(completion)
+                mesh = self.mesh(taken)[1]
             clock = _Clock()
-            envmap, steps = fit(self.sample, geometry, mesh, method, seed=self.seed)
+            envmap, steps, taken = fit(self.sample, method, taken, mesh=mesh, seed=self.seed, device=self.device)
             cost = clock.read()
-            on_mesh = self._on_mesh(completion, self.sample.truth.materials, envmap)
+            on_mesh = self._on_mesh(taken, self.sample.truth.materials, envmap)
             yield {
                 "method": name,
                 **self._of_light(envmap),
@@ -238,12 +242,15 @@ class _Stage:
         return {"mesh_psnr": metrics.psnr(picture, self.photo), "relit_psnr": metrics.psnr(relit, self.relit_photo)}
 
 
-def fit(sample: SyntheticSample, geometry: Any, mesh: Any, method: Method, *, seed: int = 0) -> tuple[Array, int]:
-    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth, and in how
-    many steps."""
+def fit(
+    sample: SyntheticSample, method: Method, completion: str, *, mesh: Any = None, seed: int = 0, device: str = "auto"
+) -> tuple[Array, int, str]:
+    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth, in how many
+    steps, and which completion that mesh had. `mesh` is the scene that the path engine renders."""
     import torch
 
-    from materialist.fit.engine import PathEngine, TransportEngine, prepared_envmap
+    from materialist.fit.attempt import Job
+    from materialist.fit.engine import PathEngine, prepared_envmap
     from materialist.fit.inverse import paste_visible_sky
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
@@ -255,17 +262,27 @@ def fit(sample: SyntheticSample, geometry: Any, mesh: Any, method: Method, *, se
     light = replace(light, field=method.field or light.field, height=method.height or light.height)
     height = sample.envmap.shape[0]
     surface = truth.depth > 0
+    given = truth if method.given else replace(truth, materials=_neutral(truth.materials))
     engine: Any
     if method.engine == "path":
         pixels = np.flatnonzero(surface.reshape(-1))
         engine = PathEngine(mesh, photo.camera, pixels, envmap_height=method.path_height, seed=seed)
     else:
-        engine = TransportEngine(geometry, photo.camera, photo.linear, seed=seed, light_height=named.light_grid)
-    problem = engine.light_problem(truth.materials if method.given else _neutral(truth.materials))
+        job = Job(
+            photo, given, named, "transport", height, 6.0, None, "default", seed, device, 0, None, lambda *_: None
+        )
+        begun, _ = job.choose(completion)
+        engine, completion = begun.fit.engine, begun.completion
+    problem = engine.light_problem(given.materials)
     field = envmap_field(light, seed=seed)
     result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
     envmap = prepared_envmap(field(max(light.height, 16)), height)
-    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps
+    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, completion
+
+
+def _all(completion: str) -> str:
+    """What `auto` adds where nothing speaks against it."""
+    return "planes,backs" if completion == "auto" else completion
 
 
 def _neutral(materials: Materials) -> Materials:

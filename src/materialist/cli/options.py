@@ -39,6 +39,7 @@ class Completion(StrEnum):
 
     auto = "auto"
     planes_backs = "planes,backs"
+    floors_backs = "floors,backs"
     planes = "planes"
     none = "none"
 

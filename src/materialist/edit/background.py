@@ -219,7 +219,7 @@ def _geometry(scene: Scene, found: Behind):
     options = scene.provenance
     return build_geometry(
         found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
-        completion=completion_of(scene.geometry), seed=int(options.get("seed", 0) or 0),
+        completion=completion_of(scene.geometry, options.get("completion")), seed=int(options.get("seed", 0) or 0),
     )  # fmt: skip
 
 

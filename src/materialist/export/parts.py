@@ -79,7 +79,7 @@ def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
     from materialist.geometry.build import build_geometry, completion_of
 
     camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
-    completion = completion_of(scene.geometry)
+    completion = completion_of(scene.geometry, scene.provenance.get("completion"))
     tau = float(scene.provenance.get("tau", 6.0))
     for _ in range(12):
         width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))

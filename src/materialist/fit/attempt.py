@@ -14,10 +14,13 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine
 from materialist.fit.inverse import Fit
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
+from materialist.geometry.completion import walled
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
-AUTO, FULL = "auto", "planes,backs"
+AUTO, FULL, FLOORS = "auto", "planes,backs", "floors,backs"
+EXPLAINED = 0.8
+"""What must be left of the error of the prior's materials under their best light for `auto` to leave walls out."""
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
@@ -36,6 +39,17 @@ class Attempt:
     rerender: Array
     """[H, W, 3] linear, path traced."""
     stages: tuple[dict, ...]
+
+
+@dataclass(frozen=True)
+class Begun:
+    """A geometry and a fit on it that has not run."""
+
+    completion: str
+    geometry: Geometry
+    fit: Fit
+    judge: Callable[..., Array]
+    stages: list[dict]
 
 
 @dataclass(frozen=True)
@@ -59,6 +73,50 @@ class Job:
 
     def run(self, completion: str) -> Attempt:
         """Mesh, light, materials, path-traced re-rendering."""
+        return self.finish(self.begin(completion))
+
+    def best(self, completion: str) -> tuple[Attempt, tuple[str, ...]]:
+        """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
+
+        A continued wall can shut out light that the photo shows. `auto` leaves walls out where the prior's materials
+        then explain the photo much better (`EXPLAINED`), and everything where the re-rendering stays poor and is
+        clearly better without.
+        """
+        begun, notes = self.choose(completion)
+        full = self.finish(begun)
+        if completion != AUTO:
+            return full, ()
+        before = metrics.psnr(full.rerender, self.picture.linear)
+        if before >= POOR or not (full.geometry.mesh.face_plane >= 0).any():
+            return full, notes
+        bare = self.run("none")
+        after = metrics.psnr(bare.rerender, self.picture.linear)
+        stages = (*full.stages, *bare.stages)
+        if after < before + CLEARLY:
+            return replace(full, stages=stages), notes
+        note = (
+            f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
+            f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
+        )
+        return replace(bare, stages=stages), (note,)
+
+    def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
+        """The fit to run for `completion`: for `auto`, the one with walls or the one without."""
+        full = self.begin(FULL if completion == AUTO else completion)
+        if completion != AUTO or self.settings.trust is None or not walled(full.geometry):
+            return full, ()
+        floors = self.begin(FLOORS)
+        with_walls, without = full.fit.prior_error(), floors.fit.prior_error()
+        if without > EXPLAINED * with_walls:
+            return full, ()
+        note = (
+            f"Walls were not continued: without them the predicted materials explain the photo much better "
+            f"(error {without:.3f} in place of {with_walls:.3f}); --completion {FULL} continues them."
+        )
+        return floors, (note,)
+
+    def begin(self, completion: str) -> Begun:
+        """The mesh, and an engine that has not traced anything yet."""
         stages: list[dict] = []
         self._tick("geometry")
         geometry = timed(
@@ -76,37 +134,21 @@ class Job:
             self.picture, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
         )  # fmt: skip
+        return Begun(completion, geometry, fit, judge, stages)
+
+    def finish(self, begun: Begun) -> Attempt:
+        """Light, materials, path-traced re-rendering."""
+        fit, stages = begun.fit, list(begun.stages)
+        if isinstance(fit.engine, TransportEngine):
+            timed(stages, "trace", fit.engine.cache.trace)
         state = fit.run()
         materials = fit.materials(state)
         self.found("light", state.envmap)
         self.found("materials", materials)
         self._tick("rerender")
         stages += state.stages
-        rerender = timed(stages, "rerender", lambda: judge(materials, state.envmap, self.spp, self.seed + 1))
-        return Attempt(completion, geometry, materials, state.envmap, rerender, tuple(stages))
-
-    def best(self, completion: str) -> tuple[Attempt, tuple[str, ...]]:
-        """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
-
-        A continued plane can shut out light that the photo shows. `auto` therefore tries again without where the
-        re-rendering is poor, and keeps that where it is clearly better.
-        """
-        if completion != AUTO:
-            return self.run(completion), ()
-        full = self.run(FULL)
-        before = metrics.psnr(full.rerender, self.picture.linear)
-        if before >= POOR or not (full.geometry.mesh.face_plane >= 0).any():
-            return full, ()
-        bare = self.run("none")
-        after = metrics.psnr(bare.rerender, self.picture.linear)
-        stages = (*full.stages, *bare.stages)
-        if after < before + CLEARLY:
-            return replace(full, stages=stages), ()
-        note = (
-            f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
-            f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
-        )
-        return replace(bare, stages=stages), (note,)
+        rerender = timed(stages, "rerender", lambda: begun.judge(materials, state.envmap, self.spp, self.seed + 1))
+        return Attempt(begun.completion, begun.geometry, materials, state.envmap, rerender, tuple(stages))
 
     def _tick(self, stage: str) -> None:
         if self.progress is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -73,11 +74,25 @@ class Fit:
     def _trusting(self, state: FitState) -> FitSettings:
         """The settings with the prices of leaving the prior scaled by how well the prior explains the photo.
 
-        A light is fitted with the prior's materials as they are. The mean absolute error e that it leaves is what
-        materials or geometry have wrong; prices grow by (trust / e)^3.
+        The error e of the best light for it is what materials or geometry have wrong; prices grow by (trust / e)^3.
         """
         settings = self.settings
-        strict = replace(settings.light, slack=None)
+        stage = self._explained
+        error = stage["prior_error"]
+        scale = min(max(((settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
+        state.stages.append({**stage, "prior_trust": scale})
+        slack = None if settings.light.slack is None else settings.light.slack * scale
+        materials = replace(settings.materials, delta=settings.materials.delta * scale)
+        return replace(settings, light=replace(settings.light, slack=slack), materials=materials)
+
+    def prior_error(self) -> float:
+        """Mean absolute error (encoded) that the best light leaves with the prior's materials as they are."""
+        return self._explained["prior_error"]
+
+    @cached_property
+    def _explained(self) -> dict:
+        """The stage in which that light is fitted."""
+        strict = replace(self.settings.light, slack=None)
         problem = self.engine.light_problem(self.prior)
         light = envmap_field(strict, seed=self.seed)
         result = fit_light(
@@ -86,11 +101,7 @@ class Fit:
         with torch.no_grad():
             radiance, photo = problem.render(light(problem.height)), self._photo()[problem.pixels]
             error = float(residual(radiance, photo, strict.encoding, clipped=strict.clipped).abs().mean())
-        scale = min(max(((settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
-        state.stages.append({**result.summary(), "name": "trust", "prior_error": error, "prior_trust": scale})
-        slack = None if settings.light.slack is None else settings.light.slack * scale
-        materials = replace(settings.materials, delta=settings.materials.delta * scale)
-        return replace(settings, light=replace(settings.light, slack=slack), materials=materials)
+        return {**result.summary(), "name": "trust", "prior_error": error}
 
     # -- stages --------------------------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ START_RADIANCE = 0.6
 """Grey level at which plain texels start."""
 SEEN = 0.5
 """Share of its light that must reach the scene for a texel to be free to differ from its neighbours."""
-STIFFEST = 10.0
+STIFFEST = 3.0
 """Largest factor on the smoothness of texels that are hidden."""
 
 

@@ -14,8 +14,9 @@ from materialist.geometry.planes import find_planes
 from materialist.geometry.rims import set_back_rims
 from materialist.types import Array, Camera, Geometry
 
-COMPLETIONS = ("planes,backs", "planes", "none")
-"""What can be added to what the picture shows: continued planes and backs of objects, planes alone, nothing."""
+COMPLETIONS = ("planes,backs", "floors,backs", "planes", "none")
+"""What can be added to what the picture shows: continued planes and backs of objects, the same without walls (planes
+that do not face up), planes alone, nothing."""
 
 
 def build_geometry(
@@ -37,17 +38,23 @@ def build_geometry(
         label[plane.mask] = k
     bounds = structural(planes, depth, camera)
     taken = np.logical_or.reduce([label < -1, *(plane.mask for plane in bounds)])  # [H, W] bool
-    objects = find_objects(mesh, depth, normal, taken) if completion == "planes,backs" else None
+    objects = find_objects(mesh, depth, normal, taken) if completion.endswith("backs") else None
+    walls = completion != "floors,backs"
     if objects is None or not (objects.label >= 0).any():
-        return Geometry(complete(mesh, planes, depth, camera), label)
+        return Geometry(complete(mesh, planes, depth, camera, walls=walls), label)
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)
-    return Geometry(join([complete(mesh, planes, depth, camera), backs]), label)
+    return Geometry(join([complete(mesh, planes, depth, camera, walls=walls), backs]), label)
 
 
-def completion_of(geometry: Geometry) -> str:
-    """Which of `COMPLETIONS` a geometry was built with, read off its mesh (one without objects has no backs)."""
+def completion_of(geometry: Geometry, told: str | None = None) -> str:
+    """Which of `COMPLETIONS` a geometry was built with: what a scene's provenance has `told`, else read off its mesh.
+
+    A mesh without objects has no backs, and one without walls does not tell whether there were any.
+    """
+    if told in COMPLETIONS:
+        return told
     mesh = geometry.mesh
     corners = mesh.vertices[mesh.faces[mesh.face_plane < 0]].astype(np.float64)  # [F, 3, 3]
     away = (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * corners[:, 0]).sum(-1)

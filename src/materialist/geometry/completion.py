@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from materialist.camera import unproject
 from materialist.geometry.planes import Plane
 from materialist.geometry.polygon import clip, triangulate
-from materialist.types import Array, Camera, Mesh
+from materialist.types import Array, Camera, Geometry, Mesh
 
 BEHIND = 0.01
 """Inside the picture a continuation lies at least this fraction of the depth behind the observed surface."""
@@ -63,11 +63,14 @@ class _Sheet:
     """Half the side of the square it may fill, scene units."""
 
 
-def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, extent: float = EXTENT) -> Mesh:
+def complete(
+    mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, extent: float = EXTENT, walls: bool = True
+) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
     extent: how far from its visible middle a plane is continued, in scene radii (see `EXTENT`).
+    walls: whether planes that do not face up (`UPWARD`) are continued, too.
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
@@ -78,11 +81,20 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, e
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
-        walls = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
-        inside = _inside_frame(sheet, walls, farthest, camera)  # [Q, 4, 3]
-        outside = _beyond_frame(sheet, walls, camera)  # [T, 3, 3]
+        if not walls and sheet.plane.normal[1] < UPWARD:
+            continue
+        stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
+        inside = _inside_frame(sheet, stops, farthest, camera)  # [Q, 4, 3]
+        outside = _beyond_frame(sheet, stops, camera)  # [T, 3, 3]
         parts += [_patch(sheet, corners, camera) for corners in (inside, outside) if len(corners)]
     return join(parts)
+
+
+def walled(geometry: Geometry) -> bool:
+    """Whether a plane that does not face up was continued."""
+    mesh = geometry.mesh
+    continued = mesh.faces[mesh.face_plane >= 0, 0]
+    return bool((mesh.normals[continued, 1] < UPWARD).any())
 
 
 def structural(planes: list[Plane], depth: Array, camera: Camera) -> list[Plane]:

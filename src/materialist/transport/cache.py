@@ -88,11 +88,8 @@ class TransportCache:
         self.slots = _radiance_slots(geometry.mesh, camera)
         self._slots = integers(mi, self.slots)
         self._primary()
-        self._hits: list[mi.UInt32] = []
-        for k in range(len(ROUGHNESS_LEVELS) + 1):
-            self._hits.append(self._trace(k))
-            if progress is not None:
-                progress("trace", k + 1, len(ROUGHNESS_LEVELS) + 1)
+        self._traced: list[mi.UInt32] = []
+        self._progress = progress
 
     # -- primary visibility ------------------------------------------------------------------------------------------
 
@@ -139,6 +136,19 @@ class TransportCache:
         )  # fmt: skip
         dr.eval(hits)
         return hits
+
+    def trace(self) -> None:
+        """Find what every lobe's rays meet, unless that is known; the light fit never asks."""
+        lobes = len(ROUGHNESS_LEVELS) + 1
+        for k in range(len(self._traced), lobes):
+            self._traced.append(self._trace(k))
+            if self._progress is not None:
+                self._progress("trace", k + 1, lobes)
+
+    @property
+    def _hits(self) -> list[mi.UInt32]:
+        self.trace()
+        return self._traced
 
     # -- gathering -----------------------------------------------------------------------------------------------------
 
