@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays
+from materialist.geometry.contour import silhouette_field
 from materialist.geometry.symmetry import border_distance, object_size, spacing, surface_in
 from materialist.geometry.turning import Axis, turned_thickness
 from materialist.types import Array, Camera
@@ -30,6 +31,18 @@ EDGED = 0.35
 """n.v at the object's lower end above which it ends in an edge, at a flat base; below, the surface turns away."""
 SIDEWAYS = 0.85
 """Least share of the horizontal in the direction across a silhouette that counts as left or right."""
+ANGULAR = 0.15
+"""Largest change of n.v over the last pixels before the left and right silhouette at which the object ends there in an
+edge, that the turn must bring to the edge on the other side; what is round turns away faster."""
+INWARD = 2.0
+"""Those last pixels."""
+ASIDE = 0.12
+"""Largest distance between such an edge and the silhouette that is told from larger ones, as a part of the object's
+size: seen face on, the edges of a box are not each other's image."""
+EDGES = 8.0
+"""Weight of that distance against the relative difference from the guess."""
+PAD = 8
+"""Pixels around the object in which that distance is known."""
 GAP = 0.4
 """Largest error that is told from larger ones, as a part of the object's size."""
 FITS, FAILS = 0.06, 0.14
@@ -112,6 +125,7 @@ class Fit:
         self.points = (self.rays * self.depth[..., None])[self.inside]  # [N, 3]
         self.normals = np.asarray(normal, np.float64)[part][self.inside]  # [N, 3]
         self.facing = np.clip(-(np.asarray(normal)[part] * self.rays).sum(-1) / self.length, 0.06, 1)
+        self.pixel = self.step * float(np.median(-self.points[:, 2])) / self.size
         self._borders()
 
     def _borders(self) -> None:
@@ -123,9 +137,50 @@ class Fit:
         field = gaussian_filter(np.pad(self.inside.astype(float), 3), 1.5)
         down, right = (g[3:-3, 3:-3] for g in np.gradient(field))
         self.rim = self.inside & (border < 1.7) & (np.abs(right) > SIDEWAYS * np.hypot(right, down))
+        self.edges = self._edges(border, right, down)
+        self.border = silhouette_field(np.pad(self.inside, PAD))  # pixels, > 0 inside
         # At distance e from a silhouette with a round section the front lies e cos / (1 - sin) before it.
         before = border * self.depth * self.step * self.facing / (1 - np.sqrt(1 - self.facing**2) + 1e-6)
         self.widest = np.minimum(2 * before, GAP * self.size)  # [h, w] gap next to the silhouette, at most
+
+    def _edges(self, border: Array, right: Array, down: Array) -> tuple[Array, Array] | None:
+        """[N, 3] points of the left and of the right edge in which the object ends, or None where it is round."""
+        rim = self.rim & (border < 1.1)
+        slope = np.maximum(np.hypot(right, down), 1e-9)
+        rows, columns = np.indices(rim.shape)
+        inner = (
+            np.round(rows + INWARD * down / slope).astype(int),
+            np.round(columns + INWARD * right / slope).astype(int),
+        )
+        i, j = (np.clip(k, 0, n - 1) for k, n in zip(inner, rim.shape, strict=True))
+        sharp = rim & self.inside[i, j] & (np.abs(self.facing[i, j] - self.facing) < ANGULAR)
+        if sharp.sum() < 0.5 * rim.sum() or min((sharp & (right > 0)).sum(), (sharp & (right < 0)).sum()) < 4:
+            return None
+        normal = np.zeros(self.rays.shape)
+        normal[self.inside] = self.normals
+        normal = normal[i, j]
+        # From the centres of the last pixels to the silhouette, on the plane of what is just inside.
+        away = np.stack([-right, down, np.zeros_like(right)], -1) / slope[..., None]
+        ray = self.rays + away * (self.step * border)[..., None]
+        facing = (normal * ray).sum(-1)
+        depth = self.depth * (normal * self.rays).sum(-1) / np.where(np.abs(facing) < 1e-6, 1, facing)
+        points = ray * depth[..., None]
+        return points[sharp & (right > 0)], points[sharp & (right < 0)]
+
+    def aside(self, axis: Axis) -> float:
+        """How far beside the silhouette the turn brings the edges in which it ends, as a part of the object's size."""
+        if self.edges is None:
+            return 0.0
+        from scipy.ndimage import map_coordinates
+
+        x, y = self._seen(axis.turned(np.concatenate(self.edges)))
+        off = np.abs(map_coordinates(self.border, [y + PAD, x + PAD], order=1, mode="nearest")) * self.pixel
+        return float(np.minimum(off, ASIDE).mean())
+
+    def _seen(self, points: Array) -> tuple[Array, Array]:
+        """Column and row [N], fractions of pixels of the window, of points [N, 3]."""
+        z = np.maximum(-points[:, 2], 1e-9)
+        return (points[:, 0] / z - self.rays[0, 0, 0]) / self.step, (self.rays[0, 0, 1] - points[:, 1] / z) / self.step
 
     def axis(self, values: Array) -> Axis:
         """The axis of parameters (right, behind) in units of the object's size, and the tilt in radians."""
@@ -153,19 +208,22 @@ class Fit:
         wrong, gap = self._against(axis)
         told = self.inside & np.isfinite(gap)
         off = np.abs(np.maximum(gap, 0) - self.guess)[told].sum() / max(float(self.guess[told].sum()), 1e-9)
-        return 2 * wrong + min(off, 3.0) + 0.3 * float((self.inside & ~told).sum() / self.inside.sum())
+        return (
+            2 * wrong
+            + EDGES * self.aside(axis)
+            + min(off, 3.0)
+            + 0.3 * float((self.inside & ~told).sum() / self.inside.sum())
+        )
 
     def _against(self, axis: Axis) -> tuple[float, Array]:
         """What of the turned front lies outside the mask or before the front, and [h, w] the gap between the two."""
         back = axis.turned(self.points)
         z = np.maximum(-back[:, 2], 1e-9)
-        x = (back[:, 0] / z - self.rays[0, 0, 0]) / self.step
-        y = (self.rays[0, 0, 1] - back[:, 1] / z) / self.step
+        x, y = self._seen(back)
         height, width = self.inside.shape
         i, j = np.clip(np.round(y).astype(int), 0, height - 1), np.clip(np.round(x).astype(int), 0, width - 1)
         beyond = np.maximum(np.abs(y - i), np.abs(x - j)) - 0.5
-        pixel = self.step * float(np.median(-self.points[:, 2])) / self.size
-        outside = np.minimum((np.maximum(beyond, 0) + self.away[i, j]) * pixel, GAP)
+        outside = np.minimum((np.maximum(beyond, 0) + self.away[i, j]) * self.pixel, GAP)
         before = np.clip((self.depth[i, j] - z) / self.size, 0, GAP) * self.inside[i, j]
         exits = np.full(self.inside.shape, -np.inf)
         np.maximum.at(exits, (i, j), z)
