@@ -29,7 +29,7 @@ class ObjectThickness:
     wall: float
     """Of the object, were it hollow."""
     method: str
-    """Which method it comes from: `half-turn`, `network`, `symmetry` or `given`."""
+    """Which method it comes from: `lathe`, `half-turn`, `network`, `symmetry` or `given`."""
 
 
 def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "auto") -> ObjectThickness:
@@ -38,8 +38,9 @@ def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "au
     Args:
         mask: [H, W] bool at working size.
         method: `half-turn` (the front turned around an upright axis), `network` (RefractionNet), `symmetry` (the
-            paper's assumption), `auto` (the turn where it fits and agrees with the network, else the network, without
-            weights symmetry), a map [H, W] of scene units along the rays, or a file with one.
+            paper's assumption), `auto` (the front swept around where its normals meet one axis, the turn where it fits
+            and agrees with the network, else the network, without weights symmetry), a map [H, W] of scene units along
+            the rays, or a file with one.
 
     Raises:
         InputError: an unknown method, a map of another size or with negative values, a mask without a surface.
