@@ -74,6 +74,28 @@ def test_a_finger_paints(browser, running):
     context.close()
 
 
+THROUGH = """() => { const s = document.querySelector('#stage').getBoundingClientRect();
+    return [...document.querySelectorAll('label, span, button, input')].filter((n) => {
+        const r = n.getBoundingClientRect(), x = r.left + r.width / 2, y = r.top + r.height / 2;
+        if (n.closest('#stage') || !r.width || y < s.top || y > s.bottom || x < s.left || x > s.right) return false;
+        const top = document.elementFromPoint(x, y); return top && n.contains(top); }).map((n) => n.textContent); }"""
+
+
+def test_nothing_shows_through_the_picture_on_a_phone(browser, running):
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    page = context.new_page()
+    opened(page, running[0])
+    page.locator(".overflow-menu > button").first.click()
+    page.locator(".overflow-dropdown button").filter(has_text="Objects").click()
+    page.get_by_role("button", name="Turn the selection to glass").click()
+    page.wait_for_selector("#glass_ior input")
+    for part in ("#glass_roughness", "#glass_hollow", "#glass"):
+        page.evaluate("(name) => document.querySelector(name).scrollIntoView({block: 'center'})", part)
+        page.wait_for_timeout(200)
+        assert page.evaluate(THROUGH) == [], part
+    context.close()
+
+
 def test_selecting_by_clicks(page, running):
     opened(page, running[0])
     click_photo(page, 0.39, 0.5)

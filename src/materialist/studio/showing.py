@@ -91,7 +91,7 @@ def _badge(steps: tuple[Step, ...], tracer: glass.Tracer | None = None, waiting:
     if waiting:
         return "Glass: tracing …" if all(tracer and tracer.pane(step) for step in panes) else "Glass: sketch, tracing …"
     if panes and tracer and all(tracer.fresh(_others(steps, step), step) for step in panes):
-        return "Glass traced; its shadow and caustics come with the final picture"
+        return "Glass traced; shadow and caustics in the final picture"
     if panes and tracer and all(tracer.pane(step) for step in panes):
         return "Live preview; click the glass in the list to trace it anew"
     if any(step.kind not in LIVE for step in steps):
