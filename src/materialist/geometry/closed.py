@@ -172,10 +172,11 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     through = np.maximum(np.minimum(through, at(_room(view, front))), LEAST * own)
     sigma = smooth * view.size
     back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
-    normals = (_between(normal, known, place) for normal in (blurred_normals(view.normal, known, sigma), back))
+    front_normal, back_normal = (_between(n, known, place) for n in (blurred_normals(view.normal, known, sigma), back))
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)
-    sheets = Sheets(place + np.array([view.left, view.top]), own, through, *normals, outward)
+    place = place + np.array([view.left, view.top])
+    sheets = Sheets(place, own, through, front_normal, back_normal, outward)
     return closed(found, sheets, camera)
 
 

@@ -26,7 +26,7 @@ REACH = 1.5
 """Farthest place of the axis, in the same units: normals of one plane all meet at infinity."""
 LEVEL = 0.02
 """What the square of a deviation from the usual tilt costs: for balls any tilt will do."""
-SWEEP = np.radians(np.linspace(90, 270, 9))
+SWEEP = tuple(np.radians(np.linspace(90, 270, 9)))
 """Turns of the front. From a camera that is near, a half turn alone leaves out a strip at either side."""
 
 
