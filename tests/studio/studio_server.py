@@ -23,7 +23,7 @@ def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen, str]:
     log = (folder.parent / "studio.log").open("w")
     process = subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, "OMP_NUM_THREADS": "1"})
     address = f"http://127.0.0.1:{port}"
-    end = time.monotonic() + 60
+    end = time.monotonic() + 120  # as `bench studio` waits
     while True:
         try:
             urllib.request.urlopen(address, timeout=5).close()
@@ -32,5 +32,7 @@ def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen, str]:
             return process, address
         except OSError:
             assert process.poll() is None, (folder.parent / "studio.log").read_text()
-            assert time.monotonic() < end, "the studio did not start"
+            if time.monotonic() > end:
+                process.kill()
+                raise AssertionError("the studio did not start") from None
             time.sleep(0.2)
