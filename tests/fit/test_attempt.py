@@ -18,7 +18,13 @@ def picture_at(decibel: float) -> np.ndarray:
 
 
 def job(
-    monkeypatch, results: dict[str, float], *, planes: bool = True, walls: bool = False, errors: tuple = (0.1, 0.1)
+    monkeypatch,
+    results: dict[str, float],
+    *,
+    planes: bool = True,
+    walls: bool = False,
+    errors: tuple = (0.1, 0.1),
+    trust: float = 1.0,
 ) -> tuple[Job, list[str]]:
     """A job whose attempts come to the given PSNR by completion, and the list of those finished.
 
@@ -36,7 +42,9 @@ def job(
     def finish(self, begun: Begun) -> Attempt:
         finished.append(begun.completion)
         picture = picture_at(results[begun.completion])
-        return Attempt(begun.completion, begun.geometry, None, None, picture, ({"name": begun.completion},))
+        return Attempt(
+            begun.completion, begun.geometry, None, None, picture, ({"name": begun.completion, "prior_trust": trust},)
+        )
 
     monkeypatch.setattr(Job, "begin", begin)
     monkeypatch.setattr(Job, "finish", finish)
@@ -71,6 +79,11 @@ def test_auto_leaves_completion_out_only_where_that_is_clearly_better(monkeypatc
 
 def test_without_planes_there_is_nothing_to_leave_out(monkeypatch):
     task, made = job(monkeypatch, {FULL: 20, "none": 40}, planes=False)
+    assert task.best("auto")[0].completion == FULL and made == [FULL]
+
+
+def test_with_a_prior_that_explains_the_photo_completion_stays(monkeypatch):
+    task, made = job(monkeypatch, {FULL: 20, "none": 40}, trust=5.0)
     assert task.best("auto")[0].completion == FULL and made == [FULL]
 
 

@@ -40,6 +40,11 @@ class Attempt:
     """[H, W, 3] linear, path traced."""
     stages: tuple[dict, ...]
 
+    @property
+    def doubted(self) -> bool:
+        """Whether the prior's materials did not explain the photo, so that the fit was free to change them."""
+        return any(stage.get("prior_trust") == 1.0 for stage in self.stages)
+
 
 @dataclass(frozen=True)
 class Begun:
@@ -80,14 +85,15 @@ class Job:
 
         A continued wall can shut out light that the photo shows. `auto` leaves walls out where the prior's materials
         then explain the photo much better (`EXPLAINED`), and everything where the re-rendering stays poor and is
-        clearly better without.
+        clearly better without. Not so where the prior explains the photo well: then a good re-rendering would be
+        bought with materials that are worse.
         """
         begun, notes = self.choose(completion)
         full = self.finish(begun)
         if completion != AUTO:
             return full, ()
         before = metrics.psnr(full.rerender, self.picture.linear)
-        if before >= POOR or not (full.geometry.mesh.face_plane >= 0).any():
+        if before >= POOR or not (full.doubted and (full.geometry.mesh.face_plane >= 0).any()):
             return full, notes
         bare = self.run("none")
         after = metrics.psnr(bare.rerender, self.picture.linear)
