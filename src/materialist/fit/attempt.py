@@ -19,7 +19,7 @@ from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
 AUTO, FULL, FLOORS = "auto", "planes,backs", "floors,backs"
-EXPLAINED = 0.8
+EXPLAINED = 0.98
 """What must be left of the error of the prior's materials under their best light for `auto` to leave walls out."""
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
@@ -84,7 +84,7 @@ class Job:
         """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
 
         A continued wall can shut out light that the photo shows. `auto` leaves walls out where the prior's materials
-        then explain the photo much better (`EXPLAINED`), and everything where the re-rendering stays poor and is
+        then explain the photo better (`EXPLAINED`), and everything where the re-rendering stays poor and is
         clearly better without. Not so where the prior explains the photo well: then a good re-rendering would be
         bought with materials that are worse.
         """
@@ -116,8 +116,8 @@ class Job:
         if without > EXPLAINED * with_walls:
             return full, ()
         note = (
-            f"Walls were not continued: without them the predicted materials explain the photo much better "
-            f"(error {without:.3f} in place of {with_walls:.3f}); --completion {FULL} continues them."
+            f"Walls were not continued beyond the photo: without them light explains it better with the predicted "
+            f"materials (error {without:.3f}, not {with_walls:.3f}); --completion {FULL} continues them."
         )
         return floors, (note,)
 

@@ -234,3 +234,13 @@ def test_a_tower_before_the_sky_is_a_surface_far_away():
     moved = inference._behind(log_depth, logit, surface)
     np.testing.assert_array_equal(moved[32:], log_depth[32:])
     assert (moved[:32, 32:] >= 0.95 * moved[32:].max()).all()
+
+
+def test_a_window_that_looks_like_sky_is_no_hole_in_the_wall():
+    ramp = np.tile(np.linspace(0, 1, 48, dtype=np.float32), (32, 1))
+    logit, log_depth = np.full((32, 48), 3.0, np.float32), ramp.copy()
+    logit[10:20, 12:24] = -2.0
+    log_depth[10:20, 12:24] = 4.0
+    moved = inference._behind(log_depth, logit, np.ones((32, 48), bool))
+    np.testing.assert_array_equal(moved[logit > 0], ramp[logit > 0])
+    np.testing.assert_allclose(moved, ramp, atol=0.03)

@@ -11,6 +11,7 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.geometry.membrane import membrane
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
@@ -202,12 +203,20 @@ def _detailed(photo: Array, rays: Array) -> Array:
 
 
 def _behind(log_depth: Array, logit: Array, surface: Array) -> Array:
-    """The logarithm of depth [h, w], with what was kept of the sky behind nearly all else."""
+    """The logarithm of depth [h, w], with what was taken for sky and kept where it belongs.
+
+    What borders on the sky (a tower) goes behind nearly all else. What does not (a bright window) is no hole in the
+    wall around it: its depth, which the network never learnt, is spanned by that.
+    """
     sure = surface & (logit > 0)
     if not sure.any():
         return log_depth
+    _, labels = cv2.connectedComponents((surface & ~sure).astype(np.uint8), connectivity=4)
+    beside_sky = cv2.dilate((~surface).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    before_sky = (labels > 0) & np.isin(labels, np.unique(labels[beside_sky]))
     far = np.percentile(log_depth[sure], 95)
-    return np.where(surface & ~sure, np.maximum(log_depth, far), log_depth)
+    depth = np.where(before_sky, np.maximum(log_depth, far), log_depth)
+    return np.where((labels > 0) & ~before_sky, membrane(depth, sure), depth)
 
 
 def _without_specks(surface: Array) -> Array:
