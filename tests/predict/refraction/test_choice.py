@@ -40,7 +40,22 @@ def chosen(depth, normal, mask, **options):
     return choice.best_thickness(np.full((64, 64, 3), 0.5, np.float32), mask, normal, depth, CAMERA, **options)
 
 
-def test_a_rough_guess_becomes_the_back_of_the_ball(network):
+@pytest.fixture
+def no_lathe(monkeypatch):
+    """Nothing is taken for turned on a lathe."""
+    monkeypatch.setattr(choice, "lathed", lambda *_, **__: None)
+
+
+def test_a_ball_is_known_by_its_normals_whatever_the_network_says(network):
+    depth, normal, mask, true = ball()
+    network((0.4 * true).astype(np.float32))
+    found = chosen(depth, normal, mask, up=LEVEL)
+    assert found.method == "lathe"
+    assert np.abs(found.thickness.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    assert (found.thickness.hollow <= found.thickness.solid).all()
+
+
+def test_a_rough_guess_becomes_the_back_of_the_ball(network, no_lathe):
     depth, normal, mask, true = ball()
     wave = 1 + 0.3 * np.sin(np.arange(64) / 2)
     network((true * wave).astype(np.float32))
@@ -63,7 +78,7 @@ def test_where_they_disagree_and_the_turn_does_not_fit_the_network_is_believed(n
     assert chosen(depth, normal, boot, up=LEVEL, prefer="half-turn").method == "half-turn"
 
 
-def test_without_weights_the_mirror_is_the_guess(monkeypatch):
+def test_without_weights_the_mirror_is_the_guess(monkeypatch, no_lathe):
     def missing(*_):
         raise WeightsError("none")
 
