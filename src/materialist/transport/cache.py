@@ -144,6 +144,7 @@ class TransportCache:
             self._traced.append(self._trace(k))
             if self._progress is not None:
                 self._progress("trace", k + 1, lobes)
+        dr.sync_thread()  # so that whoever measures this sees it
 
     @property
     def _hits(self) -> list[mi.UInt32]:
