@@ -90,6 +90,7 @@ class Job:
         """
         begun, notes = self.choose(completion)
         full = self.finish(begun)
+        del begun  # its cache: the next one is as large
         if completion != AUTO:
             return full, ()
         before = metrics.psnr(full.rerender, self.picture.linear)
