@@ -8,6 +8,7 @@ import pytest
 from materialist import metrics
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.fit.attempt import FLOORS, FULL, Attempt, Begun, Job
+from materialist.types import Camera
 
 PHOTO = np.full((8, 8, 3), 0.5, np.float32)
 
@@ -35,7 +36,10 @@ def job(
     def begin(self, completion: str) -> Begun:
         normals = np.array([[0, 0.0 if walls and completion == FULL else 1.0, 0]] * 3)
         faces = np.array([[0, 1, 2]])
-        mesh = SimpleNamespace(face_plane=np.array([0 if planes else -1]), faces=faces, normals=normals)
+        vertices = np.array([[9.0, 0, -1]] * 3)  # beside the picture
+        mesh = SimpleNamespace(
+            face_plane=np.array([0 if planes else -1]), faces=faces, normals=normals, vertices=vertices
+        )
         fit = SimpleNamespace(prior_error=lambda: errors[completion != FULL])
         return Begun(completion, SimpleNamespace(mesh=mesh), fit, None, [])
 
@@ -50,7 +54,7 @@ def job(
     monkeypatch.setattr(Job, "finish", finish)
     settings = SimpleNamespace(trust=0.08)
     rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
-    return Job(SimpleNamespace(linear=PHOTO), *rest), finished
+    return Job(SimpleNamespace(linear=PHOTO, camera=Camera(8, 8, 40.0)), *rest), finished
 
 
 def test_the_pictures_of_this_test_are_as_far_off_as_they_say():

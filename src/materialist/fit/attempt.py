@@ -110,15 +110,15 @@ class Job:
     def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
         """The fit to run for `completion`: for `auto`, the one with walls or the one without."""
         full = self.begin(FULL if completion == AUTO else completion)
-        if completion != AUTO or self.settings.trust is None or not walled(full.geometry):
+        if completion != AUTO or self.settings.trust is None or not walled(full.geometry, self.picture.camera):
             return full, ()
         floors = self.begin(FLOORS)
         with_walls, without = full.fit.prior_error(), floors.fit.prior_error()
         if without > EXPLAINED * with_walls:
             return full, ()
         note = (
-            f"Walls were not continued beyond the photo: without them light explains it better with the predicted "
-            f"materials (error {without:.3f}, not {with_walls:.3f}); --completion {FULL} continues them."
+            f"Walls and steep planes end at the frame: so light explains the photo better with the predicted materials "
+            f"(error {without:.3f}, not {with_walls:.3f}); --completion {FULL} continues them."
         )
         return floors, (note,)
 

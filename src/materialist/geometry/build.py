@@ -15,8 +15,8 @@ from materialist.geometry.rims import set_back_rims
 from materialist.types import Array, Camera, Geometry
 
 COMPLETIONS = ("planes,backs", "floors,backs", "planes", "none")
-"""What can be added to what the picture shows: continued planes and backs of objects, the same without walls (planes
-that do not face up), planes alone, nothing."""
+"""What can be added to what the picture shows: continued planes and backs of objects, the same with walls (planes that
+do not face up) ending at the frame, planes alone, nothing."""
 
 
 def build_geometry(

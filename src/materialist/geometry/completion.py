@@ -70,7 +70,7 @@ def complete(
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
     extent: how far from its visible middle a plane is continued, in scene radii (see `EXTENT`).
-    walls: whether planes that do not face up (`UPWARD`) are continued, too.
+    walls: whether planes that do not face up (`UPWARD`) go on beyond the picture, too, not only behind what it shows.
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
@@ -81,20 +81,21 @@ def complete(
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
-        if not walls and sheet.plane.normal[1] < UPWARD:
-            continue
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
-        inside = _inside_frame(sheet, stops, farthest, camera)  # [Q, 4, 3]
-        outside = _beyond_frame(sheet, stops, camera)  # [T, 3, 3]
-        parts += [_patch(sheet, corners, camera) for corners in (inside, outside) if len(corners)]
+        found = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
+        if walls or sheet.plane.normal[1] >= UPWARD:
+            found.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
+        parts += [_patch(sheet, corners, camera) for corners in found if len(corners)]
     return join(parts)
 
 
-def walled(geometry: Geometry) -> bool:
-    """Whether a plane that does not face up was continued."""
+def walled(geometry: Geometry, camera: Camera) -> bool:
+    """Whether a plane that does not face up goes on beyond the picture."""
     mesh = geometry.mesh
-    continued = mesh.faces[mesh.face_plane >= 0, 0]
-    return bool((mesh.normals[continued, 1] < UPWARD).any())
+    steep = mesh.faces[(mesh.face_plane >= 0) & (mesh.normals[mesh.faces[:, 0], 1] < UPWARD)]
+    x, y, z = np.moveaxis(mesh.vertices[steep].mean(1), -1, 0)  # middles of faces, scene units
+    half = np.array([camera.width, camera.height]) / (2 * camera.focal)
+    return bool(((z >= 0) | (np.abs(x) > -z * half[0]) | (np.abs(y) > -z * half[1])).any())
 
 
 def structural(planes: list[Plane], depth: Array, camera: Camera) -> list[Plane]:
