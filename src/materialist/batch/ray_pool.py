@@ -37,8 +37,8 @@ class RayPool:
         except Exception as error:
             reason = " ".join(str(error).split())
             raise SetupError(
-                f"The Ray cluster at '{address}' does not answer: {reason[:300]} If it runs, RAY_AUTH_MODE and the token "
-                "(~/.ray/auth_token, or RAY_AUTH_TOKEN) must be those of the cluster."
+                f"The Ray cluster at '{address}' does not answer: {reason[:300]} If it runs, RAY_AUTH_MODE and the "
+                "token (~/.ray/auth_token, or RAY_AUTH_TOKEN) must be those of the cluster."
             ) from error
         resources = ray.cluster_resources()
         gpu = device != "cpu" and resources.get("GPU", 0) >= 1
