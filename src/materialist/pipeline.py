@@ -22,7 +22,6 @@ FINAL_SPP = 36
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
-COMPLETIONS = ("auto", "planes,backs", "floors,backs", "planes", "none")
 
 
 def invert(
@@ -98,7 +97,7 @@ def invert(
     from materialist.render.variant import setup
 
     setup(device)
-    from materialist.fit.attempt import Job
+    from materialist.fit.attempt import AUTO, FULL, Job
     from materialist.fit.settings import preset as named
 
     spp = overrides.get("spp", FINAL_SPP)
@@ -107,7 +106,7 @@ def invert(
         strategy, seed, device, spp, progress, found,
     )  # fmt: skip
     # The paper's schedule is followed once, however well it does.
-    best, notes = job.best("planes,backs" if completion == "auto" and preset == "paper" else completion)
+    best, notes = job.best(FULL if completion == AUTO and preset == "paper" else completion)
     report = _report(picture, prior, best, (*stages, *best.stages), notes, start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
@@ -209,8 +208,10 @@ def _check(engine: str, strategy: str, completion: str, envmap_size: tuple[int, 
         raise InputError(f"Engine is '{engine}'; choose one of {', '.join(ENGINES)}.")
     if strategy not in STRATEGIES:
         raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
-    if completion not in COMPLETIONS:
-        raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
+    from materialist.geometry.build import COMPLETIONS
+
+    if completion not in ("auto", *COMPLETIONS):
+        raise InputError(f"Completion is '{completion}'; choose one of 'auto', {', '.join(map(repr, COMPLETIONS))}.")
     width, height = envmap_size
     if width != 2 * height or not 8 <= height <= 4096:
         raise InputError(

@@ -20,7 +20,8 @@ from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
 AUTO, FULL, FLOORS = "auto", "planes,backs", "floors,backs"
 EXPLAINED = 0.98
-"""What must be left of the error of the prior's materials under their best light for `auto` to leave walls out."""
+"""What must be left of the error of the prior's materials under their best light for `auto` to end walls at
+the frame."""
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
@@ -83,10 +84,10 @@ class Job:
     def best(self, completion: str) -> tuple[Attempt, tuple[str, ...]]:
         """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
 
-        A continued wall can shut out light that the photo shows. `auto` leaves walls out where the prior's materials
-        then explain the photo better (`EXPLAINED`), and everything where the re-rendering stays poor and is
-        clearly better without. Not so where the prior explains the photo well: then a good re-rendering would be
-        bought with materials that are worse.
+        A continued wall can shut out light that the photo shows. `auto` ends walls at the frame where the prior's
+        materials then explain the photo better (`EXPLAINED`), and leaves out everything where the re-rendering stays
+        poor and is clearly better without. Not so where the prior explains the photo well: then a good re-rendering
+        would be bought with materials that are worse.
         """
         begun, notes = self.choose(completion)
         full = self.finish(begun)
@@ -108,7 +109,7 @@ class Job:
         return replace(bare, stages=stages), (note,)
 
     def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
-        """The fit to run for `completion`: for `auto`, the one with walls or the one without."""
+        """The fit to run for `completion`: for `auto`, with walls that go on beyond the frame or end there."""
         full = self.begin(FULL if completion == AUTO else completion)
         if completion != AUTO or self.settings.trust is None or not walled(full.geometry, self.picture.camera):
             return full, ()

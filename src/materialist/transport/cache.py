@@ -140,6 +140,8 @@ class TransportCache:
     def trace(self) -> None:
         """Find what every lobe's rays meet, unless that is known; the light fit never asks."""
         lobes = len(ROUGHNESS_LEVELS) + 1
+        if len(self._traced) == lobes:
+            return
         for k in range(len(self._traced), lobes):
             self._traced.append(self._trace(k))
             if self._progress is not None:
