@@ -83,6 +83,53 @@ def test_a_component_is_drawn_with_its_own_density(component, capsys, tmp_path, 
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 
+def _leaning(wi, count=1):
+    """Interactions with a face that leans away by 30 degrees from the shading normal."""
+    si = interaction(np.tile(wi, (count, 1)))
+    si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
+    si.n = mi.Normal3f(0, float(np.sin(np.pi / 6)), float(np.cos(np.pi / 6)))
+    return si
+
+
+@pytest.mark.parametrize(("roughness", "metallic", "degrees"), [(0.4, 0.5, 30), (1, 0, 60), (0.6, 1, 70)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness, metallic, degrees, side):
+    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
+    wi, count = tilted(degrees, side), 1 << 17
+    rng = np.random.default_rng(1)
+    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
+    total = []
+    for si in (interaction(np.tile(wi, (count, 1))), _leaning(wi, count)):
+        sample, weight = surface.sample(ctx, si, u1, u2)
+        drawn = np.array(sample.pdf) > 0
+        face = np.array(si.n)[:, 0]
+        assert ((np.array(sample.wo).T @ face)[drawn] * (wi @ face) > -1e-5).all()
+        total.append(np.array(weight).mean(1))
+    np.testing.assert_allclose(total[1], total[0], rtol=0.02)
+    without = np.array(surface.sample(ctx, interaction(np.tile(wi, (count, 1))), u1, u2)[0].wo).T @ face
+    assert (without * (wi @ face) < 0).mean() > 0.01  # which would pass
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("roughness", "metallic", "degrees"), [(0.5, 0.5, 30), (1, 0.2, 60)])
+def test_chi_squared_on_a_face_that_leans(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
+    from mitsuba.chi2 import ChiSquareTest, SphericalDomain
+
+    monkeypatch.chdir(tmp_path)
+    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
+    wi = tilted(degrees, side)
+
+    def draw(u):
+        sample, _ = surface.sample(ctx, _leaning(wi, len(np.array(u[0]))), u[0], mi.Point2f(u[1], u[2]))
+        return sample.wo, mi.Float(np.array(sample.pdf) > 0)
+
+    def density(wo):
+        return surface.pdf(ctx, _leaning(wi, len(np.array(wo[0]))), wo)
+
+    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
+    assert test.run(significance_level=0.001), capsys.readouterr().out
+
+
 def test_the_components_add_up():
     surface = make(roughness=0.4, metallic=0.3)
     wi, wo = pairs(1000, 6, 0.4)

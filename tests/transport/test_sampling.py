@@ -106,3 +106,23 @@ def _hemisphere(rng, n):
     d = rng.standard_normal((n, 3))
     d[:, 2] = np.abs(d[:, 2]) + 0.02
     return d / np.linalg.norm(d, axis=-1, keepdims=True)
+
+
+def test_a_direction_below_the_face_is_mirrored_at_it():
+    face = mi.Vector3f(0, 0.6, 0.8)
+    above, below = mi.Vector3f(0, 0, 1), mi.Vector3f(0, -0.8, 0.6 - 0.2)
+    np.testing.assert_allclose(np.array(sampling.lifted(above, face)).ravel(), [0, 0, 1])
+    d = np.array([0, -0.8, 0.4])
+    expected = d - 2 * (d @ [0, 0.6, 0.8]) * np.array([0, 0.6, 0.8])
+    np.testing.assert_allclose(np.array(sampling.lifted(below, face)).ravel(), expected, atol=1e-6)
+    assert expected @ [0, 0.6, 0.8] > 0
+    np.testing.assert_allclose(np.array(sampling.lifted(below, mi.Vector3f(0))).ravel(), d, atol=1e-7)
+
+
+@pytest.mark.parametrize(("degrees", "believed"), [(0, True), (40, True), (50, False), (90, False)])
+def test_a_face_is_believed_that_agrees_with_its_normal(degrees, believed):
+    angle = np.radians(degrees)
+    for side in (1, -1):  # on the normal's side, whichever way the face's corners turn
+        face = mi.Vector3f(0, float(side * np.sin(angle)), float(side * np.cos(angle)))
+        found = np.array(sampling.face_towards(face, mi.Vector3f(0, 0, 1))).ravel()
+        np.testing.assert_allclose(found, [0, np.sin(angle), np.cos(angle)] if believed else [0, 0, 0], atol=1e-6)

@@ -8,6 +8,7 @@ from materialist.errors import InputError
 from materialist.geometry.backs import backs_of
 from materialist.geometry.boundary import depth_to_mesh
 from materialist.geometry.completion import complete, join, structural
+from materialist.geometry.creases import split_creases
 from materialist.geometry.inflate import inflated
 from materialist.geometry.objects import find_objects
 from materialist.geometry.planes import find_planes
@@ -32,7 +33,7 @@ def build_geometry(
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W]
     if completion == "none":
-        return Geometry(mesh, label)
+        return Geometry(split_creases(mesh, depth, normal), label)
     planes = find_planes(depth, normal, camera, seed=seed)
     for k, plane in enumerate(planes):
         label[plane.mask] = k
@@ -41,11 +42,12 @@ def build_geometry(
     objects = find_objects(mesh, depth, normal, taken) if completion.endswith("backs") else None
     walls = completion != "floors,backs"
     if objects is None or not (objects.label >= 0).any():
-        return Geometry(complete(mesh, planes, depth, camera, walls=walls), label)
+        return Geometry(split_creases(complete(mesh, planes, depth, camera, walls=walls), depth, normal), label)
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)
-    return Geometry(join([complete(mesh, planes, depth, camera, walls=walls), backs]), label)
+    whole = join([complete(mesh, planes, depth, camera, walls=walls), backs])
+    return Geometry(split_creases(whole, depth, normal), label)
 
 
 def completion_of(geometry: Geometry, told: str | None = None) -> str:

@@ -10,6 +10,8 @@ from materialist.transport.sampling import (
     MIN_ALPHA,
     cosine_direction,
     diffuse_polynomial,
+    face_towards,
+    lifted,
     schlick,
     smith_g1,
     visible_normal,
@@ -31,6 +33,9 @@ def ggx(h, alpha):
 def _define():
     class SimplifiedDisney(mi.BSDF):
         """f_r = f_s + (1 - M) f_d (paper, Preliminary); both sides shade alike.
+
+        Where the shading normal sees below the face, light comes from as far above the face instead (see
+        `transport.sampling.lifted`): nothing passes through the surface, and nothing is lost.
 
         Textures: base_color (RGB), roughness (perceptual, alpha = r^2), metallic.
         """
@@ -109,10 +114,10 @@ def _define():
             wo = dr.select(take_specular, mirrored, cosine_direction(sample2))
             active = active & (wi.z > 0) & (wo.z > 0)
             bs = mi.BSDFSample3f()
-            bs.pdf = dr.select(active, self._pdf(wi, wo, share, roughness), 0)
+            bs.wo = lifted(mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z)), self._face(si))
+            value, pdf = self._both(ctx, si, bs.wo, share, albedo, roughness, metallic)
+            bs.pdf = dr.select(active, pdf, 0)
             active = active & (bs.pdf > 0)
-            value = self._value(ctx, wi, wo, albedo, roughness, metallic)
-            bs.wo = mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z))
             bs.eta = 1.0
             bs.sampled_type = dr.select(
                 take_specular, mi.UInt32(+mi.BSDFFlags.GlossyReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection)
@@ -122,10 +127,27 @@ def _define():
 
         def eval_pdf(self, ctx, si, wo, active=True):
             albedo, roughness, metallic = self._materials(si, active)
-            active = active & (si.wi.z * wo.z > 0)
-            wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-            wo = mi.Vector3f(wo.x, wo.y, dr.abs(wo.z))
-            share = self._share(ctx, wi.z, albedo, metallic)
+            share = self._share(ctx, dr.abs(si.wi.z), albedo, metallic)
+            value, pdf = self._both(ctx, si, wo, share, albedo, roughness, metallic)
+            return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
+
+        def _face(self, si):
+            """The face's normal in the shading frame, on the side of `si.wi`; 0 where it is not believed."""
+            return face_towards(si.to_local(si.n), mi.Vector3f(0, 0, dr.sign(si.wi.z)))
+
+        def _both(self, ctx, si, wo, share, *materials):
+            """Value and density of `wo`: its own, and those of the direction that is lifted to it."""
+            face = self._face(si)
+            height = dr.dot(face, wo)
+            below = wo - 2 * height * face
+            found = [self._one(ctx, si.wi, w, share, *materials, seen)
+                     for w, seen in ((wo, height >= 0), (below, height > 0))]  # fmt: skip
+            return found[0][0] + found[1][0], found[0][1] + found[1][1]
+
+        def _one(self, ctx, wi, wo, share, albedo, roughness, metallic, active):
+            """Value and density of a direction by the shading normal alone, 0 where not `active`."""
+            active = active & (wi.z * wo.z > 0)
+            wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
             value = dr.select(active, self._value(ctx, wi, wo, albedo, roughness, metallic), mi.Color3f(0))
             return value, dr.select(active, self._pdf(wi, wo, share, roughness), 0)
 

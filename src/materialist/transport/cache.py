@@ -21,6 +21,8 @@ from materialist.transport.sampling import (
     MIN_ALPHA,
     cosine_direction,
     diffuse_polynomial,
+    face_towards,
+    lifted,
     pixel_shift,
     point,
     schlick,
@@ -107,14 +109,15 @@ class TransportCache:
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
         take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
-        self.position, self.geometric_normal = take(si.p), take(si.n)
         normal, view = take(si.sh_frame.n), -take(d)
+        self.position, self.geometric_normal = take(si.p), take(si.n)
         self.normal = _towards(normal, view)
+        self.face = face_towards(self.geometric_normal, self.normal)
         self.frame = mi.Frame3f(self.normal)
         self.wo = self.frame.to_local(view)
         shift = pixel_shift(cam.height, cam.width, self.seed).reshape(-1, 2)[self.pixels]
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
-        dr.eval(self.position, self.geometric_normal, self.normal, self.frame, self.wo, self.shift)
+        dr.eval(self.position, self.geometric_normal, self.face, self.normal, self.frame, self.wo, self.shift)
 
     # -- directions ----------------------------------------------------------------------------------------------------
 
@@ -132,7 +135,8 @@ class TransportCache:
         hits = dr.empty(mi.UInt32, count * width)
         _trace_loop(
             self.scene, self._slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
-            self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, self._alpha(k)), k == 0,
+            self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count),
+            dr.opaque(mi.Float, self._alpha(k)), k == 0,
         )  # fmt: skip
         dr.eval(hits)
         return hits
@@ -171,7 +175,7 @@ class TransportCache:
             count, alpha = self._count(k), self._alpha(k)
             env = pyramid.level(np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
             args = (
-                self._hits[k], slots, env, dr.arange(mi.UInt32, width), self.frame, self.wo, self.shift,
+                self._hits[k], slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
                 dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha),
             )  # fmt: skip
             sums = _gather_diffuse(*args) if k == 0 else _gather_specular(*args)
@@ -227,13 +231,15 @@ def _direction(diffuse: bool, wo, alpha, sample):
 
 
 @dr.syntax
-def _trace_loop(scene, slots, hits, lane, position, ng, frame, wo, shift, count, alpha, diffuse: bool):
+def _trace_loop(
+    scene, slots, hits, lane, position, geometric_normal, face, frame, wo, shift, count, alpha, diffuse: bool
+):
     i = dr.zeros(mi.UInt32, dr.width(lane))
     width = dr.opaque(mi.UInt32, dr.width(lane))
     while i < count:
         wi = _direction(diffuse, wo, alpha, point(i, count, shift))
         above = wi.z > 0
-        ray = spawn(position, ng, frame.to_world(wi))
+        ray = spawn(position, geometric_normal, lifted(frame.to_world(wi), face))
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
         slot = dr.gather(mi.UInt32, slots, pi.prim_index, pi.is_valid())
         dr.scatter(hits, dr.select(pi.is_valid(), slot, mi.UInt32(MISS)), i * width + lane)
@@ -249,14 +255,14 @@ def _incoming(hits, slots, env, index, direction, above):
 
 
 @dr.syntax
-def _gather_diffuse(hits, slots, env, lane, frame, wo, shift, count, alpha):
+def _gather_diffuse(hits, slots, env, lane, face, frame, wo, shift, count, alpha):
     width = dr.opaque(mi.UInt32, dr.width(lane))
     i = dr.zeros(mi.UInt32, dr.width(lane))
     d0, d1, d2 = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     while i < count:
         wi = cosine_direction(point(i, count, shift))
         h = dr.normalize(wi + wo)
-        light = _incoming(hits, slots, env, i * width + lane, frame.to_world(wi), wi.z > 0)
+        light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
         c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(h, wi))
         d0 += c0 * light
         d1 += c1 * light
@@ -266,14 +272,14 @@ def _gather_diffuse(hits, slots, env, lane, frame, wo, shift, count, alpha):
 
 
 @dr.syntax
-def _gather_specular(hits, slots, env, lane, frame, wo, shift, count, alpha):
+def _gather_specular(hits, slots, env, lane, face, frame, wo, shift, count, alpha):
     width = dr.opaque(mi.UInt32, dr.width(lane))
     i = dr.zeros(mi.UInt32, dr.width(lane))
     s0, s1 = mi.Color3f(0), mi.Color3f(0)
     while i < count:
         h = visible_normal(wo, alpha, point(i, count, shift))
         wi = mi.reflect(wo, h)
-        light = _incoming(hits, slots, env, i * width + lane, frame.to_world(wi), wi.z > 0)
+        light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
         fresnel = schlick(dr.dot(h, wo))
         weighted = light * smith_g1(wi.z, alpha)
         s0 += (1 - fresnel) * weighted

@@ -19,6 +19,7 @@ from materialist.transport.sampling import (
     MIN_ALPHA,
     cosine_direction,
     diffuse_polynomial,
+    lifted,
     point,
     schlick,
     smith_g1,
@@ -129,7 +130,7 @@ def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffu
         fresnel, g1 = schlick(dr.dot(h, wo)), smith_g1(wi.z, alpha)
         weights = [(1 - fresnel) * g1, fresnel * g1]
     above = wi.z > 0
-    world = frame.to_world(wi)
+    world = lifted(frame.to_world(wi), take(cache.face))
     scene: Any = cache.scene
     pi = scene.ray_intersect_preliminary(
         spawn(take(cache.position), take(cache.geometric_normal), world), coherent=False, active=above

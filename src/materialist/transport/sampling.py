@@ -21,6 +21,11 @@ MIN_ALPHA = 1e-3
 _R2 = (0.7548776662466927, 0.5698402909980532)
 
 
+AGREEING = 0.7
+"""Least cosine between a shading normal and its face for the face to hold back light: where a predicted depth slopes
+and the predicted normal does not, the slope is an outline that was smeared, and what it hides was never hidden."""
+
+
 def pixel_shift(height: int, width: int, seed: int) -> Array:
     """[H, W, 2] float32 rotation of the point set per pixel: stratified over each tile, random between tiles."""
     rank = np.random.default_rng(seed).permutation(TILE * TILE).reshape(TILE, TILE)
@@ -77,3 +82,18 @@ def diffuse_polynomial(cos_i, cos_o, cos_d):
     g = 2 * cos_d * cos_d
     a_i, a_o = 1 - 0.5 * fi, 1 - 0.5 * fo
     return a_i * a_o, g * (a_i * fo + a_o * fi), g * g * fi * fo
+
+
+def face_towards(face, normal):
+    """The normal of a face on the side of a shading normal; 0 where they differ too much for both to be true."""
+    cos = dr.dot(face, normal)
+    return dr.select(dr.abs(cos) > AGREEING, face * dr.sign(cos), 0)
+
+
+def lifted(direction, face):
+    """The direction, mirrored at the plane with the normal `face` where it lies below it.
+
+    A shading normal sees below the face it belongs to, and a ray from there would come through an opaque surface.
+    Mirrored, nothing passes and nothing is lost.
+    """
+    return direction - 2 * dr.minimum(dr.dot(direction, face), 0) * face

@@ -6,7 +6,7 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.geometry.slopes import slopes
-from materialist.predict.bundled.relief import excess, with_relief
+from materialist.predict.bundled.relief import excess, smooth_relief, with_relief
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 50.0)
@@ -56,3 +56,46 @@ def test_what_has_no_surface_stays_so():
     assert np.nanmax(np.abs(found - depth)) < 1e-3
     nothing = np.full_like(depth, np.nan)
     assert np.isnan(with_relief(nothing, nothing, normals, RAYS, reach=4)).all()
+
+
+def test_a_floor_with_a_wrong_slope_has_no_edge():
+    """Predicted normals lean by 6 degrees against the depth: it changes more than they say, but evenly."""
+    true, _ = _plane((0, 1, 0.5), 1.5)
+    _, leaning = _plane((0, 1, 0.65), 1.5)
+    known, demanded = np.ones(true.shape, bool), slopes(leaning, RAYS)
+    change = np.abs(np.diff(true, axis=0) - (demanded[1][1:] + demanded[1][:-1]) / 2)  # [H - 1, W]
+    found = excess(true, known, demanded, 8)
+    assert change[30:47].sum(0).max() > 0.05, "over the reach of a pixel it would count as an edge"
+    assert found[38] == pytest.approx(0, abs=0.01)
+
+
+def test_a_step_is_measured_whatever_the_slope_around_it():
+    slope, normals = _plane((0, 1, 0.5), 1.5)
+    stepped = slope.copy()
+    stepped[:, 30:] += 0.3
+    known = np.ones(slope.shape, bool)
+    found = excess(cv2.GaussianBlur(stepped, (0, 0), 1), known, slopes(normals, RAYS), 8)
+    assert found[24, 30] == pytest.approx(0.3, abs=0.03)
+    assert found[24, 10] < 0.02 and found[24, 50] < 0.02
+
+
+def test_patches_too_small_for_a_surface_go_to_their_nearest_neighbour():
+    far, normals = _plane((0, 0, 1), 3.0)
+    sharp = far.copy()
+    sharp[:, 32:] -= 0.5
+    coarse = cv2.GaussianBlur(sharp, (0, 0), 3)
+    spotted = sharp.copy()
+    spotted[20:23, 28:31] -= 0.3  # print of texture beside the edge, nearer to the one side than to the other
+    found = with_relief(coarse, spotted, normals, RAYS, reach=8)
+    assert np.abs(found - with_relief(coarse, sharp, normals, RAYS, reach=8)).max() < 0.05
+    assert found[21, 31] - found[21, 32] > 0.4  # the edge is still one step
+
+
+def test_smooth_relief_has_the_slopes_of_the_normals_and_no_edges():
+    true, normals = _plane((0.2, 0.6, 0.8), 1.5)
+    stepped = true.copy()
+    stepped[:, 30:] -= 0.3
+    found = smooth_relief(stepped, normals, RAYS, length=8.0)
+    assert np.abs(np.diff(found - true, axis=1)).max() < 0.04
+    assert np.abs(smooth_relief(true, normals, RAYS, length=8.0) - true).max() < 2e-3
+    assert abs((found - stepped).mean()) < 1e-2

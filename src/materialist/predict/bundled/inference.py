@@ -15,7 +15,7 @@ from materialist.geometry.membrane import membrane
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
-from materialist.predict.bundled.relief import with_relief
+from materialist.predict.bundled.relief import smooth_relief, with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
 NETWORK_SIDES = (160, 224)
@@ -25,6 +25,8 @@ EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
 EDGE_REACH = 0.047
 """How far the network's edges may be off, as a part of the longest side."""
+SMOOTH = 1.0
+"""What is smooth, and keeps out of the search for edges, is longer than this times that reach."""
 MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
 DEPTH_SPAN = 50.0
@@ -87,12 +89,13 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
-    sharp = weighted_median(coarse, guide, known=known)
+    seen = resample.values(np.ascontiguousarray(rays), middle)
+    # Medians of a slope would print the photo's texture on it.
+    smooth = smooth_relief(np.where(known, coarse, np.nan), _unit(normal), seen, length=SMOOTH * reach)
+    sharp = np.where(known, smooth, 0) + weighted_median(np.where(known, coarse - smooth, 0), guide, known=known)
     planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
     normal = _unit(np.stack(planes, -1))
-    logarithm = with_relief(
-        np.where(known, coarse, np.nan), sharp, normal, resample.values(np.ascontiguousarray(rays), middle), reach=reach
-    )
+    logarithm = with_relief(np.where(known, coarse, np.nan), sharp, normal, seen, reach=reach)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
         depth, normal = resample.depth(depth, size), resample.normals(normal, size)

@@ -20,6 +20,12 @@ PART = 0.12
 """Part of the whole change within reach that one such pair must have: an edge is one step, print of texture is many."""
 OPEN = 1e-3
 """Weight of such a pair of pixels."""
+LEAST_PATCH = 40
+"""Pixels below which a patch with a step all around is print of texture, no surface of its own."""
+ROUNDS = 8
+"""How often such patches are joined to a neighbour."""
+BLURRED = 0.4
+"""Part of the reach over which the network's edges are blurred."""
 LENGTH = 10.0
 """Pixels above which the depth decides, below which the normals do."""
 
@@ -54,21 +60,53 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     return found
 
 
-def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: int) -> Array:
-    """[H, W] change of log depth within reach of a pixel, along a row or a column, that the normals do not explain.
+def smooth_relief(coarse: Array, normal: Array, rays: Array, *, length: float) -> Array:
+    """Logarithm of depth [H, W] that follows the normals over less than `length` pixels, `coarse` over more.
 
-    Infinite next to where the surface ends, whose outline stays as it is.
+    No edge is left open, so that what `coarse` has of edges is what the two differ in. Arguments as of `with_relief`.
+    """
+    known = np.isfinite(coarse)
+    target = np.where(known, coarse, 0).astype(np.float64)
+    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
+    parts = []
+    for near, far, asked in between(slopes(normal, rays)):
+        both = known[near] & known[far]
+        parts.append((index[near][both], index[far][both], (asked - (target[far] - target[near]))[both]))
+    first, second, wanted = (np.concatenate(column) for column in zip(*parts, strict=True))
+    pull = np.full(int(known.sum()), length**-2)
+    moved = least_squares_change(first, second, wanted, np.ones(len(first)), pull, rtol=1e-2, maxiter=60)
+    found = np.full(coarse.shape, np.nan, np.float32)
+    found[known] = target[known] + moved
+    return found
+
+
+def excess(coarse: Array, known: Array, demanded: tuple[Array, Array], reach: int) -> Array:
+    """[H, W] step of log depth within reach of a pixel, along a row or a column, that the normals do not explain.
+
+    A step is what changes more over BLURRED of the reach than over all of it: a floor whose predicted normal is a
+    little off changes everywhere alike, and has no edge. Infinite next to where the surface ends, whose outline stays
+    as it is.
     """
     most = np.zeros(coarse.shape, np.float32)
-    windows = (2 * reach + 1, 1), (1, 2 * reach + 1)
-    for window, (near, far, asked) in zip(windows, between(demanded), strict=True):
-        own = np.zeros(coarse.shape, np.float32)
-        both = known[near] & known[far]
-        own[near] = np.where(both, coarse[far] - coarse[near] - asked, 0)
-        within = np.abs(cv2.boxFilter(own, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT))
-        most = np.maximum(most, within)
+    near_by, whole = 2 * max(1, round(BLURRED * reach)) + 1, 2 * reach + 1
+    for axis, (near, far, asked) in enumerate(between(demanded)):
+        own, there = np.zeros((2, *coarse.shape), np.float32)
+        there[near] = known[near] & known[far]
+        own[near] = np.where(there[near], coarse[far] - coarse[near] - asked, 0)
+        within, pairs = (_totals(x, near_by, axis) for x in (own, there))
+        around, all_pairs = (_totals(x, whole, axis) for x in (own, there))
+        part = pairs / np.maximum(all_pairs, 1)
+        step = np.abs(within - around * part) / np.maximum(1 - part, 0.1)
+        span = whole - near_by + 1
+        most = np.maximum(most, cv2.dilate(step, np.ones((span, 1) if axis else (1, span), np.uint8)))
     ending = cv2.dilate((~known).astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
     return np.where(ending, np.inf, most).astype(np.float32)
+
+
+def _totals(values: Array, size: int, axis: int) -> Array:
+    """[H, W] sums over `size` neighbours in a row (axis 0) or a column, no more than there are."""
+    window = (1, size) if axis else (size, 1)
+    return cv2.boxFilter(values, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
 
 
 def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> Pairs:
@@ -80,6 +118,34 @@ def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Arr
         around = np.minimum(change[near], change[far])[both]
         least = np.where(np.isinf(around), BREAK, np.maximum(BREAK, PART * around))
         broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
-        parts.append((index[near][both], index[far][both], wanted, np.where(broken, OPEN, 1.0)))
-    first, second, wanted, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return first, second, wanted, weight
+        parts.append((index[near][both], index[far][both], wanted, broken))
+    first, second, wanted, broken = (np.concatenate(column) for column in zip(*parts, strict=True))
+    broken = _without_islands(first, second, np.abs(wanted), broken, int(known.sum()))
+    return first, second, wanted, np.where(broken, OPEN, 1.0)
+
+
+def _without_islands(first: Array, second: Array, step: Array, broken: Array, count: int) -> Array:
+    """[P] bool: the broken pairs, less those between a patch that is too small for a surface and its nearest neighbour.
+
+    first, second: [P] pixels, of `count`. step: [P] between them. broken: [P] bool; they bound the patches.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    for _ in range(ROUNDS):
+        held = ~broken
+        graph = coo_matrix((np.ones(int(held.sum()), np.int8), (first[held], second[held])), (count, count))
+        label = connected_components(graph, directed=False)[1]
+        own = np.concatenate([label[first[broken]], label[second[broken]]])
+        other = np.concatenate([label[second[broken]], label[first[broken]]])
+        small = (np.bincount(label)[own] < LEAST_PATCH) & (own != other)
+        if not small.any():
+            break
+        own, other, steps = own[small], other[small], np.tile(step[broken], 2)[small]
+        order = np.lexsort((steps, own))
+        leads = order[np.unique(own[order], return_index=True)[1]]
+        joins = np.full(label.max() + 1, -1)
+        joins[own[leads]] = other[leads]
+        a, b = label[first], label[second]
+        broken = broken & (joins[a] != b) & (joins[b] != a)
+    return broken

@@ -1,0 +1,65 @@
+"""Creases: normals are not shared across them, points are."""
+
+import numpy as np
+from geometry_scenes import plane_depth, sphere_depth
+
+from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.build import build_geometry
+from materialist.geometry.creases import split_creases
+from materialist.types import Camera
+
+CAMERA = Camera(48, 36, 50.0)
+
+
+def _corner():
+    """A floor before a wall: depth [H, W], normals [H, W, 3], and where the wall is [H, W] bool."""
+    floor, wall = plane_depth(CAMERA, (0, 1, 0), -1.0), plane_depth(CAMERA, (0, 0, 1), -4.0)
+    is_wall = wall < np.where(floor > 0, floor, np.inf)
+    depth = np.where(is_wall, wall, floor)
+    return depth, np.where(is_wall[..., None], [0.0, 0, 1], [0.0, 1, 0]).astype(np.float32), is_wall
+
+
+def test_the_last_row_of_a_wall_has_the_walls_normal():
+    depth, normal, _ = _corner()
+    mesh = depth_to_mesh(depth, normal, CAMERA)
+    blended = np.abs(mesh.normals).max(-1) < 0.9
+    assert blended.sum() > 40  # the mean of wall and floor
+    split = split_creases(mesh, depth, normal)
+    own = normal.reshape(-1, 3)[split.face_pixel]  # [F, 3]
+    np.testing.assert_allclose(split.normals[split.faces], np.repeat(own[:, None], 3, 1), atol=1e-6)
+
+
+def test_points_faces_and_everything_else_stay():
+    depth, normal, _ = _corner()
+    depth[10:20, 20:30] *= 0.5  # with tucks behind it
+    mesh = depth_to_mesh(depth, normal, CAMERA)
+    split = split_creases(mesh, depth, normal)
+    assert len(split.vertices) > len(mesh.vertices)
+    np.testing.assert_array_equal(split.vertices[split.faces], mesh.vertices[mesh.faces])
+    np.testing.assert_array_equal(split.uv[split.faces], mesh.uv[mesh.faces])
+    np.testing.assert_array_equal(split.face_pixel, mesh.face_pixel)
+    tucks = np.arange(len(mesh.faces)) >= 2 * (depth > 0).sum()
+    assert tucks.any()
+    np.testing.assert_array_equal(split.normals[split.faces[tucks]], mesh.normals[mesh.faces[tucks]])
+    assert np.unique(split.faces).size == len(split.vertices)
+
+
+def test_a_round_surface_is_shaded_as_before():
+    depth, normal = sphere_depth(CAMERA, (0, 0, -4), 1.0)
+    depth, normal = np.where(np.isfinite(depth), depth, 0), normal.astype(np.float32)
+    mesh = depth_to_mesh(depth, normal, CAMERA)
+    split = split_creases(mesh, depth, normal, crease=180)
+    assert len(split.vertices) == len(mesh.vertices)
+    np.testing.assert_allclose(split.normals[split.faces], mesh.normals[mesh.faces], atol=1e-5)
+    inner = np.abs(normal[..., 2].ravel()[split.face_pixel]) > 0.6
+    usual = split_creases(mesh, depth, normal)
+    np.testing.assert_allclose(usual.normals[usual.faces[inner]], mesh.normals[mesh.faces[inner]], atol=1e-5)
+
+
+def test_every_completion_has_its_creases_split():
+    depth, normal, is_wall = _corner()
+    edge = np.flatnonzero(is_wall.any(1)).max()  # the last row of the wall
+    for completion in ("none", "planes", "planes,backs"):
+        mesh = build_geometry(depth, normal, CAMERA, completion=completion).mesh
+        faces = mesh.faces[: 2 * depth.size][2 * (edge * 48 + 24)]
+        np.testing.assert_allclose(mesh.normals[faces], np.tile([0.0, 0, 1], (3, 1)), atol=1e-6)
