@@ -79,16 +79,21 @@ def test_a_step_is_measured_whatever_the_slope_around_it():
     assert found[24, 10] < 0.02 and found[24, 50] < 0.02
 
 
-def test_patches_too_small_for_a_surface_go_to_their_nearest_neighbour():
+def test_spots_are_print_and_the_blur_of_an_edge_is_none():
     far, normals = _plane((0, 0, 1), 3.0)
     sharp = far.copy()
     sharp[:, 32:] -= 0.5
     coarse = cv2.GaussianBlur(sharp, (0, 0), 3)
+    clean = with_relief(coarse, sharp, normals, RAYS, reach=8)
     spotted = sharp.copy()
-    spotted[20:23, 28:31] -= 0.3  # print of texture beside the edge, nearer to the one side than to the other
+    spotted[20:23, 27:30] += 0.3  # farther than all around it
     found = with_relief(coarse, spotted, normals, RAYS, reach=8)
-    assert np.abs(found - with_relief(coarse, sharp, normals, RAYS, reach=8)).max() < 0.05
-    assert found[21, 31] - found[21, 32] > 0.4  # the edge is still one step
+    assert np.abs(found - clean).max() < 0.1
+    assert found[21, 31] - found[21, 32] > 0.4
+    between = sharp.copy()
+    between[20:24, 31:33] -= np.float32([0.2, -0.3])  # neither here nor there
+    found = with_relief(coarse, between, normals, RAYS, reach=8)
+    assert found[21, 28] - found[21, 35] > 0.4 and np.abs(found - clean)[:, 36:].max() < 0.05
 
 
 def test_smooth_relief_has_the_slopes_of_the_normals_and_no_edges():

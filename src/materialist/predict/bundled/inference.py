@@ -25,7 +25,7 @@ EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
 EDGE_REACH = 0.047
 """How far the network's edges may be off, as a part of the longest side."""
-SMOOTH = 1.0
+SMOOTH = 2.0
 """What is smooth, and keeps out of the search for edges, is longer than this times that reach."""
 MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""

@@ -21,9 +21,11 @@ PART = 0.12
 OPEN = 1e-3
 """Weight of such a pair of pixels."""
 LEAST_PATCH = 40
-"""Pixels below which a patch with a step all around is print of texture, no surface of its own."""
+"""Pixels below which a patch that stands out all around is print of texture, no surface of its own."""
 ROUNDS = 8
-"""How often such patches are joined to a neighbour."""
+"""How often such patches are sought: joined to what is around it, one may leave another."""
+ONE_SIDED = 0.8
+"""Share of a patch's outline that must step the same way, less that which steps the other way."""
 BLURRED = 0.4
 """Part of the reach over which the network's edges are blurred."""
 LENGTH = 10.0
@@ -120,14 +122,17 @@ def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Arr
         broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
         parts.append((index[near][both], index[far][both], wanted, broken))
     first, second, wanted, broken = (np.concatenate(column) for column in zip(*parts, strict=True))
-    broken = _without_islands(first, second, np.abs(wanted), broken, int(known.sum()))
+    broken = _without_spots(first, second, wanted, broken, int(known.sum()))
     return first, second, wanted, np.where(broken, OPEN, 1.0)
 
 
-def _without_islands(first: Array, second: Array, step: Array, broken: Array, count: int) -> Array:
-    """[P] bool: the broken pairs, less those between a patch that is too small for a surface and its nearest neighbour.
+def _without_spots(first: Array, second: Array, step: Array, broken: Array, count: int) -> Array:
+    """[P] bool: the broken pairs, less those around a small patch that is nearer, or farther, than all around it.
 
-    first, second: [P] pixels, of `count`. step: [P] between them. broken: [P] bool; they bound the patches.
+    What lies between two surfaces, as the blur of an edge does, is no such patch.
+
+    Args:
+        first, second: [P] pixels, of `count`. step: [P] from the one to the other. broken: [P] bool, bound the patches.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -136,16 +141,14 @@ def _without_islands(first: Array, second: Array, step: Array, broken: Array, co
         held = ~broken
         graph = coo_matrix((np.ones(int(held.sum()), np.int8), (first[held], second[held])), (count, count))
         label = connected_components(graph, directed=False)[1]
-        own = np.concatenate([label[first[broken]], label[second[broken]]])
-        other = np.concatenate([label[second[broken]], label[first[broken]]])
-        small = (np.bincount(label)[own] < LEAST_PATCH) & (own != other)
-        if not small.any():
-            break
-        own, other, steps = own[small], other[small], np.tile(step[broken], 2)[small]
-        order = np.lexsort((steps, own))
-        leads = order[np.unique(own[order], return_index=True)[1]]
-        joins = np.full(label.max() + 1, -1)
-        joins[own[leads]] = other[leads]
         a, b = label[first], label[second]
-        broken = broken & (joins[a] != b) & (joins[b] != a)
+        across = broken & (a != b)
+        patch, sign = np.concatenate([a[across], b[across]]), np.sign(np.concatenate([step[across], -step[across]]))
+        patches = int(label.max()) + 1
+        edges = np.bincount(patch, minlength=patches)
+        spot = (np.bincount(label, minlength=patches) < LEAST_PATCH) & (edges > 0)
+        spot &= np.abs(np.bincount(patch, sign, patches)) > ONE_SIDED * edges
+        if not spot.any():
+            break
+        broken = broken & ~(spot[a] | spot[b])
     return broken
