@@ -105,3 +105,27 @@ def test_the_share_of_a_pixel_covered_by_a_body(size):
     assert share.sum() == pytest.approx(np.pi * (outline() * scale) ** 2, rel=0.02)
     assert ((share > 0) & (share < 1)).any()
     assert not bodies_seen(target.mi_scene, CAMERA, ["body1"], size=size).any()
+
+
+def test_a_body_alone_has_its_own_radiance_at_its_rim():
+    """A grey sphere in white light before a bright sky: rays that miss it do not count."""
+    from materialist.render.portrait import look, radiance
+
+    body = sphere(surface(0.5, roughness=1.0))
+    target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
+    target.set_envmap(10 * uniform())
+    size, box = (CAMERA.height, CAMERA.width), (0, CAMERA.height, 0, CAMERA.width)
+    options = {"spp": 256, "seed": 1, "max_depth": 4}
+    alone = radiance(target, size, box, names=["body0"], **options)
+    mixed = radiance(target, size, box, **options)
+    rows, columns = np.mgrid[: CAMERA.height, : CAMERA.width]
+    radius = np.hypot(columns + 0.5 - CAMERA.width / 2, rows + 0.5 - CAMERA.height / 2)
+    away, rim = radius > outline() + 1, np.abs(radius - outline()) < 0.3
+    assert (alone[away] == 0).all() and mixed[away] == pytest.approx(10, rel=1e-3)
+    assert rim.sum() > 10
+    assert alone[disc()] == pytest.approx(mixed[disc()], rel=1e-5)
+    assert np.abs(mixed - alone)[rim].mean() > 1
+    share = look(target.mi_scene, CAMERA, {"body0": body}, size, box).share[..., None]
+    expected = share * alone + (1 - share) * 10
+    met = (alone > 0).any(-1)
+    assert np.abs(mixed - expected)[met].max() < 0.4 and np.abs(mixed - expected)[rim & met].mean() < 0.1

@@ -75,11 +75,11 @@ def portrait(
     # As many paths as a picture of working size has, on the part that the bodies take.
     pixels = (part[1] - part[0]) * (part[3] - part[2])
     paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
-    picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth)
+    picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth, names=names)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
+    picture = _filled(picture)
     if clean:
         picture = _denoised(picture, guide)
-    picture = purified(picture, guide.share)
     picture = _enlarged(picture, sight.share.shape)
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
@@ -130,6 +130,16 @@ def purified(picture: Array, share: Array) -> Array:
     near = blur(norm)[..., None]
     mean = blur(np.ascontiguousarray(total)) / np.maximum(near, 1e-6)
     return np.where(sure[..., None] > 0, picture, np.where(near > 1e-4, mean, picture)).astype(np.float32)
+
+
+def _filled(picture: Array) -> Array:
+    """[h, w, 3] with the nearest radiance of a body wherever none was met."""
+    from scipy import ndimage
+
+    none = ~(picture > 0).any(-1)
+    if none.all():
+        return picture
+    return picture[tuple(ndimage.distance_transform_edt(none, return_distances=False, return_indices=True))]
 
 
 def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
