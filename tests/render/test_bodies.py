@@ -128,4 +128,5 @@ def test_a_body_alone_has_its_own_radiance_at_its_rim():
     share = look(target.mi_scene, CAMERA, {"body0": body}, size, box).share[..., None]
     expected = share * alone + (1 - share) * 10
     met = (alone > 0).any(-1)
-    assert np.abs(mixed - expected)[met].max() < 0.4 and np.abs(mixed - expected)[rim & met].mean() < 0.1
+    error = np.abs(mixed - expected)  # the share is one of 16 rays
+    assert error[met].max() < 10 / 16 and error[rim & met].mean() < 0.15
