@@ -54,8 +54,7 @@ def with_relief(coarse: Array, sharp: Array, normal: Array, rays: Array, *, reac
     change = excess(coarse, known, demanded, reach)
     edge = np.clip((change - STEP[0]) / (STEP[1] - STEP[0]), 0, 1) ** 2
     target = np.where(known, edge * np.nan_to_num(sharp) + (1 - edge) * np.nan_to_num(coarse), 0).astype(np.float64)
-    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    pairs = _pairs(known, index, target, demanded, change)
+    pairs = _pairs(known, target, demanded, change)
     moved = least_squares_change(*pairs, np.full(int(known.sum()), LENGTH**-2), rtol=1e-3, maxiter=100)
     found = np.full(coarse.shape, np.nan, np.float32)
     found[known] = target[known] + moved
@@ -69,12 +68,9 @@ def smooth_relief(coarse: Array, normal: Array, rays: Array, *, length: float) -
     """
     known = np.isfinite(coarse)
     target = np.where(known, coarse, 0).astype(np.float64)
-    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    parts = []
-    for near, far, asked in between(slopes(normal, rays)):
-        both = known[near] & known[far]
-        parts.append((index[near][both], index[far][both], (asked - (target[far] - target[near]))[both]))
-    first, second, wanted = (np.concatenate(column) for column in zip(*parts, strict=True))
+    first, second, wanted = (
+        np.concatenate(column) for column in zip(*_linked(known, target, slopes(normal, rays)), strict=True)
+    )
     pull = np.full(int(known.sum()), length**-2)
     moved = least_squares_change(first, second, wanted, np.ones(len(first)), pull, rtol=1e-2, maxiter=60)
     found = np.full(coarse.shape, np.nan, np.float32)
@@ -111,16 +107,24 @@ def _totals(values: Array, size: int, axis: int) -> Array:
     return cv2.boxFilter(values, -1, window, normalize=False, borderType=cv2.BORDER_CONSTANT)
 
 
-def _pairs(known: Array, index: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> Pairs:
-    """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
-    parts = []
+def _linked(known: Array, target: Array, demanded: tuple[Array, Array]) -> list[tuple[Array, Array, Array]]:
+    """Neighbours [P] with a surface, in rows and in columns: their numbers, and the step wanted beyond the target's."""
+    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
+    pairs = []
     for near, far, asked in between(demanded):
         both = known[near] & known[far]
-        wanted = (asked - (target[far] - target[near]))[both]
-        around = np.minimum(change[near], change[far])[both]
+        pairs.append((index[near][both], index[far][both], (asked - (target[far] - target[near]))[both]))
+    return pairs
+
+
+def _pairs(known: Array, target: Array, demanded: tuple[Array, Array], change: Array) -> Pairs:
+    """Linked neighbours [P]: their unknowns, the step wanted on top of the target's own, and its weight."""
+    parts = []
+    linked = _linked(known, target, demanded)
+    for (near, far, _), (first, second, wanted) in zip(between(demanded), linked, strict=True):
+        around = np.minimum(change[near], change[far])[known[near] & known[far]]
         least = np.where(np.isinf(around), BREAK, np.maximum(BREAK, PART * around))
-        broken = (around > sum(STEP) / 2) & (np.abs(wanted) > least)
-        parts.append((index[near][both], index[far][both], wanted, broken))
+        parts.append((first, second, wanted, (around > sum(STEP) / 2) & (np.abs(wanted) > least)))
     first, second, wanted, broken = (np.concatenate(column) for column in zip(*parts, strict=True))
     broken = _without_spots(first, second, wanted, broken, int(known.sum()))
     return first, second, wanted, np.where(broken, OPEN, 1.0)
