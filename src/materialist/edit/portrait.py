@@ -77,7 +77,7 @@ def portrait(
     paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
     picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth, names=names)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
-    picture = _filled(picture)
+    picture = _spread(picture)
     if clean:
         picture = _denoised(picture, guide)
     picture = _enlarged(picture, sight.share.shape)
@@ -132,16 +132,6 @@ def purified(picture: Array, share: Array) -> Array:
     return np.where(sure[..., None] > 0, picture, np.where(near > 1e-4, mean, picture)).astype(np.float32)
 
 
-def _filled(picture: Array) -> Array:
-    """[h, w, 3] with the nearest radiance of a body wherever none was met."""
-    from scipy import ndimage
-
-    none = ~(picture > 0).any(-1)
-    if none.all():
-        return picture
-    return picture[tuple(ndimage.distance_transform_edt(none, return_distances=False, return_indices=True))]
-
-
 def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
     import cv2
 
@@ -179,9 +169,11 @@ def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, in
     return np.where(near, cut, sight.share).astype(np.float32)
 
 
-def _spread(depth: Array) -> Array:
-    """[h, w] with every 0 replaced by the nearest other value."""
+def _spread(values: Array) -> Array:
+    """[h, w] or [h, w, 3] with every 0 replaced by the nearest other value."""
     from scipy import ndimage
 
-    index = ndimage.distance_transform_edt(depth == 0, return_distances=False, return_indices=True)
-    return depth[tuple(index)]
+    none = values == 0 if values.ndim == 2 else (values == 0).all(-1)
+    if none.all():
+        return values
+    return values[tuple(ndimage.distance_transform_edt(none, return_distances=False, return_indices=True))]

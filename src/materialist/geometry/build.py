@@ -13,7 +13,7 @@ from materialist.geometry.inflate import inflated
 from materialist.geometry.objects import find_objects
 from materialist.geometry.planes import find_planes
 from materialist.geometry.rims import set_back_rims
-from materialist.types import Array, Camera, Geometry
+from materialist.types import Array, Camera, Geometry, Mesh
 
 COMPLETIONS = ("planes,backs", "floors,backs", "planes", "none")
 """What can be added to what the picture shows: continued planes and backs of objects, the same with walls (planes that
@@ -30,10 +30,17 @@ def build_geometry(
     """
     if completion not in COMPLETIONS:
         raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
-    mesh = depth_to_mesh(depth, normal, camera, tau=tau)
+    mesh, label = _completed(depth_to_mesh(depth, normal, camera, tau=tau), depth, normal, camera, completion, seed)
+    return Geometry(split_creases(mesh, depth, normal), label)
+
+
+def _completed(
+    mesh: Mesh, depth: Array, normal: Array, camera: Camera, completion: str, seed: int
+) -> tuple[Mesh, Array]:
+    """The mesh of a depth map with what its picture does not show, and the plane of each pixel [H, W] int8."""
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W]
     if completion == "none":
-        return Geometry(split_creases(mesh, depth, normal), label)
+        return mesh, label
     planes = find_planes(depth, normal, camera, seed=seed)
     for k, plane in enumerate(planes):
         label[plane.mask] = k
@@ -42,12 +49,11 @@ def build_geometry(
     objects = find_objects(mesh, depth, normal, taken) if completion.endswith("backs") else None
     walls = completion != "floors,backs"
     if objects is None or not (objects.label >= 0).any():
-        return Geometry(split_creases(complete(mesh, planes, depth, camera, walls=walls), depth, normal), label)
+        return complete(mesh, planes, depth, camera, walls=walls), label
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)
-    whole = join([complete(mesh, planes, depth, camera, walls=walls), backs])
-    return Geometry(split_creases(whole, depth, normal), label)
+    return join([complete(mesh, planes, depth, camera, walls=walls), backs]), label
 
 
 def completion_of(geometry: Geometry, told: str | None = None) -> str:

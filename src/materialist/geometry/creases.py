@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from materialist.geometry.boundary import QUAD, face_camera
+from materialist.geometry.objects import pixel_corners
 from materialist.types import Array, Mesh
 
 CREASE = 40.0
@@ -27,9 +28,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CR
     normal: [H, W, 3] unit, camera frame.
     """
     own = normal[depth > 0].astype(np.float64)  # [P, 3]
-    faces = mesh.faces[: 2 * len(own)].reshape(-1, 2, 3)
-    corner = np.concatenate([faces[:, 0], faces[:, 1, 2:]], 1)[:, [0, 3, 1, 2]]  # [P, 4] in reading order
-    vertex = corner.ravel().astype(np.int64)  # [4 P]
+    vertex = pixel_corners(mesh, depth > 0)[depth > 0].ravel()  # [4 P]
     order = np.argsort(vertex, kind="stable")
     sorted_vertex = vertex[order]
     starts = np.flatnonzero(np.diff(sorted_vertex, prepend=-1))

@@ -48,7 +48,7 @@ def find_objects(mesh: Mesh, depth: Array, normal: Array, taken: Array) -> Objec
     An object is a connected patch of the mesh, cut at depth boundaries, whose outline stands free (`FREE`) and whose
     faces agree with its normals (`CUT_OFF`).
     """
-    corner = _corners(mesh, depth > 0)
+    corner = pixel_corners(mesh, depth > 0)
     label = _patches(corner, (depth > 0) & ~taken)
     edges, pixel, kind = _outline(corner, label, depth)
     count, owner = int(label.max(initial=-1)) + 1, label.ravel()[pixel]
@@ -63,7 +63,7 @@ def find_objects(mesh: Mesh, depth: Array, normal: Array, taken: Array) -> Objec
     return Objects(number[label].astype(np.int32), corner, edges[mine], pixel[mine], kind[mine] == _FREE)
 
 
-def _corners(mesh: Mesh, surface: Array) -> Array:
+def pixel_corners(mesh: Mesh, surface: Array) -> Array:
     """[H, W, 4] front vertices of each pixel's corners, read off the two faces that come first for each pixel."""
     faces = mesh.faces[: 2 * int(surface.sum())].reshape(-1, 6)
     corner = np.full((*surface.shape, 4), -1, np.int64)
