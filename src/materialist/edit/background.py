@@ -13,6 +13,7 @@ from materialist.edit.behind import Behind, behind
 from materialist.edit.exemplar import Plan, exemplar_plan
 from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted
+from materialist.edit.regular import regular_sources
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
@@ -68,10 +69,11 @@ def without(
 
 
 def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
-    """Where the hole is filled from: albedo and photo must look alike, on the same surface."""
+    """Where the hole is filled from: patterns of planes go on; else albedo and photo must look alike, on one surface."""
     features = np.concatenate([linear_to_srgb(scene.materials.albedo), linear_to_srgb(scene.photo.linear)], -1)
     anywhere = np.ones(hole.painted.shape, bool)
-    return exemplar_plan(features, hole.painted, anywhere, found.label, seed=seed)
+    told = regular_sources(features, hole.painted, anywhere, found.label, found.depth, scene.camera)
+    return exemplar_plan(features, hole.painted, anywhere, found.label, told=told, seed=seed)
 
 
 def _filled(plan: Plan | None, maps: Array, hole: Array) -> Array:

@@ -44,6 +44,8 @@ class Plan:
     """[H, W] bool"""
     reach: int = 1
     """Pixels around a patch's middle that it speaks for."""
+    told: int = 0
+    """The first so many entries speak for their middle alone, and nothing else does there."""
 
     def fill(self, maps: Array) -> Array:
         """`maps` [H, W, C] with the hole filled; float32, the rest as it was."""
@@ -55,15 +57,20 @@ class Plan:
             for dx in range(-self.reach, self.reach + 1):
                 y, x = self.rows + dy, self.columns + dx
                 use = (y >= 0) & (y < height) & (x >= 0) & (x < width)
+                use[: self.told] &= dy == dx == 0
                 # No two patches have one middle, so that this sum meets no place twice.
                 part = self.weight[use, None]
                 from_y, from_x = np.clip(row[use] + dy, 0, height - 1), np.clip(column[use] + dx, 0, width - 1)
                 total[y[use], x[use]] += part * values[from_y, from_x]
                 norm[y[use], x[use]] += part
-        return np.where(self.hole[..., None] & (norm > 0), total / np.maximum(norm, 1e-12), values)
+        total = np.where(self.hole[..., None] & (norm > 0), total / np.maximum(norm, 1e-12), values)
+        total[self.rows[: self.told], self.columns[: self.told]] = values[row[: self.told], column[: self.told]]
+        return total
 
 
-def exemplar_plan(features: Array, hole: Array, source: Array, label: Array, *, seed: int = 0) -> Plan | None:
+def exemplar_plan(
+    features: Array, hole: Array, source: Array, label: Array, *, told: Array | None = None, seed: int = 0
+) -> Plan | None:
     """Find what to fill a hole with.
 
     Args:
@@ -71,10 +78,36 @@ def exemplar_plan(features: Array, hole: Array, source: Array, label: Array, *, 
         hole: [H, W] bool.
         source: [H, W] bool: what may be copied; the hole never is.
         label: [H, W] int: surfaces, known in the hole too; patches of another one are avoided.
+        told: [H, W] int row-major sources that are known already (see `regular.regular_sources`), -1 for none; patches
+            are sought for the rest of the hole, and fit to these.
 
     Returns:
         None where there is no whole patch to copy from.
     """
+    use = np.zeros_like(hole) if told is None else hole & (told >= 0)
+    if told is None or not use.any():
+        return _by_patches(features, hole, source, label, seed)
+    filled = features.copy()
+    filled[use] = features.reshape(-1, features.shape[-1])[told[use]]
+    rows, columns = np.nonzero(use)
+    plan = Plan(rows, columns, told[use], np.ones(len(rows), np.float32), hole, told=len(rows))
+    if not (hole & ~use).any():
+        return plan
+    rest = _by_patches(filled, hole & ~use, source & ~hole, label, seed)
+    if rest is None:
+        return None
+    own = ~use[rest.rows, rest.columns]
+    both = (
+        (plan.rows, rest.rows),
+        (plan.columns, rest.columns),
+        (plan.source, rest.source),
+        (plan.weight, rest.weight),
+    )
+    return Plan(*(np.concatenate([a, b[own]]) for a, b in both), hole, told=len(rows))
+
+
+def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed: int) -> Plan | None:
+    """`exemplar_plan` where nothing is told."""
     rng = np.random.default_rng(seed)
     sizes = [1]
     while max(hole.shape) / sizes[-1] > FINEST:

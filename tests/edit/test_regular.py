@@ -1,0 +1,96 @@
+"""Patterns on planes go on behind what hides them, in perspective; other pictures are left alone."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays
+from materialist.edit.exemplar import exemplar_plan
+from materialist.edit.regular import regular_sources
+from materialist.types import Camera
+
+CAMERA = Camera(120, 96, 50)
+SHAPE = (96, 120)
+
+
+def slanted(colour, tilt=0.6):
+    """A plane at depth 2 ahead, leaning back by `tilt` radians: depth, and what `colour` says of its places."""
+    normal = np.array([0.25, np.sin(tilt), np.cos(tilt)])
+    normal /= np.linalg.norm(normal)
+    rays = pixel_rays(CAMERA).astype(float)
+    depth = -2 * normal[2] / (rays @ normal)
+    point = rays * depth[..., None]
+    right = np.cross(normal, [0, 1.0, 0])
+    right /= np.linalg.norm(right)
+    u, v = point @ right, point @ np.cross(normal, right)
+    return depth, np.clip(colour(u, v), 0, 1)
+
+
+def chequers(u, v):
+    # Edges a pixel wide, as a camera would see them.
+    wave = np.clip(4 * np.sin(u / 0.2 * np.pi) * np.sin(v / 0.2 * np.pi), -1, 1)
+    return np.stack([0.5 + 0.3 * wave, 0.5 + 0.1 * wave, 0.4 + 0 * wave], -1)
+
+
+def stripes(u, v):
+    return np.repeat((0.5 + 0.3 * np.sin((u + 0.4 * v) * 22))[..., None], 3, -1)
+
+
+@pytest.fixture
+def hole():
+    rows, columns = np.indices(SHAPE)
+    return np.hypot(rows - 50, columns - 62) < 19
+
+
+@pytest.mark.parametrize("pattern", [chequers, stripes])
+def test_a_pattern_goes_on_in_perspective(hole, pattern):
+    depth, picture = slanted(pattern)
+    noisy = picture + np.random.default_rng(0).normal(0, 0.02, picture.shape)
+    torn = np.where(hole[..., None], 0.9, noisy)
+    label = np.zeros(SHAPE, int)
+    found = regular_sources(torn, hole, ~hole, label, depth, CAMERA)
+    told = found >= 0
+    assert not told[~hole].any() and told[hole].mean() > 0.97
+    assert not hole.ravel()[found[told]].any()  # nothing is copied out of the hole
+    error = np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean()
+    assert error < 0.03, error  # sources are whole pixels, and noise is 0.016 of it; any other place is off by 0.2
+    filled = exemplar_plan(torn, hole, ~hole, label, told=found).fill(torn)
+    np.testing.assert_array_equal(filled[~hole], torn[~hole].astype(np.float32))
+    np.testing.assert_array_equal(filled[told], torn.reshape(-1, 3)[found[told]].astype(np.float32))
+    assert np.abs(filled - picture)[hole].mean() < 0.03
+
+
+def test_patches_alone_lose_chequers_and_the_rest_of_a_hole_is_theirs(hole):
+    depth, picture = slanted(chequers)
+    torn, label = np.where(hole[..., None], 0.9, picture), np.zeros(SHAPE, int)
+    found = regular_sources(torn, hole, ~hole, label, depth, CAMERA)
+    left = np.arange(SHAPE[1]) < 55
+    half = np.where(left, found, -1)
+    filled = exemplar_plan(torn, hole, ~hole, label, told=half).fill(torn)
+    alone = exemplar_plan(torn, hole, ~hole, label).fill(torn)
+    error = [np.abs(p - picture)[hole & left].mean() for p in (filled, alone)]
+    assert error[0] < 0.7 * error[1]
+    assert np.abs(filled - picture)[hole & ~left].mean() < 1.5 * np.abs(alone - picture)[hole & ~left].mean()
+    assert np.isfinite(filled).all() and (filled[hole & ~left] < 0.89).all()  # none of it is what was in the hole
+
+
+def test_what_does_not_repeat_is_not_told(hole):
+    rng = np.random.default_rng(1)
+    spots = rng.random((30, 3)) * [3, 3, 0.12] + [-1.5, -1.5, 0.03]
+
+    def dotted(u, v):
+        inside = [np.hypot(u - x, v - y) < r for x, y, r in spots]
+        return np.repeat(0.3 + 0.4 * np.any(inside, 0)[..., None], 3, -1)
+
+    for colour in (dotted, lambda u, v: np.repeat(0.5 + 0.1 * u[..., None], 3, -1)):
+        depth, picture = slanted(colour)
+        noisy = picture + rng.normal(0, 0.02, picture.shape)
+        assert (regular_sources(noisy, hole, ~hole, np.zeros(SHAPE, int), depth, CAMERA) < 0).all()
+
+
+def test_each_plane_has_its_own_pattern_and_loose_things_have_none(hole):
+    depth, picture = slanted(chequers)
+    label = np.where(np.arange(SHAPE[1]) < 62, 0, 1) * np.ones(SHAPE, int)
+    found = regular_sources(picture, hole, ~hole, label, depth, CAMERA)
+    told = found >= 0
+    assert told[hole].mean() > 0.8 and (label.ravel()[found[told]] == label[told]).all()
+    assert (regular_sources(picture, hole, ~hole, np.full(SHAPE, -1), depth, CAMERA) < 0).all()
