@@ -69,7 +69,7 @@ def without(
 
 
 def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
-    """Where the hole is filled from: patterns of planes go on; else albedo and photo must look alike, on one surface."""
+    """Where the hole is filled from: patterns of planes go on; else albedo and photo must look alike, on a surface."""
     features = np.concatenate([linear_to_srgb(scene.materials.albedo), linear_to_srgb(scene.photo.linear)], -1)
     anywhere = np.ones(hole.painted.shape, bool)
     told = regular_sources(features, hole.painted, anywhere, found.label, found.depth, scene.camera)
