@@ -57,7 +57,7 @@ class GlassPreview:
         `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS.
         """
         from materialist.edit.glass import check_glass
-        from materialist.edit.portrait import purified
+        from materialist.edit.portrait import denoised, spread
         from materialist.render.portrait import radiance
         from materialist.render.scene import GLASS_DEPTH
 
@@ -68,10 +68,8 @@ class GlassPreview:
         size, box = self._size(spp)
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
-        traced = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH)
-        guide = self._guides[size]
-        clean = _denoised(without_fireflies(traced), guide)
-        return self._in_photo(purified(clean, guide.share), surface)
+        traced = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
+        return self._in_photo(denoised(without_fireflies(spread(traced)), self._guides[size]), surface)
 
     @property
     def edited(self) -> Scene:
@@ -164,14 +162,3 @@ class GlassPreview:
         share = self._share[top:bottom, left:right, None]
         out[top:bottom, left:right] = share * part + (1 - share) * out[top:bottom, left:right]
         return out
-
-
-def _denoised(picture: Array, guide: Any) -> Array:
-    """[h, w, 3] without noise, where the denoiser is installed."""
-    from materialist.errors import SetupError
-    from materialist.render.denoise import denoise
-
-    try:
-        return denoise(picture, albedo=guide.albedo, normal=guide.normal)
-    except SetupError:
-        return picture

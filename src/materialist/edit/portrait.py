@@ -77,9 +77,9 @@ def portrait(
     paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
     picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth, names=names)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
-    picture = _spread(picture)
+    picture = spread(picture)
     if clean:
-        picture = _denoised(picture, guide)
+        picture = denoised(picture, guide)
     picture = _enlarged(picture, sight.share.shape)
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
@@ -110,7 +110,8 @@ def _scaled(box: tuple[int, int, int, int], native: tuple[int, int], size: tuple
     return top, min(bottom, size[0]), left, min(right, size[1])
 
 
-def _denoised(picture: Array, guide: Any) -> Array:
+def denoised(picture: Array, guide: Any) -> Array:
+    """[h, w, 3] without noise, where the denoiser is installed; `guide` is a `render.portrait.Sight`."""
     from materialist.errors import SetupError
     from materialist.render.denoise import denoise
 
@@ -118,18 +119,6 @@ def _denoised(picture: Array, guide: Any) -> Array:
         return denoise(picture, albedo=guide.albedo, normal=guide.normal)
     except SetupError:
         return picture
-
-
-def purified(picture: Array, share: Array) -> Array:
-    """[h, w, 3] without what is behind in pixels at the rim: they take the mean of the covered ones around."""
-    import cv2
-
-    sure = (share > 0.99).astype(np.float32)
-    total, norm = picture * sure[..., None], sure
-    blur = lambda v: cv2.GaussianBlur(v, (5, 5), 0.8)  # noqa: E731
-    near = blur(norm)[..., None]
-    mean = blur(np.ascontiguousarray(total)) / np.maximum(near, 1e-6)
-    return np.where(sure[..., None] > 0, picture, np.where(near > 1e-4, mean, picture)).astype(np.float32)
 
 
 def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
@@ -162,14 +151,14 @@ def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, in
     kernel = np.ones((2 * int(np.ceil(2 * scale)) + 1,) * 2, np.uint8)
     near = cv2.dilate(hidden.astype(np.uint8), kernel) > 0
     whole = np.zeros(native, np.float32)
-    whole[rows, columns] = _spread(alone.depth)
+    whole[rows, columns] = spread(alone.depth)
     depth = cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
     thing = (scene.depth > 0) & (scene.depth < depth - CONTACT * size)
     cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
     return np.where(near, cut, sight.share).astype(np.float32)
 
 
-def _spread(values: Array) -> Array:
+def spread(values: Array) -> Array:
     """[h, w] or [h, w, 3] with every 0 replaced by the nearest other value."""
     from scipy import ndimage
 
