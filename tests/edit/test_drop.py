@@ -7,7 +7,7 @@ from made_meshes import box_file, floor_scene
 
 from materialist.edit import film
 from materialist.edit.convex import convex_pieces, thinned
-from materialist.edit.drop import down, drop, upright
+from materialist.edit.drop import METRES, down, drop, upright
 from materialist.edit.ground import Field, blocks
 from materialist.edit.insert import extent, insert
 from materialist.edit.mesh_shape import volume
@@ -130,7 +130,9 @@ def test_several_start_clear_of_each_other(box):
     film = drop(floor_scene(96, 72), [box, box], (48.0, 50.0), frames=2, spin=0)
     a, b = (body.vertices @ UP for body in film[0].bodies)
     assert b.min() > a.max()
-    assert film[0].provenance["edits"][-1]["kind"] == "drop"
+    told = film[0].provenance["edits"][-1]
+    assert told["kind"] == "drop" and told["metres"] == METRES and told["up"] == "auto"
+    assert np.linalg.norm(told["gravity"]) == pytest.approx(1, abs=1e-5)  # the one that was found
 
 
 def test_bad_input(box):

@@ -145,14 +145,16 @@ def prepared(
         raise InputError("Nothing falls; give at least one mesh.")
     places = _places(at, len(models))
     stood = [put(scene, model, place, scale=release.scale) for model, place in zip(models, places)]
-    to_up = upright(down(scene, stood[0][1], release.gravity))
+    direction = down(scene, stood[0][1], release.gravity)
+    to_up = upright(direction)
     factor = release.metres / max(extent(bodies) for bodies, _ in stood)
     starts = _raised(stood, to_up, factor, release.height * release.metres)
     things = _things(starts, to_up, factor, release)
     ground = ground_below(scene, things, to_up, factor, release.metres)
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
-        **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "seed")},
+        **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
+        "gravity": [round(float(v), 6) for v in direction],
     }  # fmt: skip
     notes = tuple(note for model in models for note in model.warnings)
     return Falling(scene, things, ground, starts, to_up, factor, notes, what)
