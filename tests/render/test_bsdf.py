@@ -130,6 +130,24 @@ def test_chi_squared_on_a_face_that_leans(roughness, metallic, degrees, side, ca
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 
+def test_a_ray_that_meets_the_front_sees_the_light_of_the_front():
+    """Its shading normal turns away: it must not be lit from behind, as a slit in a corner would be."""
+    surface, ctx, count = make(roughness=0.7, metallic=0), mi.BSDFContext(), 1 << 12
+    wi = np.array([0, 0.98, -0.199])
+    si = _leaning(wi, count)
+    face = np.array([0, 0.5, np.sqrt(0.75)])
+    assert wi @ face > 0.3 > 0 > wi[2]
+    rng = np.random.default_rng(2)
+    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
+    sample, weight = surface.sample(ctx, si, u1, u2)
+    wo, drawn = np.array(sample.wo).T, np.array(sample.pdf) > 0
+    assert drawn.mean() > 0.9 and (wo[drawn] @ face > -1e-5).all()
+    behind = wo * [1, 1, -1]
+    value = np.array(surface.eval(ctx, si, vector(behind))).T
+    assert (value[behind @ face < -1e-3] == 0).all() and (behind @ face < -1e-3).mean() > 0.3
+    assert np.array(weight).mean() > 0.3  # and it is not black
+
+
 def test_the_components_add_up():
     surface = make(roughness=0.4, metallic=0.3)
     wi, wo = pairs(1000, 6, 0.4)

@@ -34,8 +34,10 @@ def _define():
     class SimplifiedDisney(mi.BSDF):
         """f_r = f_s + (1 - M) f_d (paper, Preliminary); both sides shade alike.
 
-        Where the shading normal sees below the face, light comes from as far above the face instead (see
-        `transport.sampling.lifted`): nothing passes through the surface, and nothing is lost.
+        A ray meets the back only where face and shading normal both say so: where the latter turns away from a ray
+        that meets the front, it is still the front's light that is seen. Where the shading normal sees below the face,
+        light comes from as far above the face instead (see `transport.sampling.lifted`): nothing passes through the
+        surface, and nothing is lost.
 
         Textures: base_color (RGB), roughness (perceptual, alpha = r^2), metallic.
         """
@@ -114,7 +116,8 @@ def _define():
             wo = dr.select(take_specular, mirrored, cosine_direction(sample2))
             active = active & (wi.z > 0) & (wo.z > 0)
             bs = mi.BSDFSample3f()
-            bs.wo = lifted(mi.Vector3f(wo.x, wo.y, dr.mulsign(wo.z, si.wi.z)), self._face(si))
+            side = self._side(si)
+            bs.wo = lifted(mi.Vector3f(wo.x, wo.y, wo.z * side), self._face(si, side))
             value, pdf = self._both(ctx, si, bs.wo, share, albedo, roughness, metallic)
             bs.pdf = dr.select(active, pdf, 0)
             active = active & (bs.pdf > 0)
@@ -131,22 +134,28 @@ def _define():
             value, pdf = self._both(ctx, si, wo, share, albedo, roughness, metallic)
             return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
 
-        def _face(self, si):
-            """The face's normal in the shading frame, on the side of `si.wi`; 0 where it is not believed."""
-            return face_towards(si.to_local(si.n), mi.Vector3f(0, 0, dr.sign(si.wi.z)))
+        def _side(self, si):
+            """-1 where `si.wi` lies behind the shading normal and on the other side of the face than that, else 1."""
+            face = si.to_local(si.n)
+            front = (si.wi.z > 0) | (dr.dot(face, si.wi) * face.z > 0)
+            return dr.select(front, mi.Float(1), mi.Float(-1))
+
+        def _face(self, si, side):
+            """The face's normal in the shading frame, on that side of it; 0 where it is not believed."""
+            return face_towards(si.to_local(si.n), mi.Vector3f(0, 0, side))
 
         def _both(self, ctx, si, wo, share, *materials):
             """Value and density of `wo`: its own, and those of the direction that is lifted to it."""
-            face = self._face(si)
+            side = self._side(si)
+            face = self._face(si, side)
             height = dr.dot(face, wo)
             below = wo - 2 * height * face
-            found = [self._one(ctx, si.wi, w, share, *materials, seen)
+            found = [self._one(ctx, si.wi, w, share, *materials, seen & (side * w.z > 0))
                      for w, seen in ((wo, height >= 0), (below, height > 0))]  # fmt: skip
             return found[0][0] + found[1][0], found[0][1] + found[1][1]
 
         def _one(self, ctx, wi, wo, share, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
-            active = active & (wi.z * wo.z > 0)
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
             value = dr.select(active, self._value(ctx, wi, wo, albedo, roughness, metallic), mi.Color3f(0))
             return value, dr.select(active, self._pdf(wi, wo, share, roughness), 0)
