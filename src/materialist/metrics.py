@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.types import Array
 
@@ -64,8 +65,7 @@ def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
     if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
         raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
     h, w = envmap.shape[:2]
-    edges = np.cos(np.linspace(0, np.pi, h + 1))  # [h + 1] cosine of the inclination at row borders
-    weight = (edges[:-1] - edges[1:]) * (2 * np.pi / w)  # [h] steradian per texel
+    weight = row_solid_angle(h)  # [h] steradian per texel
     cos_theta = np.cos((np.arange(h) + 0.5) * np.pi / h)  # [h]
     phi = ((np.arange(w) + 0.5) / w - 0.5) * 2 * np.pi  # [w] azimuth from -Z towards +X
     # The basis is a product of a row and a column function: sum the columns once per order m.

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.fit.fields import (
     EnvmapMLP,
     EnvmapSH,
@@ -18,7 +19,6 @@ from materialist.fit.fields import (
     resize_envmap,
     sh_basis,
 )
-from materialist.transport.environment import row_solid_angle, texel_directions
 
 
 def prior_maps(count: int, seed: int = 0):

@@ -8,12 +8,12 @@ import torch
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist import metrics
+from materialist.envmap import texel_directions
 from materialist.fit.engine import PathEngine, TransportEngine
 from materialist.fit.inverse import Fit, paste_visible_sky
 from materialist.fit.loop import Schedule
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage
 from materialist.render.scene import RenderScene
-from materialist.transport.environment import texel_directions
 from materialist.types import Camera, Materials, Photo
 
 ENVMAP_HEIGHT = 16

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from materialist.envmap import texel_directions
 from materialist.geometry.build import build_geometry
 from materialist.render.brdf import diffuse_coefficients, specular_split
 from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, TransportCache
-from materialist.transport.environment import texel_directions
 from materialist.types import Camera, Geometry, Mesh
 
 CAMERA = Camera(12, 9, 60.0)

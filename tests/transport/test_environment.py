@@ -6,12 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.transport.environment import (
     EnvmapLevel,
     EnvmapPyramid,
     halve,
-    row_solid_angle,
-    texel_directions,
 )
 from materialist.transport.light import bilinear
 

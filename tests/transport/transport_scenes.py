@@ -4,8 +4,8 @@ import numpy as np
 from geometry_scenes import room, sphere_depth
 
 from materialist.camera import unproject
+from materialist.envmap import texel_directions
 from materialist.geometry.build import build_geometry
-from materialist.transport.environment import texel_directions
 from materialist.types import Camera, Geometry, Materials
 
 

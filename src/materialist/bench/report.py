@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import OutputError
+from materialist.plain import plain
 
 CEILING = "ceiling"
 """How the method names of rows begin that no method can beat: they do not compete for the best figure."""
@@ -78,7 +79,7 @@ def as_dict(report: Report) -> dict[str, Any]:
         "settings": report.settings,
         "machine": {"cores": os.cpu_count(), "processor": platform.machine(), "python": platform.python_version()},
         "means": means(report),
-        "rows": [{k: _plain(v) for k, v in row.items()} for row in report.rows],
+        "rows": [{k: plain(v) for k, v in row.items()} for row in report.rows],
     }
 
 
@@ -144,10 +145,3 @@ def _replace(path: Path, content: bytes) -> None:
     temporary = path.with_suffix(path.suffix + ".part")
     temporary.write_bytes(content)
     temporary.replace(path)
-
-
-def _plain(value: Any) -> Any:
-    """A value that JSON holds: infinite and undefined figures become None."""
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value

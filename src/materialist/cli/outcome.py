@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 import traceback
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from typing import Any
 import typer
 
 from materialist.errors import MaterialistError
+from materialist.plain import plain
 
 OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -49,7 +49,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
 def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:
     """Tell a person in `lines`, or with `as_json` a program in one last line on stdout."""
     if as_json:
-        typer.echo(json.dumps(_plain({"ok": True, "command": command, **facts})))
+        typer.echo(json.dumps(plain({"ok": True, "command": command, **facts})))
     else:
         for line in lines:
             typer.echo(line)
@@ -74,16 +74,3 @@ def _is_usage_error(error: Exception) -> bool:
     """Whether the option parser raised it; its base class is private in some versions of typer, so ask by family."""
     family = {base.__name__ for base in type(error).__mro__}
     return "ClickException" in family and hasattr(error, "show")
-
-
-def _plain(value: Any) -> Any:
-    """JSON's own types; NaN and infinity become null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, str | int | bool) else str(value)

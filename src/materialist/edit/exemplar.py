@@ -97,13 +97,9 @@ def exemplar_plan(
     if rest is None:
         return None
     own = ~use[rest.rows, rest.columns]
-    both = (
-        (plan.rows, rest.rows),
-        (plan.columns, rest.columns),
-        (plan.source, rest.source),
-        (plan.weight, rest.weight),
-    )
-    return Plan(*(np.concatenate([a, b[own]]) for a, b in both), hole, told=len(rows))
+    with_rest = lambda name: np.concatenate([getattr(plan, name), getattr(rest, name)[own]])  # noqa: E731
+    rows, columns, sources, weight = (with_rest(name) for name in ("rows", "columns", "source", "weight"))
+    return Plan(rows, columns, sources, weight, hole, told=plan.told)
 
 
 def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed: int) -> Plan | None:

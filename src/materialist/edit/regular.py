@@ -74,7 +74,8 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
     if np.sqrt((detail**2)[seen].mean()) < FEATURED:
         return np.full(plane.known.shape, -1)
     shifts = _shifts(detail, seen) * frame.cell
-    found = np.full(plane.known.shape, -1)
+    height, width = plane.known.shape
+    found = np.full((height, width), -1)
     rows, columns = np.nonzero(plane.hidden)
     for shift in shifts:  # best first
         left = found[rows, columns] < 0
@@ -83,10 +84,10 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
         moved = plane.point[rows[left], columns[left]] + shift @ frame.axes
         place, ahead = project(moved, camera)
         column, row = np.floor(place).astype(int).T
-        good = (ahead > 0) & (row >= 0) & (row < found.shape[0]) & (column >= 0) & (column < found.shape[1])
+        good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
         row, column = np.where(good, row, 0), np.where(good, column, 0)
         good &= plane.known[row, column]
-        found[rows[left][good], columns[left][good]] = (row * found.shape[1] + column)[good]
+        found[rows[left][good], columns[left][good]] = (row * width + column)[good]
     return found if (found[rows, columns] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
 
 

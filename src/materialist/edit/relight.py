@@ -11,6 +11,7 @@ from materialist.camera import pixel_rays
 from materialist.edit.lights import kelvin_colour
 from materialist.edit.material import noted
 from materialist.edit.region import checked_pixel
+from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.types import Array, Lamp, Scene
 
@@ -150,7 +151,7 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
     from materialist.color import luminance
 
     angle = _angle_to(envmap.shape[0], azimuth, elevation)  # [h, 2h] degrees
-    solid = _solid_angles(envmap.shape[0])  # [h, 1]
+    solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
     texel = 180 / envmap.shape[0]
     disc = np.clip((max(SUN_RADIUS, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
     mean = luminance((envmap * solid[..., None]).sum((0, 1)) / (4 * np.pi))
@@ -171,15 +172,9 @@ def _angle_to(rows: int, azimuth: float, elevation: float) -> Array:
     return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
 
-def _solid_angles(rows: int) -> Array:
-    """[h, 1] solid angle of a texel of each row, steradian."""
-    edges = np.cos(np.pi * np.arange(rows + 1) / rows)
-    return ((edges[:-1] - edges[1:]) * np.pi / rows)[:, None]
-
-
 def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
     if gain == "auto":
-        mean = lambda e: float((e.mean(-1) * _solid_angles(e.shape[0])).sum())  # noqa: E731
+        mean = lambda e: float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())  # noqa: E731
         return np.float32(mean(np.asarray(fitted)) / mean(np.asarray(envmap)))
     if isinstance(gain, str) or not (np.isfinite(gain) and 0 < gain <= 1e6):
         raise InputError(f"The gain is {gain!r}; it must be a number above 0, or auto.")

@@ -15,7 +15,7 @@ from scipy.special import sph_harm_y
 from torch import nn
 from torch.nn import functional
 
-from materialist.transport.environment import texel_directions
+from materialist.envmap import texel_directions
 
 
 def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from materialist.color import linear_to_srgb
+from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.fields import EnvmapTexels
 from materialist.fit.light import envmap_field, fit_light
@@ -18,7 +19,6 @@ from materialist.fit.losses import residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
-from materialist.transport.environment import texel_directions
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 

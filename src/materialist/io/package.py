@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.io.ply import read_ply, write_ply
 from materialist.io.target import MARKER, interrupted_replacement, whole_folder
+from materialist.plain import plain
 from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 
 FORMAT = "materialist-scene"
@@ -240,24 +240,9 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     try:
-        path.write_text(json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n", "utf-8")
+        path.write_text(json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
-
-
-def _plain(value: Any) -> Any:
-    """JSON's own types; NaN and infinity, which JSON lacks, become null."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, str | int | bool):
-        return value
-    return [_plain(item) for item in value] if isinstance(value, Iterable) else str(value)
 
 
 def _report_to_json(report: FitReport) -> dict[str, Any]:

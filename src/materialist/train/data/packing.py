@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import luminance
+from materialist.envmap import row_solid_angle
 from materialist.train.data.world import World
 from materialist.types import Array
 
@@ -106,8 +107,7 @@ def _directions(world: World) -> tuple[Array, Array, bool]:
 
     size = (2 * ENV_ROWS, ENV_ROWS)
     glow = cv2.resize(luminance(world.envmap), size, interpolation=cv2.INTER_AREA).astype(np.float64)
-    edges = np.cos(np.linspace(0, np.pi, ENV_ROWS + 1))
-    angle = np.repeat((edges[:-1] - edges[1:]) * np.pi / ENV_ROWS, 2 * ENV_ROWS)
+    angle = np.repeat(row_solid_angle(ENV_ROWS), 2 * ENV_ROWS)
     weight = np.maximum(glow.ravel(), 1e-6) * angle
     if world.portals:
         weight *= _entering(world)

@@ -1,0 +1,20 @@
+"""Values as JSON has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+
+def plain(value: Any) -> Any:
+    """JSON's own types: arrays as lists, keys as texts, NaN and infinity, which JSON lacks, as None; else a text."""
+    if hasattr(value, "tolist"):  # numpy's arrays and numbers
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int | bool):
+        return value
+    return [plain(item) for item in value] if isinstance(value, Iterable) else str(value)
