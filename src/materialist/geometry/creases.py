@@ -7,6 +7,7 @@ wall from above: a bright line along every crease, and around the foot of everyt
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CR
     mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
     normal: [H, W, 3] unit, camera frame.
     """
-    own = normal[depth > 0].astype(np.float64)  # [P, 3]
+    own = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
     vertex = pixel_corners(mesh, depth > 0)[depth > 0].ravel()  # [4 P]
     order = np.argsort(vertex, kind="stable")
     sorted_vertex = vertex[order]
@@ -36,21 +37,28 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CR
     place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
     around = np.full((len(mesh.vertices), 4), -1)
     around[vertex, place] = np.repeat(np.arange(len(own)), 4)  # [V, 4] pixels that meet in a vertex
-    near = around[vertex]  # [4 P, 4]
-    alike = (near >= 0) & ((own[near] * np.repeat(own, 4, 0)[:, None]).sum(-1) > np.cos(np.radians(crease)))
-    alike[np.arange(len(vertex)), place] = True
+    cosine = np.cos(np.radians(crease))
+    # Most vertices lie on no crease and stay as they are.
+    flat = np.ones(len(around), bool)
+    for i, j in combinations(range(4), 2):
+        both = around[:, j] >= 0  # places are filled from the first
+        flat[both] &= np.einsum("nk,nk->n", own[around[both, i]], own[around[both, j]]) > cosine
+    corner = np.flatnonzero(~flat[vertex])  # [C] of pixels, at creases
+    at, near = vertex[corner], around[vertex[corner]]  # [C], [C, 4]
+    alike = (near >= 0) & (np.einsum("njk,nk->nj", own[near], own[corner // 4]) > cosine)
+    alike[np.arange(len(corner)), place[corner]] = True
     # Pixels with the same company share a vertex.
-    key, first, number = np.unique(vertex * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True)
-    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(1)  # [K, 3]
-    rest = len(mesh.vertices)  # the vertices there were, for everything else
-    quads = rest + number.reshape(-1, 4)[:, QUAD].reshape(-1, 3)
+    key, first, number = np.unique(at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True)
+    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(1, dtype=np.float64)  # [K, 3]
+    new = vertex.copy()
+    new[corner] = len(mesh.vertices) + number  # after the vertices there were
     points = mesh.vertices[key // 16]
     return _tidy(replace(
         mesh,
         vertices=np.concatenate([mesh.vertices, points]),
         normals=np.concatenate([mesh.normals, face_camera(shading, points)]),
         uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
-        faces=np.concatenate([quads, mesh.faces[2 * len(own) :]]).astype(np.int32),
+        faces=np.concatenate([new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]).astype(np.int32),
     ))  # fmt: skip
 
 
