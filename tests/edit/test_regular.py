@@ -94,3 +94,14 @@ def test_each_plane_has_its_own_pattern_and_loose_things_have_none(hole):
     told = found >= 0
     assert told[hole].mean() > 0.8 and (label.ravel()[found[told]] == label[told]).all()
     assert (regular_sources(picture, hole, ~hole, np.full(SHAPE, -1), depth, CAMERA) < 0).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 40), (96, 3), (90, 114)])
+def test_holes_of_any_shape_are_borne(size):
+    depth, picture = slanted(chequers)
+    hole = np.zeros(SHAPE, bool)
+    hole[: size[0], : size[1]] = True
+    found = regular_sources(picture, hole, ~hole, np.zeros(SHAPE, int), depth, CAMERA)
+    assert not hole.ravel()[found[found >= 0]].any() and (found[~hole] < 0).all()
+    far = np.where(np.indices(SHAPE)[0] < 4, 1e6, depth)  # a plane that is none
+    regular_sources(picture, hole, ~hole, np.zeros(SHAPE, int), far, CAMERA)

@@ -14,6 +14,8 @@ import numpy as np
 from materialist.camera import pixel_rays, project
 from materialist.types import Array, Camera
 
+KNOWN, HIDDEN = 200, 16
+"""Fewest pixels that must be known, and hidden, of a plane; smaller holes need no pattern."""
 CELLS = 160
 """Cells along the longer side of a plane looked at straight on."""
 AROUND = 2.5
@@ -61,7 +63,7 @@ def regular_sources(features: Array, hole: Array, source: Array, label: Array, d
         if k < 0:
             continue
         plane = Surface(points, (label == k) & source & ~hole & (depth > 0), (label == k) & hole & (depth > 0))
-        if plane.known.sum() > 200:
+        if plane.known.sum() >= KNOWN and plane.hidden.sum() >= HIDDEN:
             found = np.where(found < 0, _on_plane(features, plane, camera), found)
     return found
 
@@ -71,7 +73,7 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
     frame = _Frame(plane)
     window, seen = frame.straight(features, plane.known, camera)
     detail = _detail(window, seen)
-    if np.sqrt((detail**2)[seen].mean()) < FEATURED:
+    if seen.sum() < KNOWN or np.sqrt((detail**2)[seen].mean()) < FEATURED:
         return np.full(plane.known.shape, -1)
     shifts = _shifts(detail, seen) * frame.cell
     height, width = plane.known.shape
