@@ -49,10 +49,13 @@ def test_the_floor_and_the_wall_go_on_behind_the_box(furnished):
     assert plane == floor and distance == pytest.approx(0.5, abs=0.02)
     distance, plane, _ = hit(geometry.mesh, (-0.5, -0.9, -5.5), (0, 0, -1))
     assert plane == wall and distance == pytest.approx(0.5, abs=0.05)
-    seen = 6 * CAMERA.width / (2 * CAMERA.focal)  # half of the wall's width in the frame
-    distance, plane, _ = hit(geometry.mesh, (1.1 * seen, 1.0, -3.0), (0, 0, -1))  # and beside the frame
+    # Above the frame it goes on, but not without end.
+    right, top = 6 * CAMERA.width / (2 * CAMERA.focal), 6 * CAMERA.height / (2 * CAMERA.focal)
+    distance, plane, _ = hit(geometry.mesh, (0.0, 1.2 * top, -3.0), (0, 0, -1))
     assert plane == wall and distance == pytest.approx(3, abs=0.05)
-    assert hit(geometry.mesh, (2 * seen, 1.0, -3.0), (0, 0, -1))[1] is None  # but not without end
+    assert hit(geometry.mesh, (0.0, 2 * top, -3.0), (0, 0, -1))[1] is None
+    # To the sides, where far more of it is seen, it ends with the frame.
+    assert hit(geometry.mesh, (1.1 * right, 1.0, -3.0), (0, 0, -1))[1] is None
 
 
 def test_planes_stop_at_each_other_and_leave_light_from_above_and_behind(furnished):

@@ -28,9 +28,12 @@ SKY_SHARE = 0.05
 UPWARD = 0.7
 """Least Y of the normal of a floor or table top. Only those go on behind the camera: a wall or ceiling there would
 shut out the light that the picture never shows."""
-WALL_REACH = 1.2
-"""How far a wall or ceiling goes on, as a multiple of what is seen of it: where it ends is not known, and one continued
-too far shuts out the light from beside and above."""
+WALL_REACH = 0.8
+"""How far a wall or ceiling goes beyond the picture, to each side of the middle of what is seen of it, as a multiple of
+the farthest that is seen: where it ends is not known, and one continued too far shuts out the light from beside and
+above."""
+WALL_BEHIND = 1.2
+"""The same for what lies behind things that the picture shows."""
 BOUNDING = 0.9
 """A plane that has this share of the other points in front of it bounds the scene (floor, wall, ceiling) and goes on
 freely; any other (a table top above a floor) only between its own pixels and across the frame sides that it touches."""
@@ -60,7 +63,9 @@ class _Sheet:
     touches: tuple[bool, ...]
     """[4] whether its pixels reach the frame's bottom, left, right, top."""
     half_size: float
-    """Half the side of the square it may fill, scene units."""
+    """Half the side of the square it may fill beyond the picture, scene units."""
+    behind: float
+    """Radius about its middle within which it goes on behind what the picture shows, scene units."""
 
 
 def complete(
@@ -125,10 +130,11 @@ def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float
     own = points.reshape(-1, 3)[pixels]
     own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
     outdoors = np.mean(~surface) > SKY_SHARE and plane.normal[1] > UPWARD
-    half_size = (GROUND_EXTENT if outdoors else extent) * radius
+    half_size = behind = (GROUND_EXTENT if outdoors else extent) * radius
     if plane.normal[1] < UPWARD:
-        half_size = min(half_size, WALL_REACH * float(np.linalg.norm(own - own.mean(0), axis=-1).max()))
-    return _Sheet(index, plane, own, pixels, bool(bounding), touches, half_size)
+        farthest = float(np.linalg.norm(own - own.mean(0), axis=-1).max())
+        half_size, behind = min(half_size, WALL_REACH * farthest), min(behind, WALL_BEHIND * farthest)
+    return _Sheet(index, plane, own, pixels, bool(bounding), touches, half_size, behind)
 
 
 def _farthest_shown(mesh: Mesh, depth: Array) -> Array:
@@ -169,7 +175,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     reach = sheet.plane.inverse_depth(rays)  # [h+1, w+1]
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
-    close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.half_size)
+    close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.behind)
     reach4, allowed4, close4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
         np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2) for g in (reach, allowed, close, points)
     )
