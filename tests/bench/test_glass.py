@@ -10,6 +10,7 @@ from materialist.bench import glass, shapes
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.errors import InputError
+from materialist.predict.refraction.thickness import Thickness
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +46,9 @@ def test_without_refraction_both_models_show_the_background(scene, mitsuba):
     room = scene.render(envmap, "room", spp=64)
     behind = models.true_background(scene, room)
     mask = scene.mask
+    true = Thickness(scene.front.thickness, scene.front.thickness)
     bent = models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6)
-    traced = models.closed_proxy(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-4, spp=16)
+    traced = models.closed_proxy(scene, true, behind, envmap, 1.0 + 1e-4, spp=16)
     assert np.abs(bent - room)[mask].mean() < 0.02 * room[mask].mean()
     # Sampled at random places of a pixel, a fine pattern is another one, but no brighter or darker.
     assert np.abs(traced - room)[mask].mean() < 0.12 * room[mask].mean()
@@ -72,7 +74,7 @@ def test_figures_look_inside_the_mask_alone(scene):
     truth = np.random.default_rng(1).random((40, 40, 3)).astype(np.float32)
     case = glass.Case(scene, np.ones((8, 16, 3)), truth, truth, 0.5, 1.3, "case")
     outside = np.where(scene.mask[..., None], truth, 0)
-    found = glass.figures(case, outside, scene.front.thickness * 1.5)
+    found = glass.figures(case, outside, Thickness(scene.front.thickness * 1.5, scene.front.thickness))
     assert found["psnr_symmetric"] == np.inf and found["ssim_symmetric"] == pytest.approx(1)
     assert found["thickness_symmetric"] == pytest.approx(0.5, rel=1e-4)
     worse = glass.figures(case, outside * 0.8, None)
@@ -83,7 +85,13 @@ def test_noise_on_the_thickness_is_drawn_as_often_as_asked(scene, mitsuba):
     envmap = np.full((16, 32, 3), 0.5, np.float32)
     room = scene.render(envmap, "room", spp=4)
     case = glass.Case(scene, envmap, room, room, 1.0, 1.3, "case")
-    rows = glass.sensitivity(case, scene.front.thickness, models.true_background(scene, room), draws=3, seed=0)
+    rows = glass.sensitivity(
+        case,
+        Thickness(scene.front.thickness, scene.front.thickness),
+        models.true_background(scene, room),
+        draws=3,
+        seed=0,
+    )
     errors = [row["thickness_symmetric"] for row in rows]
     assert len(set(errors)) == 3 and max(errors) <= 0.5
 

@@ -71,6 +71,20 @@ def test_a_ball_bends_rays_twice_by_the_difference_of_angles():
     np.testing.assert_allclose(deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.02)
 
 
+def test_a_back_of_its_own_bends_rays_as_that_back_does():
+    """A wedge: flat in front, its back leaning; the mirrored front would let rays through as a pane does."""
+    depth, normal, mask, thick = pane(CAMERA, 0.3)
+    lean = np.radians(10)
+    back = np.tile([np.sin(lean), 0, -np.cos(lean)], (*mask.shape, 1))
+    front = ti.Front(CAMERA, normal, depth, mask, back)
+    crossing = ti.cross(front, thick[mask], ior=1.5)
+    middle = np.argmax(front.direction @ [0, 0, -1.0])
+    # Snell's law at the back of a prism for a ray along the axis: sin(out) = n sin(lean).
+    found = np.arcsin(crossing.direction[middle, 0])
+    assert abs(front.direction[middle, 0]) < 0.02
+    assert found == pytest.approx(lean - np.arcsin(1.5 * np.sin(lean)), abs=0.03)
+
+
 def test_without_refraction_the_background_is_seen_unchanged():
     depth, normal, mask, cosine = ball(CAMERA)
     picture = gradient(CAMERA)

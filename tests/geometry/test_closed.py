@@ -74,6 +74,18 @@ def test_normals_follow_the_map_in_front_and_the_thickness_behind():
         assert np.quantile((shell.normals * out).sum(-1)[inner & side], 0.01) > 0.999
 
 
+def test_a_back_has_the_normals_that_are_known_of_it():
+    depth, normal, mask, thick = ball()
+    leaning = np.tile(np.array([0.6, 0, -0.8]), (*mask.shape, 1))
+    shell = closed_proxy(depth, normal, mask, thick, CAMERA, back=leaning)
+    out = (shell.vertices - [0.1, 0, -3]) / 0.6
+    inner = np.linalg.norm(out[:, :2], axis=-1) < 0.9
+    np.testing.assert_allclose(shell.normals[inner & (out[:, 2] < 0)] @ [0.6, 0, -0.8], 1, atol=1e-6)
+    assert np.quantile((shell.normals * out).sum(-1)[inner & (out[:, 2] > 0)], 0.01) > 0.99
+    with pytest.raises(InputError, match="normals of the back are"):
+        closed_proxy(depth, normal, mask, thick, CAMERA, back=leaning[1:])
+
+
 def test_an_object_ends_in_a_wall_where_its_thickness_does_not_end():
     rows, columns = np.mgrid[:48, :64]
     depth, normal, mask, thick, camera = plate((np.abs(rows - 24) < 12) & (np.abs(columns - 32) < 16))

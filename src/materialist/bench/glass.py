@@ -8,7 +8,7 @@ object's mask. Symmetric and asymmetric objects, the true background or one inpa
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from materialist.bench.glass_models import Background
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
 
 COLUMNS = (
@@ -147,8 +148,8 @@ def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tup
     best = "predicted"
     rows = []
 
-    def add(method: str, picture: Array, thickness: Array | None = None) -> None:
-        rows.append({"method": method, "sample": case.name, **figures(case, picture, thickness)})
+    def add(method: str, picture: Array, found: Thickness | None = None) -> None:
+        rows.append({"method": method, "sample": case.name, **figures(case, picture, found)})
         shown[method] = picture
 
     for kind, background in behind.items():
@@ -158,41 +159,43 @@ def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tup
     again = scene.render(case.envmap, "glass", ior=case.ior, spp=spp, seed=4)
     add(f"{CEILING}, truth again", again)
     for model in (_two_interface, _closed):
-        for source, thickness in d.items():
-            add(f"{model.__name__[1:]}, {source} d", model(case, thickness, behind["true"], spp), thickness)
+        for source, found in d.items():
+            add(f"{model.__name__[1:]}, {source} d", model(case, found, behind["true"], spp), found)
         name = f"{model.__name__[1:]}, {best} d, inpainted"
         add(name, model(case, d[best], behind["inpainted"], spp), d[best])
-    same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
+    leaning = replace(d["true"], back=scene.front.back)
+    add("closed, true d and back", _closed(case, leaning, behind["true"], spp), leaning)
+    same = models.two_interface(scene, d[best].solid, behind["true"], case.envmap, case.ior, back="same")
     add(f"two_interface, {best} d, back normal = front normal", same, d[best])
     rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
     order = ("two_interface, true d", f"two_interface, {best} d", f"closed, {best} d", f"closed, {best} d, inpainted")
     return rows, _strip(case, room, [shown[name] for name in order])
 
 
-def _two_interface(case: Case, thickness: Array, behind: Background, spp: int) -> Array:
-    return models.two_interface(case.scene, thickness, behind, case.envmap, case.ior)
+def _two_interface(case: Case, found: Thickness, behind: Background, spp: int) -> Array:
+    return models.two_interface(case.scene, found.solid, behind, case.envmap, case.ior)
 
 
-def _closed(case: Case, thickness: Array, behind: Background, spp: int) -> Array:
-    return models.closed_proxy(case.scene, thickness, behind, case.envmap, case.ior, spp=spp)
+def _closed(case: Case, found: Thickness, behind: Background, spp: int) -> Array:
+    return models.closed_proxy(case.scene, found, behind, case.envmap, case.ior, spp=spp)
 
 
-Model = Callable[[Case, Array, Background, int], Array]
+Model = Callable[[Case, Thickness, Background, int], Array]
 
 
-def sensitivity(case: Case, d: Array, behind: Background, *, draws: int, seed: int) -> list[dict[str, Any]]:
+def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, seed: int) -> list[dict[str, Any]]:
     """Rows of the two-interface model with thickness d (1 + e) (paper, Sensitivity Analysis of d)."""
     rng = np.random.default_rng([seed, 10, *case.name.encode()])
     rows = []
     for k in range(draws):
-        noisy = d * (1 + rng.uniform(-NOISE, NOISE))
+        noisy = replace(d, solid=d.solid * (1 + rng.uniform(-NOISE, NOISE)))
         picture = _two_interface(case, noisy, behind, 1)
         row = {"method": "two_interface, noise on d", "sample": f"{case.name} draw {k}"}
         rows.append({**row, **figures(case, picture, noisy)})
     return rows
 
 
-def figures(case: Case, picture: Array, thickness: Array | None) -> dict[str, float]:
+def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str, float]:
     """The figures of a picture [H, W, 3] inside the mask, named by the object's group."""
     mask, group = case.scene.mask, case.scene.thing.group
     truth = case.truth * case.gain
@@ -204,7 +207,7 @@ def figures(case: Case, picture: Array, thickness: Array | None) -> dict[str, fl
         found["lpips"] = distance
     if thickness is not None:
         true = case.scene.front.thickness
-        found["thickness"] = float(np.abs(thickness - true)[mask].sum() / true[mask].sum())
+        found["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
     return {f"{name}_{group}": value for name, value in found.items()}
 
 

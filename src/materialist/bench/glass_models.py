@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _light, _mesh, path_traced
+from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
 
 
@@ -37,6 +38,7 @@ def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> 
     from materialist.color import linear_to_srgb
     from materialist.edit.behind import SKY, behind
     from materialist.edit.exemplar import exemplar_plan
+    from materialist.edit.regular import regular_sources
     from materialist.geometry.membrane import membrane
 
     hole = _grown(scene.mask)
@@ -47,7 +49,9 @@ def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> 
         plane = planes_of(scene, depth, normal)
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
-    plan = exemplar_plan(linear_to_srgb(photo * gain), hole, np.ones_like(hole), label)
+    seen, anywhere = linear_to_srgb(photo * gain), np.ones_like(hole)
+    told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
+    plan = exemplar_plan(seen, hole, anywhere, label, told=told)
     picture = membrane(photo, ~hole) if plan is None else plan.fill(photo)
     return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal)
 
@@ -60,7 +64,7 @@ def _grown(mask: Array) -> Array:
 
 
 def two_interface(
-    scene: GlassScene, thickness: Array, behind: Background, envmap: Array, ior: float, back: str = "mirrored"
+    scene: GlassScene, thickness: Array, behind: Background, envmap: Array, ior: float, back: str | Array = "mirrored"
 ) -> Array:
     """[H, W, 3] linear, inside the object's mask: the paper's model."""
     from materialist.edit.two_interface import two_interface as model
@@ -73,7 +77,7 @@ def two_interface(
 
 
 def closed_proxy(
-    scene: GlassScene, thickness: Array, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
+    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
 ) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced.
 
@@ -83,7 +87,9 @@ def closed_proxy(
     from materialist.geometry.closed import closed_proxy as close
 
     front = scene.front
-    shell = close(front.depth, front.normal, scene.mask, thickness, scene.camera, behind=behind.depth)
+    shell = close(
+        front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=behind.depth, back=found.back
+    )  # fmt: skip
     return before(scene, shell, behind, envmap, ior, spp=spp, seed=seed)
 
 
@@ -149,11 +155,12 @@ def plain_background(scene: GlassScene, behind: Background) -> Array:
     return np.where(scene.mask[..., None], behind.picture, 0).astype(np.float32)
 
 
-def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str, Array]:
-    """[H, W] thickness along the camera rays by where it comes from.
+def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str, Thickness]:
+    """Thickness along the camera rays, and the normals of the back, by where they come from.
 
     'true', 'predicted' (what `materialist glass` takes by itself), 'network' (RefractionNet alone, where its weights
-    are), 'symmetry'. The upright direction comes from the floor of the background, where there is one.
+    are), 'symmetry'. Where the normals are None they are those of the thickness: 'true' leaves out what the true ones
+    add. The upright direction comes from the floor of the background, where there is one.
     """
     from materialist.errors import WeightsError
     from materialist.geometry.half_turn import upright
@@ -164,11 +171,13 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     front: Front = scene.front
     seen = (photo, scene.mask, front.normal, front.depth, scene.camera)
     up = upright(behind.depth, behind.normal, planes_of(scene, behind.depth, behind.normal), scene.camera)
-    found = {"true": front.thickness, "predicted": best_thickness(*seen, up=up).thickness.solid}
+    found = {
+        "true": Thickness(front.thickness, front.thickness), "predicted": best_thickness(*seen, up=up).thickness
+    }  # fmt: skip
     with suppress(WeightsError):  # the others still tell something
-        found["network"] = thickness(*seen).solid
-    found["symmetry"] = symmetric_thickness(front.depth, front.normal, scene.mask, scene.camera)
-    return found
+        found["network"] = thickness(*seen)
+    mirrored = symmetric_thickness(front.depth, front.normal, scene.mask, scene.camera)
+    return {**found, "symmetry": Thickness(mirrored, mirrored)}
 
 
 def planes_of(scene: GlassScene, depth: Array, normal: Array) -> Array:

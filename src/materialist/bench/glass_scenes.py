@@ -51,6 +51,8 @@ class Front:
     """[H, W, 3] unit, camera frame, towards the viewer."""
     thickness: Array
     """[H, W] from the first to the last surface along the ray."""
+    back: Array
+    """[H, W, 3] unit normal of that last surface, away from the viewer."""
 
 
 def things(data: Path | None, count: int, seed: int = 0) -> list[Thing]:
@@ -160,7 +162,7 @@ class GlassScene:
         if not self.room:
             size = (self.camera.height, self.camera.width)
             normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*size, 3))
-            return Front(np.zeros(size, np.float32), normal, np.zeros(size, np.float32))
+            return Front(np.zeros(size, np.float32), normal, np.zeros(size, np.float32), -normal)
         return seen(joined([i.solid for i in self.room]), self.camera)
 
     @cached_property
@@ -195,15 +197,20 @@ def seen(solid: Solid, camera: Camera) -> Front:
     direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
     found = Tracer(solid).trace(np.zeros_like(direction), direction)
     hit = np.isfinite(found.first)
-    normal = found.normal / np.maximum(np.linalg.norm(found.normal, axis=-1, keepdims=True), 1e-12)
-    normal = np.where(np.sum(normal * direction, -1, keepdims=True) > 0, -normal, normal)
-    normal = np.where(hit[:, None], normal, [0, 0, 1])
+    normal = _towards(np.where(hit[:, None], found.normal, [0, 0, 1]), direction, -1)
+    back = _towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)
     thickness = found.solid * np.linalg.norm(direction, axis=-1)
     depth = np.where(hit, found.first, 0)
     return Front(
         depth.reshape(shape).astype(np.float32), normal.reshape(*shape, 3).astype(np.float32),
-        thickness.reshape(shape).astype(np.float32),
+        thickness.reshape(shape).astype(np.float32), back.reshape(*shape, 3).astype(np.float32),
     )  # fmt: skip
+
+
+def _towards(normal: Array, direction: Array, sign: int) -> Array:
+    """[N, 3] unit normals on the side of directions [N, 3] that `sign` says."""
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    return np.where(sign * np.sum(normal * direction, -1, keepdims=True) < 0, -normal, normal)
 
 
 def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int = 0) -> Array:

@@ -22,7 +22,9 @@ def bench(
     context: typer.Context,
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="invert, batch, light, materials, whdr, predictor, glass, edit, studio."),
+        typer.Argument(
+            metavar="NAME", help="invert, batch, light, materials, whdr, predictor, thickness, glass, edit, studio."
+        ),
     ],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,

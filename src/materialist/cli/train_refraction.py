@@ -29,6 +29,7 @@ def refraction(
     minutes: Minutes = None,
     batch: Annotated[int, typer.Option(help="Views a step.")] = 32,
     rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 2e-3,
+    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False,
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,
@@ -52,8 +53,9 @@ def refraction(
 
         budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
         trainer = Trainer(
-            output, train, aside, budget=budget, recipe=Recipe(batch=batch, rate=rate), seed=seed, every=every,
-            resume=resume, note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
+            output, train, aside, budget=budget, recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16),
+            seed=seed, every=every, resume=resume,
+            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
         )  # fmt: skip
         figures = trainer.run(progress)
     lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]

@@ -86,7 +86,7 @@ def _shell(scene: Scene, removed: Scene, own: Array, found: ObjectThickness, hol
     """The closed object in front of what is behind it now."""
     return closed_proxy(
         scene.depth, scene.normal, own, found.solid, scene.camera, smooth=smooth,
-        wall=found.wall if hollow else None, behind=removed.depth,
+        wall=found.wall if hollow else None, behind=removed.depth, back=found.back,
     )  # fmt: skip
 
 

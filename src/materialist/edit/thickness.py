@@ -30,6 +30,8 @@ class ObjectThickness:
     """Of the object, were it hollow."""
     method: str
     """Which method it comes from: `lathe`, `half-turn`, `network`, `symmetry` or `given`."""
+    back: Array | None = None
+    """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
 
 
 def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "auto") -> ObjectThickness:
@@ -64,7 +66,7 @@ def _by_network(scene: Scene, inside: Array, size: float) -> ObjectThickness:
     from materialist.predict.refraction import thickness
 
     found = thickness(scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
-    return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network")
+    return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network", found.back)
 
 
 def _chosen(scene: Scene, inside: Array, size: float, method: str) -> ObjectThickness:
@@ -78,7 +80,8 @@ def _chosen(scene: Scene, inside: Array, size: float, method: str) -> ObjectThic
     solid = choice.thickness.solid
     if choice.method == "symmetry":
         solid = _mirrored(scene, inside)
-    return ObjectThickness(solid, _wall(scene, inside, choice.thickness, size), choice.method)
+    wall = _wall(scene, inside, choice.thickness, size)
+    return ObjectThickness(solid, wall, choice.method, choice.thickness.back)
 
 
 def _wall(scene: Scene, inside: Array, found, size: float) -> float:

@@ -61,7 +61,7 @@ class Crossing:
 def two_interface(
     camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, background_depth: Array,
     background: Array, envmap: Array, *, ior: float = 1.5, transmission: float = 1.0,
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, back: str = "mirrored",
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, back: str | Array = "mirrored",
 ) -> Array:  # fmt: skip
     """The object under the mask as glass.
 
@@ -75,7 +75,7 @@ def two_interface(
         envmap: [h, 2h, 3] linear radiance: reflections, and what rays meet that leave the picture.
         ior: index of refraction, 1 to 3. transmission: T in [0, 1]. tint: linear RGB in [0, 1].
         roughness: perceptual r in [0, 1]; alpha = r^2.
-        back: see BACKS.
+        back: see BACKS; or the back's own outward normals [H, W, 3], unit, read at the exit's place in the picture.
 
     Returns:
         [H, W, 3] float32 linear radiance inside the mask, 0 outside.
@@ -83,18 +83,19 @@ def two_interface(
     Raises:
         InputError: options out of range, or maps of another size than the camera's.
     """
-    _check(ior, transmission, tint, roughness, back)
+    kind, own = (back, None) if isinstance(back, str) else ("mirrored", back)
+    _check(ior, transmission, tint, roughness, kind)
     inside = surface_in(mask, depth, camera)
     for name, value in (("thickness", thickness), ("background depth", background_depth), ("normals", normal),
                         ("background", background)):  # fmt: skip
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
     behind = Behind(background, background_depth, envmap)
-    front = Front(camera, normal, depth, inside)
+    front = Front(camera, normal, depth, inside, own)
     count = SAMPLES if roughness > 0 else 1
     total = np.zeros((int(inside.sum()), 3))
     for k in range(count):
-        crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=back)
+        crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
         seen = crossing.share[:, None] * look(crossing.exit, crossing.direction, behind, camera)
         mirror = crossing.reflectance[:, None] * environment(crossing.reflected, envmap)
         total += seen * transmission * np.asarray(tint, float) + mirror
@@ -104,9 +105,9 @@ def two_interface(
 
 
 class Front:
-    """The visible surface of the object: its points, and its normals also just outside the mask."""
+    """The visible surface of the object: its points, and its normals also just outside the mask; its back, if known."""
 
-    def __init__(self, camera: Camera, normal: Array, depth: Array, inside: Array):
+    def __init__(self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None):
         from scipy.ndimage import distance_transform_edt
 
         self.camera = camera
@@ -116,12 +117,23 @@ class Front:
         self.normal = _facing(normal[inside].astype(np.float64), self.direction)  # [N, 3]
         rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
         self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
+        self._backs = None if back is None else back[rows, columns].astype(np.float64)
 
     def normal_at(self, point: Array) -> Array:
         """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
+        return _facing(self._read(self._normals, point), _unit(point))
+
+    def back_at(self, point: Array, kind: str) -> Array:
+        """[N, 3] the back's outward unit normal at points [N, 3]: its own where it is known, else see BACKS."""
+        if self._backs is not None:
+            return self._read(self._backs, point)
+        front = self.normal_at(point)
+        return -front if kind == "same" else reflect(front, _unit(point))
+
+    def _read(self, normals: Array, point: Array) -> Array:
         place, _ = project(point, self.camera)
-        found = bilinear(self._normals, place)
-        return _facing(found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9), _unit(point))
+        found = bilinear(normals, place)
+        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
 
 
 def cross(
@@ -139,7 +151,7 @@ def cross(
     reflectance = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
     share = (1 - reflectance) * _unmasked(inner, front.normal, alpha, below=True)
     exit_point = front.point + d1[:, None] * inner
-    outward = _back_normal(front.normal_at(exit_point), _unit(exit_point), back)
+    outward = front.back_at(exit_point, back)
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
     against = -_facing(outward, -inner)
     facet = visible_facet(inner, against, alpha, points[2], points[3])
@@ -157,13 +169,6 @@ def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool
         return np.ones(len(direction))
     side = np.where(below, -1.0, 1.0) * np.sum(direction * normal, -1)
     return np.where(side > 0, masking(direction, normal, alpha), 0)
-
-
-def _back_normal(front: Array, view: Array, back: str) -> Array:
-    """[N, 3] outward normal of the back below a front normal, seen along view [N, 3]."""
-    if back == "same":
-        return -front
-    return reflect(front, view)
 
 
 def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:

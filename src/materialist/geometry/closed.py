@@ -2,12 +2,13 @@
 
 The paper bends a camera ray twice at front normals and needs no back side. A closed surface can be path-traced:
 reflections inside, total internal reflection, shadows and caustics then come by themselves. What light does at glass is
-decided by normals, hardly by places: the front has those of the map, the back those of planes fitted to its depth.
+decided by normals, hardly by places: the front has those of the map, the back those that are known of it, else those
+of planes fitted to its depth.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,7 +40,7 @@ THIN = 0.004
 
 def closed_proxy(
     depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *, smooth: float = 0.01,
-    wall: Array | float | None = None, behind: Array | None = None,
+    wall: Array | float | None = None, behind: Array | None = None, back: Array | None = None,
 ) -> Shell:  # fmt: skip
     """The closed object behind a mask.
 
@@ -51,6 +52,7 @@ def closed_proxy(
         smooth: blur of the normals of front and back, as a part of the object's size (the root of its area); 0: none.
         wall: the object is hollow: thickness of its wall, scene units, or [H, W]. A second surface is added inside.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
+        back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
 
     Returns:
         A watertight surface: every edge has two faces that run through it in opposite directions.
@@ -61,7 +63,9 @@ def closed_proxy(
     """
     inside = surface_in(mask, depth, camera)
     _check(normal, thickness, inside)
-    view = _window(depth, normal, inside, thickness, behind, camera)
+    if back is not None and back.shape != normal.shape:
+        raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
+    view = _window(depth, normal, inside, thickness, behind, back, camera)
     front = smooth_front(view.depth, view.normal, view.inside, view.rays, smooth=smooth)
     thick = _thickness(view, front)  # [h, w]
     shell = _closed(view, front, thick, smooth, camera)
@@ -80,6 +84,7 @@ class _View:
     inside: Array
     thickness: Array
     behind: Array
+    back: Array | None
     rays: Array
     """[h, w, 3] through the pixels at z = -1."""
     left: int
@@ -102,7 +107,7 @@ def _check(normal: Array, thickness: Array, inside: Array) -> None:
         raise InputError(f"The thickness goes from {own.min():g} to {own.max():g}; it must be finite, >= 0, not all 0.")
 
 
-def _window(depth, normal, inside, thickness, behind, camera: Camera) -> _View:
+def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
     edge = MARGIN + 1
     rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
     top, left = rows[0] - edge, columns[0] - edge
@@ -117,10 +122,10 @@ def _window(depth, normal, inside, thickness, behind, camera: Camera) -> _View:
             ((camera.height / 2 - y - 0.5) / camera.focal)[:, None], np.array(-1.0),
         ), -1,
     )  # fmt: skip
-    back = np.zeros(inside.shape) if behind is None else np.asarray(behind)
+    beyond = np.zeros(inside.shape) if behind is None else np.asarray(behind)
     return _View(
         np.asarray(depth)[i, j], np.asarray(normal)[i, j], inside[i, j] & near, np.asarray(thickness)[i, j],
-        back[i, j], rays, int(left), int(top),
+        beyond[i, j], None if back is None else np.asarray(back)[i, j], rays, int(left), int(top),
     )  # fmt: skip
 
 
@@ -147,7 +152,7 @@ def _cavity(view: _View, front: Array, thick: Array, wall, smooth: float, camera
     room = view.inside & (left > THIN * view.size * pixel) & (border_distance(view.inside) * pixel > wall)
     if room.sum() < 16:
         return None
-    inner = _View(view.depth, view.normal, room, left, view.behind, view.rays, view.left, view.top)
+    inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
     return _closed(inner, front + through / length, np.where(room, left, 0), smooth, camera)
 
 
@@ -171,7 +176,10 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     own = np.exp(at(middle)) - through / (2 * at(length))
     through = np.maximum(np.minimum(through, at(_room(view, front))), LEAST * own)
     sigma = smooth * view.size
-    back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
+    if view.back is None:
+        back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
+    else:
+        back = blurred_normals(view.back, known, sigma)
     front_normal, back_normal = (_between(n, known, place) for n in (blurred_normals(view.normal, known, sigma), back))
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)

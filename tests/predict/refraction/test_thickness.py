@@ -8,7 +8,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.symmetry import symmetric_thickness
 from materialist.predict.refraction import WEIGHTS, thickness, weights
-from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, SIDE, Window, features
+from materialist.predict.refraction.crop import BACK_X, CHANNELS, MASK, MIRROR, SIDE, Window, features
 from materialist.predict.refraction.network import LEAST, Architecture, RefractionNet
 from materialist.types import Camera
 
@@ -50,6 +50,13 @@ def test_an_untrained_network_gives_the_symmetry_prior(plain, size):
     np.testing.assert_allclose(found.hollow[mask], found.solid[mask] / 2, rtol=1e-4)
     assert found.solid.shape == mask.shape and found.solid.dtype == np.float32
     assert (found.solid[~mask] == 0).all() and (found.hollow[~mask] == 0).all()
+    # Its back is the front mirrored at the plane across the ray to the object's middle.
+    ahead = pixel_rays(camera)[mask].mean(0)
+    ahead /= np.linalg.norm(ahead)
+    back = normal - 2 * (normal @ ahead)[..., None] * ahead
+    assert (found.back[~mask] == 0).all()
+    np.testing.assert_allclose(np.linalg.norm(found.back[mask], axis=-1), 1, rtol=1e-5)
+    assert np.quantile((found.back * back).sum(-1)[mask], 0.1) > 0.97
 
 
 def test_thickness_is_in_scene_units(plain):
@@ -115,7 +122,10 @@ def test_the_network_is_bounded_and_zero_outside():
     torch.nn.init.normal_(network.head.weight, std=3)
     maps = torch.rand(2, CHANNELS, 64, 64)
     maps[:, MASK] = (maps[:, MASK] > 0.5).float()
-    solid, hollow = network(maps).unbind(1)
+    answer = network(maps)
+    solid, hollow, back = answer[:, 0], answer[:, 1], answer[:, BACK_X:]
+    length = back.square().sum(1).sqrt()[maps[:, MASK] > 0]
+    torch.testing.assert_close(length, torch.ones_like(length), rtol=1e-4, atol=1e-4)
     assert (solid[maps[:, MASK] == 0] == 0).all() and (hollow <= solid).all()
     assert (solid <= (maps[:, MIRROR] + LEAST) * np.exp(3.001)).all()
 
@@ -126,4 +136,4 @@ def test_the_shipped_weights_know_a_ball():
     photo, mask, normal, depth, true = ball(camera)
     found = thickness(photo, mask, normal, depth, camera)
     assert np.abs(found.solid - true)[mask].sum() < 0.25 * true[mask].sum()
-    assert WEIGHTS.stat().st_size < 6e6
+    assert WEIGHTS.stat().st_size < 15e6

@@ -37,6 +37,8 @@ def test_chords_of_a_ball():
     np.testing.assert_allclose(found.first[:4], 3 - chord[:4] / 2, atol=3e-3)
     normal = found.normal[:4] / np.linalg.norm(found.normal[:4], axis=-1, keepdims=True)
     np.testing.assert_allclose(normal[:, 0], x[:4] / RADIUS, atol=5e-3)
+    leaving = found.exit_normal[:4] / np.linalg.norm(found.exit_normal[:4], axis=-1, keepdims=True)
+    np.testing.assert_allclose(leaving, normal * [1, 1, -1], atol=1e-2)
 
 
 def test_lengths_are_in_units_of_the_direction():

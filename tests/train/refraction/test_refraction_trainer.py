@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from materialist.cli import app
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
-from materialist.predict.refraction.crop import MASK, MIRROR, SIDE
+from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.train.budget import Budget
 from materialist.train.refraction import lessons, scores, trainer
 from materialist.train.refraction.trainer import Recipe, Trainer
@@ -34,7 +34,7 @@ def test_it_learns_resumes_and_leaves_weights(views, tmp_path):
     resumed = Trainer(run, views, views, budget=Budget(steps=3), recipe=RECIPE, resume=True)
     assert resumed.clock.step == 3
     figures = resumed.run()
-    assert figures.keys() >= {"solid", "symmetry", "hollow"}
+    assert figures.keys() >= {"solid", "symmetry", "hollow", "back", "back_symmetry"}
     network, facts = weights.load(run / "weights.safetensors")
     assert facts["step"] == 6 and facts["recipe"]["batch"] == 4
     again = scores.score(network, lessons.load(views))
@@ -74,6 +74,24 @@ def test_relative_errors():
     assert scores.relative_error(truth * [[[1.5]], [[1.0]]], truth, inside).tolist() == [0.5, 0]
     mixed = np.where(np.arange(4) < 2, 2.0, 0.01) * truth
     assert scores.pixel_error(mixed * 1.25, mixed, inside).tolist() == pytest.approx([0.25, 0.25])
+
+
+def test_angles_between_backs():
+    turned = np.zeros((1, 3, 4, 4))
+    turned[:, 0], turned[:, 2] = np.sin(np.radians(30)), -np.cos(np.radians(30))
+    straight = np.zeros((1, 3, 4, 4))
+    straight[:, 2] = -1
+    assert scores.degrees(turned, straight, np.ones((1, 4, 4), bool)).tolist() == pytest.approx([30])
+
+
+def test_a_mirrored_view_is_a_view_of_the_mirrored_shape(views):
+    """Flipped lessons keep what the mirror image of a shape would have: x turns around, in front and behind."""
+    full = {name: value[:1] for name, value in lessons.load(views).items()}
+    seeds = [s for s in range(20) if np.random.default_rng(s).random(1)[0] < 0.5]
+    flipped = trainer.prepared(full, np.array([0]), np.random.default_rng(seeds[0]))
+    for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
+                                ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
+        np.testing.assert_array_equal(flipped[name][0, channel].numpy(), sign * full[name][0, channel, :, ::-1])
 
 
 def test_bad_recipes_are_refused():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, SIDE
+from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.train.data import solids
 from materialist.train.refraction import lessons, view
 from materialist.train.refraction.glassware import Shape, shape
 from materialist.train.refraction.paths import Tracer
 
 
-@pytest.mark.parametrize("index", range(16))
+@pytest.mark.parametrize("index", range(20))
 def test_every_kind_of_shape_is_usable(index):
     made = shape(index)
     vertices = made.solid.vertices
@@ -31,7 +31,7 @@ def test_every_kind_of_shape_is_usable(index):
 
 def test_shapes_depend_on_their_numbers_alone():
     assert np.array_equal(shape(3).solid.vertices, shape(3).solid.vertices)
-    others = shape(19), shape(3, "heldout"), shape(3, seed=1)  # the same kind as 3
+    others = shape(23), shape(3, "heldout"), shape(3, seed=1)  # the same kind as 3
     assert all(not np.array_equal(shape(3).solid.vertices, o.solid.vertices) for o in others)
 
 
@@ -43,7 +43,7 @@ def ball():
 def test_a_balls_view_is_consistent(ball):
     lesson = view.lesson(ball, Tracer(ball.solid), np.random.default_rng(1), exact=True)
     maps, target = lesson.maps.astype(float), lesson.target.astype(float)
-    assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (2, SIDE, SIDE)
+    assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (ANSWERS, SIDE, SIDE)
     inside = maps[MASK] > 0.5
     assert np.array_equal(inside, target[0] > 0)
     assert (maps[:, ~inside] == 0).all()
@@ -51,6 +51,10 @@ def test_a_balls_view_is_consistent(ball):
     assert target[0].max() == pytest.approx(2 / np.sqrt(np.pi), rel=0.15)
     assert np.abs(maps[MIRROR] - target[0])[inside].mean() < 0.06 * target[0][inside].mean()
     np.testing.assert_allclose(target[0], target[1], atol=0.02)
+    # A ball's back is its front in a mirror.
+    front = maps[NORMAL_X : NORMAL_X + 3] * np.array([1, 1, -1])[:, None, None]
+    inner = inside & (maps[7] > 0.35)
+    assert (front * target[BACK_X:]).sum(0)[inner].mean() > 0.97
     # Seen normals look towards the viewer: n.v is positive, largest in the middle.
     assert maps[7][inside].min() > -1e-3 and maps[7].max() > 0.98
 
@@ -63,15 +67,16 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
     stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
     plain = replace(pose, stretch=np.eye(3))
     rays = view.window_rays(stretched.vertices @ pose.to_camera.T + pose.centre)
-    a, normal_a = view.look(Tracer(ball.solid), pose, rays)
-    b, normal_b = view.look(Tracer(stretched), plain, rays)
+    a, normal_a, back_a = view.look(Tracer(ball.solid), pose, rays)
+    b, normal_b, back_b = view.look(Tracer(stretched), plain, rays)
     both = np.isfinite(a.first) & np.isfinite(b.first)
     assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
     np.testing.assert_allclose(a.solid[both], b.solid[both], atol=6e-3)
     inner = both & (a.solid > 0.3)
-    agreement = np.sum(normal_a.reshape(-1, 3)[inner] * normal_b.reshape(-1, 3)[inner], -1)
-    assert np.median(agreement) > 0.999
+    for one, two in ((normal_a, normal_b), (back_a, back_b)):
+        agreement = np.sum(one.reshape(-1, 3)[inner] * two.reshape(-1, 3)[inner], -1)
+        assert np.median(agreement) > 0.999
 
 
 def test_views_are_made_once_and_belong_to_their_plan(tmp_path):

@@ -51,7 +51,8 @@ def best_thickness(
         prefer: `auto`, or `half-turn`: the turn in any case.
 
     Returns:
-        Thickness as of `thickness`; `hollow` is 0 where there are no weights.
+        Thickness as of `thickness`; `hollow` is 0 where there are no weights, `back` None where the depth of the back
+        says more about it than the network.
 
     Raises:
         InputError: maps of different sizes, or a mask without any surface.
@@ -74,5 +75,5 @@ def best_thickness(
 
 
 def _as_thick(guess: Thickness, solid: Array) -> Thickness:
-    """The guess with another solid thickness [H, W]."""
-    return replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid))
+    """The guess with another solid thickness [H, W], whose own slopes are those of the back."""
+    return replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid), back=None)

@@ -107,9 +107,8 @@ def features(view: View) -> Array:
     Lengths are in units of the object's size, directions in the frame of the ray through the window's centre, so that
     neither the place in the picture nor the scene's scale matters.
     """
-    centre = view.rays[len(view.rays) // 2, view.rays.shape[1] // 2].astype(np.float64)
     length = np.linalg.norm(view.rays, axis=-1)
-    normal = view.normal @ _frame(centre / np.linalg.norm(centre)).T
+    normal = view.normal @ to_window(view.rays).T
     facing = -np.sum(view.normal * view.rays, -1) / length
     size = view.size
     distance = view.depth * length
@@ -126,11 +125,17 @@ MIRROR = 9
 MASK = 6
 """The channel of `features` that holds the mask."""
 NORMAL_X = 3
-"""The channel of `features` that changes its sign in a mirror."""
+"""The channel of `features` that changes its sign in a mirror; the other two of the normal follow it."""
+BACK_X = 2
+"""The channel of the network's answer that does, with the other two of the back's normal after it."""
+ANSWERS = 5
+"""Channels of the answer: solid and hollow thickness, the back's normal."""
 
 
-def _frame(forward: Array) -> Array:
-    """[3, 3] rows: right, up and back of a camera that looks along the unit vector `forward` [3], level."""
+def to_window(rays: Array) -> Array:
+    """[3, 3] rotation of camera directions into the network's frame: level, -Z along the middle of rays [S, S, 3]."""
+    forward = rays[len(rays) // 2, rays.shape[1] // 2].astype(np.float64)
+    forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 1, 0])
     right /= max(np.linalg.norm(right), 1e-9)
     return np.stack([right, np.cross(right, forward), -forward])

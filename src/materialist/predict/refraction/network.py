@@ -1,7 +1,9 @@
-"""RefractionNet: a small U-Net from the maps of an object to its thickness.
+"""RefractionNet: a small U-Net from the maps of an object to its thickness and the normals of its back.
 
 The paper has the decoder of its depth prediction here. This one sees the photo, the geometry, and the thickness by
-symmetry, and answers with a factor on the latter: it starts as the symmetry prior and learns where that is wrong.
+symmetry, and answers with a factor on the latter and a turn of the mirrored normals: it starts as the symmetry prior
+and learns where that is wrong. Normals have an answer of their own because glass is decided by them, and a soft map of
+thickness says little about which way the back leans.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.predict.refraction.crop import CHANNELS, MASK, MIRROR, NORMAL_X
+from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X
 
 STRIDE = 32
 """Sides of the input are multiples of this."""
@@ -25,7 +27,7 @@ LEAST = 0.05
 class Architecture:
     """Widths; stored with the weights."""
 
-    widths: tuple[int, ...] = (24, 48, 80, 112, 128)
+    widths: tuple[int, ...] = (32, 64, 96, 128, 160)
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
     blocks: tuple[int, ...] = (1, 1, 2, 2, 2)
     """Residual blocks of the encoder at each."""
@@ -42,7 +44,7 @@ class Architecture:
 
 
 class RefractionNet(nn.Module):
-    """Features of an object in, solid and hollow thickness out."""
+    """Features of an object in, solid and hollow thickness and normals of the back out."""
 
     def __init__(self, architecture: Architecture | None = None):
         super().__init__()
@@ -53,19 +55,20 @@ class RefractionNet(nn.Module):
         self.downs = nn.ModuleList(nn.Conv2d(w[k], w[k + 1], 3, stride=2, padding=1) for k in range(len(w) - 1))
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(len(w) - 1))
         self.decoders = nn.ModuleList(_Block(w[k]) for k in range(len(w) - 1))
-        self.head = nn.Conv2d(w[0], 8, 3, padding=1)
+        self.head = nn.Conv2d(w[0], 4 * ANSWERS, 3, padding=1)
         nn.init.zeros_(self.head.weight)
         assert self.head.bias is not None
         nn.init.zeros_(self.head.bias)
 
     def forward(self, maps: Tensor) -> Tensor:
-        """Thickness of a batch of objects.
+        """Thickness and back of a batch of objects.
 
         Args:
             maps: [B, CHANNELS, S, S] float32 of `crop.features`; S a multiple of 32.
 
         Returns:
-            [B, 2, S, S] float32, in units of the object's size, 0 outside its mask: solid, and hollow <= solid.
+            [B, 5, S, S] float32, 0 outside the mask: solid thickness, in units of the object's size; hollow <= solid;
+            the outward normal of the last surface, unit, in the frame of the features, away from the viewer.
         """
         x = self.levels[0](self.stem(F.pixel_unshuffle(maps, 2)))
         skips = []
@@ -77,14 +80,24 @@ class RefractionNet(nn.Module):
         raw = F.pixel_shuffle(self.head(F.silu(x)), 2).float()
         inside = maps[:, MASK : MASK + 1]
         solid = (maps[:, MIRROR : MIRROR + 1] + LEAST) * (3 * torch.tanh(raw[:, :1] / 3)).exp()
-        return torch.cat([solid, solid * raw[:, 1:].sigmoid()], 1) * inside
+        normal = maps[:, NORMAL_X : NORMAL_X + 3]
+        mirrored = torch.cat([normal[:, :2], -normal[:, 2:]], 1)
+        return torch.cat([solid, solid * raw[:, 1:2].sigmoid(), unit(mirrored + raw[:, 2:])], 1) * inside
 
 
 def both_ways(network: RefractionNet, maps: Tensor) -> Tensor:
-    """The mean [B, 2, S, S] of what the network says of maps [B, CHANNELS, S, S] and of their mirror image."""
+    """The mean [B, 5, S, S] of what the network says of maps [B, CHANNELS, S, S] and of their mirror image."""
     mirrored = maps.flip(-1)
     mirrored[:, NORMAL_X] = -mirrored[:, NORMAL_X]
-    return (network(maps) + network(mirrored).flip(-1)) / 2
+    other = network(mirrored).flip(-1)
+    other[:, BACK_X] = -other[:, BACK_X]
+    mean = (network(maps) + other) / 2
+    return torch.cat([mean[:, :BACK_X], unit(mean[:, BACK_X:])], 1)
+
+
+def unit(vectors: Tensor) -> Tensor:
+    """Vectors [B, 3, S, S] of length 1; none stay none."""
+    return vectors / vectors.square().sum(1, keepdim=True).clamp(min=1e-8).sqrt()
 
 
 class _Block(nn.Module):

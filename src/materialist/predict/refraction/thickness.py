@@ -12,7 +12,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.symmetry import surface_in
-from materialist.predict.refraction.crop import Window, features
+from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
 from materialist.types import Array, Camera
 
 if TYPE_CHECKING:
@@ -30,12 +30,14 @@ class Thickness:
     """[H, W] float32 scene units: from the first to the last point of its outer surface; 0 outside the mask."""
     hollow: Array
     """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`."""
+    back: Array | None = None
+    """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
 
 
 def thickness(
     photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, weights: str | Path = ""
 ) -> Thickness:
-    """The thickness of the object under a mask, as RefractionNet predicts it.
+    """The thickness and the back of the object under a mask, as RefractionNet predicts them.
 
     Args:
         photo_linear: [H, W, 3] linear Rec.709.
@@ -46,7 +48,8 @@ def thickness(
         weights: a .safetensors file from `materialist train refraction`, or "" for those in the package.
 
     Returns:
-        Both thicknesses along the straight camera rays, in the units of `depth`; the same input gives the same result.
+        Both thicknesses along the straight camera rays, in the units of `depth`, and the normals where those rays
+        leave the object; the same input gives the same result.
 
     Raises:
         InputError: maps of different sizes, or a mask without any surface.
@@ -59,15 +62,18 @@ def thickness(
     network, _ = _loaded(Path(weights) if str(weights) else WEIGHTS)
     window = Window.around(inside)
     view = window.cut(photo_linear, inside, normal, depth, pixel_rays(camera))
-    found = run(network, features(view))  # [2, S, S] in units of the object's size
+    found = run(network, features(view))  # [5, S, S], lengths in units of the object's size
     if not np.isfinite(found).all():
         raise WeightsError(f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS}).")
-    solid, hollow = (window.put_back(channel * view.size, view.inside, inside) for channel in found)
-    return Thickness(solid, np.minimum(hollow, solid))
+    solid, hollow = (window.put_back(channel * view.size, view.inside, inside) for channel in found[:BACK_X])
+    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
+    back = np.stack([window.put_back(channel, view.inside, inside) for channel in np.moveaxis(turned, -1, 0)], -1)
+    back /= np.maximum(np.linalg.norm(back, axis=-1, keepdims=True), 1e-6)
+    return Thickness(solid, np.minimum(hollow, solid), back)
 
 
 def run(network: RefractionNet, maps: Array) -> Array:
-    """[2, S, S] float32 solid and hollow thickness in units of the object's size, of features [C, S, S]."""
+    """[5, S, S] float32 of features [C, S, S], see `RefractionNet.forward`: the mean over both ways to see them."""
     import torch
 
     from materialist.predict.refraction.network import both_ways

@@ -14,6 +14,7 @@ import numpy as np
 from materialist.bench import shapes
 from materialist.bench.shapes import Solid
 from materialist.train.data import solids
+from materialist.train.refraction.grown import creature
 from materialist.types import Array
 
 SPLITS = {"train": 71, "heldout": 72}
@@ -190,6 +191,10 @@ def _figure(rng: np.random.Generator) -> tuple[Solid, bool]:
     return replace(body, normals=solids.smooth_normals(body.vertices, body.faces)), False
 
 
+def _creature(rng: np.random.Generator) -> tuple[Solid, bool]:
+    return creature(rng), False
+
+
 def _stick(rng: np.random.Generator) -> tuple[Solid, bool]:
     """Bars, tubes, cones, hooks: round along a bent line."""
     t = np.linspace(0, 1, 28)
@@ -206,9 +211,10 @@ def _stick(rng: np.random.Generator) -> tuple[Solid, bool]:
 _KINDS: dict[str, Callable[[np.random.Generator], tuple[Solid, bool]]] = {
     "body": _body, "vase": _vase, "superquadric": _superquadric, "figure": _figure, "cup": _cup, "blob": _blob,
     "bottle": _bottle, "twisted": twisted, "box": _box, "mug": _mug, "goblet": _goblet, "figure 2": _figure,
-    "body 2": _body, "ring": _ring, "stick": _stick, "blob 2": _blob,
+    "body 2": _body, "ring": _ring, "stick": _stick, "blob 2": _blob, "creature": _creature, "creature 2": _creature,
+    "creature 3": _creature, "creature 4": _creature,
 }  # fmt: skip
-_ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2")
+_ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2", "creature 2")
 
 
 def centred(solid: Solid) -> Solid:

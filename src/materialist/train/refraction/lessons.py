@@ -19,7 +19,7 @@ from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
 DESCRIPTION = "lessons.json"
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> f
 
 
 def views(index: int, plan: Plan) -> dict[str, Array]:
-    """Views of shape `index`: maps [V, CHANNELS, S, S] and target [V, 2, S, S] float16, hollow [V] bool."""
+    """Views of shape `index`: maps [V, CHANNELS, S, S] and target [V, 5, S, S] float16, hollow [V] bool."""
     chosen = shape(index, plan.split, plan.seed)
     tracer = Tracer(chosen.solid)
     rng = np.random.default_rng([plan.seed, SPLITS[plan.split], index, 1])

@@ -26,6 +26,8 @@ class Paths:
     """[N, 3] float64 shading normal there, outwards, not normalised."""
     last: Array
     """[N] distance of the last surface; as `first` where there is one alone."""
+    exit_normal: Array
+    """[N, 3] float64 shading normal at the last surface, not normalised."""
     material: Array
     """[N] length inside the material, told by which way the surfaces face: the walls of a hollow object."""
 
@@ -56,7 +58,8 @@ class Tracer:
         """Follow straight rays (origin and direction [N, 3]) through everything they meet."""
         count = len(direction)
         first, last, material = np.full(count, np.inf), np.zeros(count), np.zeros(count)
-        normal, depth = np.zeros((count, 3)), np.zeros(count, int)  # depth: how many surfaces the ray is inside of
+        normal, leaving = np.zeros((count, 3)), np.zeros((count, 3))
+        depth = np.zeros(count, int)  # how many surfaces the ray is inside of
         alive, at = np.arange(count), np.zeros(count)
         step = AHEAD / np.linalg.norm(direction, axis=-1)
         for k in range(MOST):
@@ -66,16 +69,16 @@ class Tracer:
             if not len(alive):
                 break
             reached = at[alive] + t
+            leaving[alive] = self._shading(face, uv)
             if k == 0:
-                first[alive] = reached
-                normal[alive] = self._shading(face, uv)
+                first[alive], normal[alive] = reached, leaving[alive]
             # The way that the previous surface opened; nothing before the first.
             material[alive] += np.where((depth[alive] > 0) & (k > 0), reached - last[alive], 0)
             entering = np.sum(self._flat[face] * direction[alive], -1) < 0
             depth[alive] = np.maximum(depth[alive] + np.where(entering, 1, -1), 0)
             last[alive] = reached
             at[alive] = reached + step[alive]
-        return Paths(first, normal, last, material)
+        return Paths(first, normal, last, leaving, material)
 
     def _shading(self, face: Array, uv: Array) -> Array:
         """[n, 3] normals between the corners of faces [n]."""

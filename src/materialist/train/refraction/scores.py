@@ -1,4 +1,4 @@
-"""How far RefractionNet and the symmetry prior are from true thickness."""
+"""How far RefractionNet and the symmetry prior are from true thickness and true backs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.bench import shapes
 from materialist.errors import InputError
-from materialist.predict.refraction.crop import MASK, MIRROR
+from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.train.refraction.glassware import Shape, centred
 from materialist.train.refraction.paths import Tracer
 from materialist.train.refraction.view import lesson
@@ -31,11 +31,25 @@ def pixel_error(found: Array, truth: Array, inside: Array) -> Array:
     return each.sum((1, 2)) / np.maximum(counted.sum((1, 2)), 1)
 
 
-def score(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, float]:
-    """Mean figures over views (see `lessons.views`): `solid`, `hollow` and `symmetry` are relative errors.
+def degrees(found: Array, truth: Array, inside: Array) -> Array:
+    """[N] mean angle in degrees between unit normals [N, 3, S, S] within inside [N, S, S]."""
+    angle = np.degrees(np.arccos(np.clip((found * truth).sum(1), -1, 1)))
+    return (angle * inside).sum((1, 2)) / np.maximum(inside.sum((1, 2)), 1)
 
-    `solid_median`: the median over views; `solid_pixel`, `symmetry_pixel`: `pixel_error`; `hollow` counts only
-    hollow shapes, `symmetry` the mirrored thickness as the solid one.
+
+def score(network, lessons: dict[str, Array]) -> dict[str, float]:
+    """Means of `errors` over views, and medians as NAME_median."""
+    each = errors(network, lessons)
+    figures = {name: float(np.nanmean(values)) for name, values in each.items()}
+    return figures | {f"{k}_median": float(np.nanmedian(each[k])) for k in ("solid", "symmetry", "hollow") if k in each}
+
+
+def errors(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, Array]:
+    """Figures [N] of every view (see `lessons.views`).
+
+    `solid`, `hollow`: relative errors, the latter NaN for shapes that are not, and left out where none is; `symmetry`:
+    of the mirrored thickness as the solid one; `solid_pixel`, `symmetry_pixel`: `pixel_error`; `back`,
+    `back_symmetry`: degrees by which the back's normals are off, those predicted and those of the front mirrored.
     """
     import torch
 
@@ -47,18 +61,19 @@ def score(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, floa
     found = np.concatenate(parts)
     # Where the mask that the network got is wider than the object, there is nothing to compare with.
     inside = (maps[:, MASK] > 0.5) & (target[:, 0] > 0)
-    solid = relative_error(found[:, 0], target[:, 0], inside)
-    symmetry = relative_error(maps[:, MIRROR], target[:, 0], inside)
+    front = maps[:, NORMAL_X : NORMAL_X + 3] * np.array([1, 1, -1], np.float32)[:, None, None]
+    front /= np.maximum(np.linalg.norm(front, axis=1, keepdims=True), 1e-6)
     figures = {
-        "solid": float(solid.mean()), "solid_median": float(np.median(solid)),
-        "solid_pixel": float(pixel_error(found[:, 0], target[:, 0], inside).mean()),
-        "symmetry": float(symmetry.mean()), "symmetry_median": float(np.median(symmetry)),
-        "symmetry_pixel": float(pixel_error(maps[:, MIRROR], target[:, 0], inside).mean()),
-    }  # fmt: skip
+        "solid": relative_error(found[:, 0], target[:, 0], inside),
+        "solid_pixel": pixel_error(found[:, 0], target[:, 0], inside),
+        "symmetry": relative_error(maps[:, MIRROR], target[:, 0], inside),
+        "symmetry_pixel": pixel_error(maps[:, MIRROR], target[:, 0], inside),
+        "back": degrees(found[:, BACK_X:], target[:, BACK_X:], inside),
+        "back_symmetry": degrees(front, target[:, BACK_X:], inside),
+    }
     hollow = lessons["hollow"].astype(bool)
     if hollow.any():
-        walls = relative_error(found[hollow, 1], target[hollow, 1], inside[hollow])
-        figures |= {"hollow": float(walls.mean()), "hollow_median": float(np.median(walls))}
+        figures["hollow"] = np.where(hollow, relative_error(found[:, 1], target[:, 1], inside), np.nan)
     return figures
 
 

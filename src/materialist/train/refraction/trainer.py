@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
-from materialist.predict.refraction.crop import MASK, NORMAL_X, SIDE
+from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import STRIDE, RefractionNet
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
@@ -48,10 +48,12 @@ class Recipe:
     """Weight of the hollow thickness in the loss."""
     logarithm: float = 0.3
     """Weight of the difference of logarithms beside that of the lengths."""
+    back: float = 1.0
+    """Weight of the normals of the back: one minus the cosine of their error."""
     bfloat16: bool = False
     side: int = 32
     """Pixels on a side of the views at first: smaller ones train faster, and most can be learnt on them."""
-    full_size: float = 0.75
+    full_size: float = 0.6
     """Part of the run after which views have their full SIDE."""
 
     def __post_init__(self) -> None:
@@ -171,11 +173,12 @@ class Trainer:
 
 
 def prepared(views: dict[str, Array], chosen: Array, rng: np.random.Generator) -> dict[str, Tensor]:
-    """A batch: maps [B, C, S, S] and target [B, 2, S, S] float32, hollow [B]; mirrored and recoloured at random."""
+    """A batch: maps [B, C, S, S] and target [B, 5, S, S] float32, hollow [B]; mirrored and recoloured at random."""
     maps, target = views["maps"][chosen].astype(np.float32), views["target"][chosen].astype(np.float32)
     flip = rng.random(len(chosen)) < 0.5
     maps[flip], target[flip] = maps[flip, ..., ::-1], target[flip, ..., ::-1]
     maps[flip, NORMAL_X] *= -1
+    target[flip, BACK_X] *= -1
     gain, order = rng.uniform(0.7, 1.2, (len(chosen), 3, 1, 1)), rng.permutation(3)
     inside = maps[:, MASK : MASK + 1]
     maps[:, :3] = (np.clip((maps[:, :3] + 0.5 * inside)[:, order] * gain, 0, 1) - 0.5) * inside
@@ -202,7 +205,7 @@ def smaller(views: dict[str, Array], side: int, at_a_time: int = 256) -> dict[st
 
 
 def losses(found: Tensor, batch: dict[str, Tensor], recipe: Recipe) -> dict[str, Tensor]:
-    """The terms of the loss of predictions [B, 2, S, S]: relative length and logarithm, solid and hollow."""
+    """The terms of the loss of predictions [B, 5, S, S]: relative length and logarithm, solid and hollow; the back."""
     target, maps = batch["target"], batch["maps"]
     inside = maps[:, MASK] * (target[:, 0] > 0)
     count = inside.sum((1, 2)).clamp(min=1)
@@ -216,4 +219,8 @@ def losses(found: Tensor, batch: dict[str, Tensor], recipe: Recipe) -> dict[str,
         if k == 1:  # only hollow shapes have walls to learn from
             each = each * batch["hollow"] / batch["hollow"].mean().clamp(min=0.1)
         terms[name] = share * each.mean()
+    # Means over pixels of smaller views are shorter than 1 where the back is bent: they say less there.
+    cosine = (found[:, BACK_X:] * target[:, BACK_X:]).sum(1)
+    length = target[:, BACK_X:].square().sum(1).clamp(min=1e-8).sqrt()
+    terms["back"] = recipe.back * (((length - cosine) * inside).sum((1, 2)) / count).mean()
     return terms

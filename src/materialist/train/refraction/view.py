@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.predict.refraction.crop import MARGIN, SIDE, View, features
+from materialist.predict.refraction.crop import MARGIN, SIDE, View, features, to_window
 from materialist.train.refraction.glassware import Shape
 from materialist.train.refraction.paths import Paths, Tracer
 from materialist.types import Array
@@ -26,7 +26,8 @@ class Lesson:
     maps: Array
     """[CHANNELS, S, S] float16, see `crop.features`."""
     target: Array
-    """[2, S, S] float16 solid and hollow thickness in units of the object's size, 0 outside the true mask."""
+    """[5, S, S] float16, 0 outside the true mask: solid and hollow thickness in units of the object's size, and the
+    normal of the last surface in the frame of `crop.to_window`, away from the viewer."""
     hollow: bool
 
 
@@ -47,7 +48,7 @@ def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: boo
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
         rays = window_rays(shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre)
-        paths, normal = look(tracer, pose, rays)
+        paths, normal, back = look(tracer, pose, rays)
         inside = np.isfinite(paths.first).reshape(SIDE, SIDE)
         if inside.mean() >= LEAST_PIXELS:
             break
@@ -57,9 +58,11 @@ def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: boo
     point = (rays * depth[..., None] - pose.centre) @ pose.to_camera
     view = View(_photo(rng, normal, rays, point) * inside[..., None], inside, normal, depth, rays)
     target = np.stack([picture(paths.solid), picture(paths.material)]) * length / view.size
+    back = np.moveaxis(np.where(inside[..., None], back @ to_window(rays).T, 0), -1, 0)
+    target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
     if not exact:
         view = _imperfect(rng, view)
-    return Lesson(features(view).astype(np.float16), np.minimum(target, 8).astype(np.float16), shape.hollow)
+    return Lesson(features(view).astype(np.float16), target, shape.hollow)
 
 
 def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> Pose:
@@ -88,19 +91,26 @@ def window_rays(vertices: Array) -> Array:
     return rays
 
 
-def look(tracer: Tracer, pose: Pose, rays: Array) -> tuple[Paths, Array]:
-    """Paths of the rays through the shape, and the normals [S, S, 3] seen, unit, camera frame.
+def look(tracer: Tracer, pose: Pose, rays: Array) -> tuple[Paths, Array, Array]:
+    """Paths of the rays through the shape; normals [S, S, 3] of the first and of the last surface, unit, camera frame.
 
     The rays are brought into the shape's own frame; lengths along them are the same there.
     """
     back = np.linalg.inv(pose.to_camera @ pose.stretch)
     direction = rays.reshape(-1, 3).astype(np.float64) @ back.T
     paths = tracer.trace(np.broadcast_to(-back @ pose.centre, direction.shape), direction)
-    normal = paths.normal @ back  # the inverse transpose, as for every normal
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    # What is seen faces the viewer, also where the shading normals of coarse triangles do not.
-    away = np.sum(normal * rays.reshape(-1, 3), -1, keepdims=True)
-    return paths, np.where(away > 0, -normal, normal).reshape(*rays.shape).astype(np.float32)
+    # The inverse transpose, as for every normal.
+    return paths, _towards(paths.normal @ back, rays, -1), _towards(paths.exit_normal @ back, rays, 1)
+
+
+def _towards(normal: Array, rays: Array, sign: int) -> Array:
+    """[S, S, 3] float32 unit normals [S * S, 3] on the side of the rays that `sign` says.
+
+    What is seen faces the viewer, also where the shading normals of coarse triangles do not.
+    """
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    wrong = sign * np.sum(normal * rays.reshape(-1, 3), -1, keepdims=True) < 0
+    return np.where(wrong, -normal, normal).reshape(*rays.shape).astype(np.float32)
 
 
 def _about(axis: int, angle: float) -> Array:

@@ -1,0 +1,71 @@
+"""`bench thickness`: how far RefractionNet and the symmetry prior are from true thickness and true backs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.bench.report import Column, Report, write
+from materialist.errors import InputError
+from materialist.types import Array
+
+NOTE = """`solid` is the mean absolute error of the thickness over its mean, of each view; `pixel` the mean of
+|found - true| / true over pixels; `walls` that of the walls of hollow shapes; `back` the mean angle between the found
+and the true normals where the camera rays leave the object. Means over views. `held-out`: procedural shapes that no
+training set has, their maps bent and blurred as predicted ones are. Captured meshes (`DIR/meshes/GROUP`, `--data`):
+exact maps. `symmetry` is the paper's prior: front and back alike, mirrored across the view of the object's middle."""
+COLUMNS = (
+    Column("solid", "solid", "lower"),
+    Column("pixel", "solid, pixel", "lower"),
+    Column("hollow", "walls", "lower"),
+    Column("back", "back, degrees", "lower", 1),
+)
+
+
+def run(
+    *, data: Path | None, output: Path, shapes: int = 64, views: int = 8, mesh_views: int = 4, weights: str = "",
+    seed: int = 0, device: str = "auto",
+) -> None:  # fmt: skip
+    """Score RefractionNet on `shapes` held-out shapes and the meshes of DATA, each seen `views` or `mesh_views` times.
+
+    `weights`: a .safetensors file instead of those in the package. Raises InputError for counts below 1, WeightsError
+    where there are no weights. `device` is not used: the network is small.
+    """
+    if min(shapes, views, mesh_views) < 1:
+        raise InputError(f"shapes is {shapes}, views {views}, mesh_views {mesh_views}; give at least 1 each.")
+    from materialist.predict.refraction import WEIGHTS
+    from materialist.predict.refraction.weights import load
+    from materialist.render.variant import setup
+    from materialist.train.refraction.lessons import Plan
+    from materialist.train.refraction.lessons import views as lessons_of
+    from materialist.train.refraction.scores import of_meshes
+
+    setup("cpu")
+    network, _ = load(Path(weights) if weights else WEIGHTS)
+    rows: list[dict[str, Any]] = []
+    settings = {"shapes": shapes, "views": views, "mesh_views": mesh_views, "seed": seed}
+    report = Report("Thickness and back of objects", NOTE, settings, COLUMNS, rows, plotted=("solid", "back"))
+    for k in range(shapes):
+        rows += _rows("held-out", f"shape {k}", network, lessons_of(k, Plan(shapes, views, "heldout", seed)))
+    for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
+        for name, found in of_meshes(group, mesh_views, seed).items():
+            rows += _rows(f"{group.name} meshes", name, network, found)
+    write(report, output)
+
+
+def _rows(group: str, name: str, network: Any, lessons: dict[str, Array]) -> list[dict[str, Any]]:
+    """A row a view for the network and for the prior."""
+    from materialist.train.refraction.scores import errors
+
+    each = errors(network, lessons)
+    rows = []
+    for k in range(len(each["solid"])):
+        own = {"solid": "solid", "pixel": "solid_pixel", "hollow": "hollow", "back": "back"}
+        prior = {"solid": "symmetry", "pixel": "symmetry_pixel", "back": "back_symmetry"}
+        for method, names in (("RefractionNet", own), ("symmetry", prior)):
+            figures = {key: float(each[source][k]) for key, source in names.items() if source in each}
+            figures = {key: value for key, value in figures.items() if np.isfinite(value)}
+            rows.append({"method": f"{group}: {method}", "sample": f"{name} view {k}", **figures})
+    return rows

@@ -1,0 +1,42 @@
+"""The benchmark of RefractionNet: a ball is known by symmetry, and every view has its row."""
+
+import json
+
+import pytest
+import torch
+import trimesh
+
+from materialist import bench
+from materialist.errors import InputError
+from materialist.predict.refraction import weights
+from materialist.predict.refraction.network import Architecture, RefractionNet
+
+
+@pytest.fixture
+def plain(tmp_path):
+    """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
+    torch.manual_seed(0)
+    weights.save(tmp_path / "plain.safetensors", RefractionNet(Architecture((8,) * 5, (1,) * 5)), {"step": 0})
+    return str(tmp_path / "plain.safetensors")
+
+
+def test_shapes_and_meshes_have_rows(tmp_path, plain, mitsuba):
+    folder = tmp_path / "data" / "meshes" / "symmetric"
+    folder.mkdir(parents=True)
+    trimesh.creation.icosphere(3, 0.7).export(folder / "ball.ply")
+    options = {"shapes": 2, "views": 2, "mesh_views": 1, "weights": plain}
+    bench.run("thickness", output=tmp_path / "report", data=tmp_path / "data", **options)
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert len(report["rows"]) == 2 * (2 * 2 + 1)
+    ball = {row["method"]: row for row in report["rows"] if row["sample"].startswith("ball")}
+    prior, network = ball["symmetric meshes: symmetry"], ball["symmetric meshes: RefractionNet"]
+    assert prior["solid"] < 0.12 and "hollow" not in prior
+    # Seen from near, rays to a ball's sides are not parallel, and its back is not quite its front in a mirror.
+    assert network["back"] == pytest.approx(prior["back"], abs=0.01) and prior["back"] < 35
+    assert prior["solid"] < network["solid"] < prior["solid"] + 0.2  # LEAST is added to it
+    assert (tmp_path / "report" / "plot.png").is_file()
+
+
+def test_bad_input(tmp_path, plain):
+    with pytest.raises(InputError, match="shapes is 0"):
+        bench.run("thickness", output=tmp_path / "report", shapes=0, weights=plain)
