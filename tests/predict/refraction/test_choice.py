@@ -78,6 +78,19 @@ def test_where_they_disagree_and_the_turn_does_not_fit_the_network_is_believed(n
     assert chosen(depth, normal, boot, up=LEVEL, prefer="half-turn").method == "half-turn"
 
 
+def test_a_turn_that_fits_only_about_is_believed_where_the_network_says_the_same(network, no_lathe):
+    """A ball without one of its quarters has it again after the turn, which says how badly that fits."""
+    depth, normal, mask, true = ball()
+    rows, columns = np.indices((64, 64))
+    part = mask & ~((columns > 40) & (rows < 30))
+    for wrong, method in ((0.0, "half-turn"), (0.25, "network")):
+        guess = true * part * (1 + wrong * np.where(rows % 8 < 4, 1, -1))
+        network(guess.astype(np.float32))
+        found = chosen(depth, normal, part, up=LEVEL)
+        assert found.method == method
+    assert chosen(depth, normal, part, up=LEVEL, prefer="half-turn").thickness.back is None
+
+
 def test_without_weights_the_mirror_is_the_guess(monkeypatch, no_lathe):
     def missing(*_):
         raise WeightsError("none")
