@@ -163,8 +163,10 @@ def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tup
             add(f"{model.__name__[1:]}, {source} d", model(case, found, behind["true"], spp), found)
         name = f"{model.__name__[1:]}, {best} d, inpainted"
         add(name, model(case, d[best], behind["inpainted"], spp), d[best])
-    leaning = replace(d["true"], back=scene.front.back)
-    add("closed, true d and back", _closed(case, leaning, behind["true"], spp), leaning)
+    for source in ("true", "network"):
+        if source in d:
+            leaning = replace(d[source], back=scene.front.back)
+            add(f"closed, {source} d, true back", _closed(case, leaning, behind["true"], spp), leaning)
     same = models.two_interface(scene, d[best].solid, behind["true"], case.envmap, case.ior, back="same")
     add(f"two_interface, {best} d, back normal = front normal", same, d[best])
     rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
