@@ -105,3 +105,16 @@ def test_holes_of_any_shape_are_borne(size):
     assert not hole.ravel()[found[found >= 0]].any() and (found[~hole] < 0).all()
     far = np.where(np.indices(SHAPE)[0] < 4, 1e6, depth)  # a plane that is none
     regular_sources(picture, hole, ~hole, np.zeros(SHAPE, int), far, CAMERA)
+
+
+def test_shadows_beside_the_hole_are_not_copied(hole):
+    depth, picture = slanted(chequers)
+    rows, columns = np.indices(SHAPE)
+    shadow = np.hypot(rows - 50, columns - 98) < 12  # where the nearest repeats of much of the hole lie
+    seen = np.where(shadow[..., None], 0.5 * picture, picture)
+    torn = np.where(hole[..., None], 0.9, seen)
+    found = regular_sources(torn, hole, ~hole, np.zeros(SHAPE, int), depth, CAMERA)
+    told = found >= 0
+    assert told[hole].mean() > 0.97
+    assert shadow.ravel()[found[told]].mean() < 0.03
+    assert np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean() < 0.035

@@ -7,6 +7,7 @@ offsets of He and Sun 2012, with the perspective taken out).
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,10 @@ FEATURED = 0.012
 """Least standard deviation (sRGB) of a plane's detail: a plain one has nothing that could be said to repeat."""
 ENOUGH = 0.6
 """Part of what is hidden of a plane that its pattern must tell: a few alike places are no pattern."""
+BORDER = 2
+"""Pixels next to the end of a plane that are not copied: they show what is beside it, too."""
+USUAL = 0.06
+"""Differences (sRGB) of what several shifts say up to which they say the same."""
 SHADING = 0.35
 """Waves longer than this part of the window are light, not pattern."""
 
@@ -62,10 +67,18 @@ def regular_sources(features: Array, hole: Array, source: Array, label: Array, d
     for k in np.unique(label[hole]):
         if k < 0:
             continue
-        plane = Surface(points, (label == k) & source & ~hole & (depth > 0), (label == k) & hole & (depth > 0))
+        own = (label == k) & (depth > 0)
+        plane = Surface(points, _within(own) & source & ~hole, own & hole)
         if plane.known.sum() >= KNOWN and plane.hidden.sum() >= HIDDEN:
             found = np.where(found < 0, _on_plane(features, plane, camera), found)
     return found
+
+
+def _within(mask: Array) -> Array:
+    """A mask [H, W] without the pixels at its border, which show something else as well."""
+    import cv2
+
+    return cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=BORDER, borderValue=1) > 0
 
 
 def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
@@ -77,20 +90,33 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
         return np.full(plane.known.shape, -1)
     shifts = _shifts(detail, seen) * frame.cell
     height, width = plane.known.shape
-    found = np.full((height, width), -1)
     rows, columns = np.nonzero(plane.hidden)
-    for shift in shifts:  # best first
-        left = found[rows, columns] < 0
-        if not left.any():
-            break
-        moved = plane.point[rows[left], columns[left]] + shift @ frame.axes
-        place, ahead = project(moved, camera)
+    sources = np.full((len(shifts), len(rows)), -1)
+    for shift, told in zip(shifts, sources, strict=True):  # best first
+        place, ahead = project(plane.point[rows, columns] + shift @ frame.axes, camera)
         column, row = np.floor(place).astype(int).T
         good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
         row, column = np.where(good, row, 0), np.where(good, column, 0)
-        good &= plane.known[row, column]
-        found[rows[left][good], columns[left][good]] = (row * width + column)[good]
+        told[:] = np.where(good & plane.known[row, column], row * width + column, -1)
+    found = np.full((height, width), -1)
+    found[rows, columns] = _usual(features.reshape(-1, features.shape[-1]), sources)
     return found if (found[rows, columns] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
+
+
+def _usual(values: Array, sources: Array) -> Array:
+    """[P] of sources [K, P] the first one that shows about what most of them do, -1 where there is none.
+
+    The median of them leaves out the shadows and reflections that lie at some of the places.
+    """
+    if not len(sources):
+        return np.full(sources.shape[1], -1)
+    seen = np.where((sources >= 0)[..., None], values[np.maximum(sources, 0)], np.nan)  # [K, P, F]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # pixels that no shift tells
+        off = np.abs(seen - np.nanmedian(seen, 0)).max(-1)  # [K, P]
+    off = np.where(np.isnan(off), np.inf, np.maximum(off, USUAL))  # alike ones are equally good: the first is taken
+    best = off.argmin(0)
+    return sources[best, np.arange(sources.shape[1])]
 
 
 class _Frame:
