@@ -54,7 +54,7 @@ def run(
     Raises InputError for bad options, MaterialistError where the ways give different results.
     """
     counts = _counts(workers)
-    chosen = _chosen(None if data is None else Path(data), photos)
+    chosen = _chosen(None if data is None else Path(data), photos, Path(output))
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -93,14 +93,14 @@ def _counts(workers: str | int) -> list[int]:
     return counts
 
 
-def _chosen(data: Path | None, photos: int) -> list[str]:
+def _chosen(data: Path | None, photos: int, output: Path) -> list[str]:
     """Photos as texts for the command line, spread over those there are."""
     if not isinstance(photos, int) or photos < 1:
         raise InputError(f"photos is {photos}; give at least 1.")
     if data is None:
         return list(EXAMPLES[:photos])
     below = data / "photos"
-    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=data)]
+    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=output)]
     return found[:: max(1, len(found) // photos)][:photos]
 
 
