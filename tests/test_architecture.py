@@ -9,7 +9,7 @@ import pytest
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
 LAYER = {
-    **dict.fromkeys(("types", "errors", "color", "camera", "metrics"), 0),
+    **dict.fromkeys(("types", "errors", "color", "camera", "envmap", "metrics", "plain"), 0),
     **dict.fromkeys(("io", "predict", "geometry", "transport", "render"), 1),
     **dict.fromkeys(("fit", "edit", "export"), 2),
     "pipeline": 3,
@@ -25,7 +25,7 @@ HEAVY = {"torch", "mitsuba", "drjit"}
 MAY_BE_HEAVY = ("render", "transport", "fit", "train")
 NETWORKS = ("predict.bundled.", "predict.matnet.", "predict.refraction.")
 """Packages of networks: their own modules need torch at the top; whoever calls them imports them late."""
-LIGHT_START = ("", "types", "errors", "color", "camera", "cli")
+LIGHT_START = ("", "types", "errors", "color", "camera", "plain", "cli")
 """Modules that load at every start and so may import nothing slow at the top."""
 SLOW = HEAVY | {"cv2", "OpenEXR", "scipy", "skimage", "matplotlib", "PIL", "rawpy", "pillow_heif", "transformers"}
 
