@@ -189,7 +189,7 @@ class GlassScene:
 
 def seen(solid: Solid, camera: Camera) -> Front:
     """What the camera sees of a mesh in its frame."""
-    from materialist.train.refraction.paths import Tracer
+    from materialist.train.refraction.paths import Tracer, towards
 
     rays = pixel_rays(camera)
     shape = rays.shape[:2]
@@ -197,20 +197,14 @@ def seen(solid: Solid, camera: Camera) -> Front:
     direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
     found = Tracer(solid).trace(np.zeros_like(direction), direction)
     hit = np.isfinite(found.first)
-    normal = _towards(np.where(hit[:, None], found.normal, [0, 0, 1]), direction, -1)
-    back = _towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)
+    normal = towards(np.where(hit[:, None], found.normal, [0, 0, 1]), direction, -1)
+    back = towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)
     thickness = found.solid * np.linalg.norm(direction, axis=-1)
     depth = np.where(hit, found.first, 0)
     return Front(
         depth.reshape(shape).astype(np.float32), normal.reshape(*shape, 3).astype(np.float32),
         thickness.reshape(shape).astype(np.float32), back.reshape(*shape, 3).astype(np.float32),
     )  # fmt: skip
-
-
-def _towards(normal: Array, direction: Array, sign: int) -> Array:
-    """[N, 3] unit normals on the side of directions [N, 3] that `sign` says."""
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    return np.where(sign * np.sum(normal * direction, -1, keepdims=True) < 0, -normal, normal)
 
 
 def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int = 0) -> Array:

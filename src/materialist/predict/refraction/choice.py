@@ -3,8 +3,7 @@
 What was turned on a lathe is known by its normals, and its back with it.
 
 The turned front has the object's own edges, and is taken where it fits the front and the mask very well (boxes,
-pyramids, bottles), or where the network says the same. Elsewhere RefractionNet is nearer to the truth: of 22 captured
-meshes its backs lean less wrongly than the turned ones on 20 (docs/glass.md).
+pyramids, bottles), or where the network says the same. Elsewhere RefractionNet's backs lean less wrongly.
 """
 
 from __future__ import annotations

@@ -37,6 +37,15 @@ class Paths:
         return np.where(np.isfinite(self.first), self.last - self.first, 0)
 
 
+def towards(normal: Array, direction: Array, sign: int) -> Array:
+    """[N, 3] unit normals on the side of directions [N, 3] that `sign` says (-1: against them).
+
+    What is seen faces the viewer, also where the shading normals of coarse triangles do not.
+    """
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    return np.where(sign * np.sum(normal * direction, -1, keepdims=True) < 0, -normal, normal)
+
+
 class Tracer:
     """One mesh to be shot at."""
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, features, to_window
 from materialist.train.refraction.glassware import Shape
-from materialist.train.refraction.paths import Paths, Tracer
+from materialist.train.refraction.paths import Paths, Tracer, towards
 from materialist.types import Array
 
 LEAST_PIXELS = 0.02
@@ -100,17 +100,9 @@ def look(tracer: Tracer, pose: Pose, rays: Array) -> tuple[Paths, Array, Array]:
     direction = rays.reshape(-1, 3).astype(np.float64) @ back.T
     paths = tracer.trace(np.broadcast_to(-back @ pose.centre, direction.shape), direction)
     # The inverse transpose, as for every normal.
-    return paths, _towards(paths.normal @ back, rays, -1), _towards(paths.exit_normal @ back, rays, 1)
-
-
-def _towards(normal: Array, rays: Array, sign: int) -> Array:
-    """[S, S, 3] float32 unit normals [S * S, 3] on the side of the rays that `sign` says.
-
-    What is seen faces the viewer, also where the shading normals of coarse triangles do not.
-    """
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    wrong = sign * np.sum(normal * rays.reshape(-1, 3), -1, keepdims=True) < 0
-    return np.where(wrong, -normal, normal).reshape(*rays.shape).astype(np.float32)
+    flat = rays.reshape(-1, 3)
+    first, last = towards(paths.normal @ back, flat, -1), towards(paths.exit_normal @ back, flat, 1)
+    return paths, first.reshape(rays.shape).astype(np.float32), last.reshape(rays.shape).astype(np.float32)
 
 
 def _about(axis: int, angle: float) -> Array:
