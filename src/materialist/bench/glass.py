@@ -49,7 +49,8 @@ NOTE = (
     "without any refraction. `ceiling, true mesh` is the object's own mesh before the background that the closed "
     "proxy stands before, `ceiling, truth again` the truth with other noise and as few paths as the predictions: "
     "nothing can do better. The inpainted background is that of `materialist glass`: patterns that go on "
-    "and patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights are installed."
+    "and patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights "
+    "are installed."
 )
 NOISE = 0.5
 """Largest relative error of the thickness in the sensitivity test (paper, eq. ablation_d)."""
