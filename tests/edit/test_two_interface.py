@@ -80,6 +80,10 @@ def test_a_back_of_its_own_bends_rays_as_that_back_does():
     crossing = ti.cross(front, thick[mask], ior=1.5)
     middle = np.argmax(front.direction @ [0, 0, -1.0])
     # Snell's law at the back of a prism for a ray along the axis: sin(out) = n sin(lean).
+    with pytest.raises(InputError, match="back has shape"):
+        ti.two_interface(
+            CAMERA, normal, depth, mask, thick, depth + 1, gradient(CAMERA), np.ones((8, 16, 3)), back=back[1:]
+        )
     found = np.arcsin(crossing.direction[middle, 0])
     assert abs(front.direction[middle, 0]) < 0.02
     assert found == pytest.approx(lean - np.arcsin(1.5 * np.sin(lean)), abs=0.03)

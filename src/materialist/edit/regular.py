@@ -31,6 +31,8 @@ FEATURED = 0.012
 """Least standard deviation (sRGB) of a plane's detail: a plain one has nothing that could be said to repeat."""
 ENOUGH = 0.6
 """Part of what is hidden of a plane that its pattern must tell: a few alike places are no pattern."""
+REPEATS = 16
+"""Repeats of a hidden place that are looked at, the best ones."""
 BORDER = 2
 """Pixels next to the end of a plane that are not copied: they show what is beside it, too."""
 USUAL = 0.06
@@ -91,13 +93,17 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
     shifts = _shifts(detail, seen) * frame.cell
     height, width = plane.known.shape
     rows, columns = np.nonzero(plane.hidden)
-    sources = np.full((len(shifts), len(rows)), -1)
-    for shift, told in zip(shifts, sources, strict=True):  # best first
-        place, ahead = project(plane.point[rows, columns] + shift @ frame.axes, camera)
+    sources, count = np.full((REPEATS, len(rows)), -1), np.zeros(len(rows), int)
+    for shift in shifts:  # best first
+        unsure = np.flatnonzero(count < REPEATS)
+        place, ahead = project(plane.point[rows[unsure], columns[unsure]] + shift @ frame.axes, camera)
         column, row = np.floor(place).astype(int).T
         good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
         row, column = np.where(good, row, 0), np.where(good, column, 0)
-        told[:] = np.where(good & plane.known[row, column], row * width + column, -1)
+        good &= plane.known[row, column]
+        told = unsure[good]
+        sources[count[told], told] = (row * width + column)[good]
+        count[told] += 1
     found = np.full((height, width), -1)
     found[rows, columns] = _usual(features.reshape(-1, features.shape[-1]), sources)
     return found if (found[rows, columns] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
@@ -108,8 +114,6 @@ def _usual(values: Array, sources: Array) -> Array:
 
     The median of them leaves out the shadows and reflections that lie at some of the places.
     """
-    if not len(sources):
-        return np.full(sources.shape[1], -1)
     seen = np.where((sources >= 0)[..., None], values[np.maximum(sources, 0)], np.nan)  # [K, P, F]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # pixels that no shift tells

@@ -87,7 +87,7 @@ def two_interface(
     _check(ior, transmission, tint, roughness, kind)
     inside = surface_in(mask, depth, camera)
     for name, value in (("thickness", thickness), ("background depth", background_depth), ("normals", normal),
-                        ("background", background)):  # fmt: skip
+                        ("background", background), ("back", normal if own is None else own)):  # fmt: skip
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
     behind = Behind(background, background_depth, envmap)
