@@ -34,6 +34,9 @@ def data(
     meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None,
     envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None,
     split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train,
+    only: Annotated[
+        str, typer.Option(metavar="KIND", help="Only room, table, still-life, outdoor or workshop scenes.")
+    ] = "",
     resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False,
     sheet: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
@@ -52,7 +55,14 @@ def data(
     from materialist.train.data.produce import options_for, produce
 
     options = options_for(
-        size=size, seed=seed, spp=spp, split=split.value, meshes=meshes, envmaps=envmaps, device=device.value
+        size=size,
+        seed=seed,
+        spp=spp,
+        split=split.value,
+        meshes=meshes,
+        envmaps=envmaps,
+        device=device.value,
+        only=only,
     )
     with StageProgress(quiet=as_json) as progress:
         made = produce(output, options, count=count, workers=workers, resume=resume, progress=progress)

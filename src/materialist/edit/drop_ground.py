@@ -36,9 +36,11 @@ def ground_below(scene: Scene, things: list[Thing], to_up: Array, factor: float,
 
 def _heights(target: Any, to_up: Array, factor: float, x: Array, y: Array, top: float) -> Array:
     """z [n] (metres) of what rays downwards from `top` meet first in a `RenderScene`, NaN for nothing."""
+    from materialist.render.buffers import floats
+
     mi = target.mi
     start = np.stack([x, y, np.full_like(x, top)], -1) / factor @ to_up  # back in the camera frame
-    origin = mi.Point3f(*(mi.Float(np.ascontiguousarray(start[:, k], np.float32)) for k in range(3)))
+    origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
     direction = mi.Vector3f(*(float(v) for v in -to_up[2]))
     hit = target.mi_scene.ray_intersect_preliminary(mi.Ray3f(origin, direction))
     distance = np.array(hit.t, np.float64) * factor

@@ -5,7 +5,19 @@ import pytest
 
 from materialist.bench.lights import directions
 from materialist.color import luminance
-from materialist.train.data import furniture, materials, outdoors, packing, rooms, skies, things, tiles
+from materialist.train.data import (
+    furniture,
+    machines,
+    materials,
+    outdoors,
+    packing,
+    rooms,
+    skies,
+    things,
+    tiles,
+    wheels,
+    workshops,
+)
 from materialist.train.data import solids as s
 from materialist.train.data.sample import balance, exposure
 
@@ -104,7 +116,9 @@ def test_things_do_not_stand_in_each_other():
             assert np.hypot(x - a, z - b) > 0.84 * (r + q)
 
 
-@pytest.mark.parametrize("maker", [rooms.room, rooms.table_top, outdoors.still_life, outdoors.outdoor])
+@pytest.mark.parametrize(
+    "maker", [rooms.room, rooms.table_top, outdoors.still_life, outdoors.outdoor, workshops.workshop]
+)
 def test_worlds_can_be_packed(maker):
     for k in range(4):
         rng = np.random.default_rng([5, k])
@@ -115,14 +129,32 @@ def test_worlds_can_be_packed(maker):
         assert len(packed.faces) < 400_000
 
 
-def test_cameras_stand_inside_their_room():
+@pytest.mark.parametrize("maker", [rooms.room, workshops.workshop])
+def test_cameras_stand_inside_their_room(maker):
     for k in range(10):
         rng = np.random.default_rng([6, k])
-        world = rooms.room(rng, (), ())
+        world = maker(rng, (), ())
         points = np.concatenate([p.solid.vertices for p in world.parts])
         assert (world.view.position > points.min(0)).all()
         assert (world.view.position < points.max(0)).all()
         assert np.linalg.det(world.view.to_scene) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("maker", [maker for maker, _ in machines._TABLE])
+def test_large_things_stand_on_the_floor_and_fit_into_a_room(maker):
+    for k in range(6):
+        points = np.concatenate([p.solid.vertices for p in maker(np.random.default_rng([8, k]))])
+        assert np.isfinite(points).all()
+        assert -0.06 < points[:, 1].min() < 0.06
+        assert 0.3 < np.ptp(points, axis=0).max() < 3.2
+
+
+def test_wheels_touch_the_floor_at_both_ends():
+    for k in range(6):
+        points = np.concatenate([p.solid.vertices for p in wheels.two_wheeler(np.random.default_rng([9, k]))])
+        low = points[points[:, 1] < 0.02]
+        assert low[:, 0].min() < -0.3
+        assert low[:, 0].max() > 0.3
 
 
 def test_density_of_the_sky_integrates_to_one():

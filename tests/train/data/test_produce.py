@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.train.data import heldout
 from materialist.train.data.produce import options_for, produce, read_description, sample_path
-from materialist.train.data.sample import make_sample
+from materialist.train.data.sample import make_sample, make_world
 from materialist.train.data.sheet import write_sheet
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
@@ -115,6 +116,16 @@ def test_resume_makes_what_is_missing_and_nothing_else(made, options):
     assert not list((made / "samples").glob("*.tmp"))
 
 
+def test_only_one_kind_of_scene_when_asked(tmp_path):
+    options = options_for(size=SIZE, seed=11, spp=1, device="cpu", only="still-life")
+    kinds = {make_world(np.random.default_rng(k), options).kind for k in range(12)}
+    assert kinds == {"still life"}
+    every = {make_world(np.random.default_rng(k), replace(options, only="")).kind for k in range(60)}
+    assert every == {"room", "table", "still life", "outdoor", "workshop"}
+    aside = replace(options, only="", split="heldout")
+    assert "workshop" not in {make_world(np.random.default_rng(k), aside).kind for k in range(60)}
+
+
 def test_an_existing_folder_is_refused(made, options):
     with pytest.raises(InputError, match="--resume"):
         produce(made, options, count=6)
@@ -136,7 +147,8 @@ def test_the_description(made):
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [({"size": 30}, "30"), ({"size": 33}, "33"), ({"spp": 0}, "spp is 0"), ({"seed": -1}, "-1"),
-     ({"split": "dev"}, "'dev'"), ({"meshes": Path("/nowhere")}, "/nowhere")],
+     ({"split": "dev"}, "'dev'"), ({"only": "castle"}, "'castle'.*workshop"),
+     ({"meshes": Path("/nowhere")}, "/nowhere")],
 )  # fmt: skip
 def test_options_that_cannot_be(wrong, said):
     with pytest.raises(InputError, match=said):

@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.errors import InputError, OutputError
 from materialist.train.data import heldout
-from materialist.train.data.sample import Options, make_sample
+from materialist.train.data.sample import KINDS, Options, make_sample
 
 FORMAT = 1
 Progress = Callable[[str, int, int], None]
@@ -31,7 +31,7 @@ class Made:
 
 def options_for(
     *, size: int = 256, seed: int = 0, spp: int = 16, split: str = "train", meshes: Path | None = None,
-    envmaps: Path | None = None, device: str = "auto",
+    envmaps: Path | None = None, device: str = "auto", only: str = "",
 ) -> Options:  # fmt: skip
     """Checked options with the files of the split. Raises InputError for values or folders that cannot be used."""
     if not 32 <= size <= 2048 or size % 4:
@@ -40,9 +40,11 @@ def options_for(
         raise InputError(f"spp is {spp}; give 1 to 4096 samples per pixel.")
     if seed < 0:
         raise InputError(f"The seed is {seed}; give 0 or more.")
+    if only and only not in KINDS:
+        raise InputError(f"There is no kind '{only}' of scene; give one of {', '.join(KINDS)}, or none for all.")
     mesh_files = heldout.files(meshes, ".ply", heldout.MESHES, split)
     maps = heldout.files(envmaps, ".exr", heldout.ENVMAPS, split)
-    return Options(size, seed, spp, split, mesh_files, maps, device)
+    return Options(size, seed, spp, split, mesh_files, maps, device, only)
 
 
 def produce(
@@ -132,7 +134,7 @@ def _description(options: Options) -> dict:
     return {
         "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split,
         "options": {"spp": options.spp, "meshes": [p.stem for p in options.meshes],
-                    "envmaps": [p.stem for p in options.envmaps]},
+                    "envmaps": [p.stem for p in options.envmaps]} | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
     }  # fmt: skip
 
