@@ -14,8 +14,9 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.geometry.contour import region, silhouette_field
-from materialist.geometry.front import blurred_normals, smooth_front
+from materialist.geometry.front import smooth_front
 from materialist.geometry.membrane import membrane
+from materialist.geometry.ridges import at_edges, blurred_normals
 from materialist.geometry.sheets import COLLAR, Sheets, closed
 from materialist.geometry.shell import Shell, joined, turned
 from materialist.geometry.symmetry import border_distance, spacing, surface_in
@@ -180,7 +181,14 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
         back = blurred_normals(view.back, known, sigma)
-    front_normal, back_normal = (_between(n, known, place) for n in (blurred_normals(view.normal, known, sigma), back))
+    facing = blurred_normals(view.normal, known, sigma)
+    front_normal, back_normal = _between(facing, known, place), _between(back, known, place)
+    depth = own + through / at(length)
+    k, z, n = at_edges(front, facing, known, view.rays, place)
+    own[k], front_normal[k] = z, n
+    k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
+    depth[k], back_normal[k] = z, n
+    through = np.maximum((depth - own) * at(length), LEAST * own)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)
     place = place + np.array([view.left, view.top])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.geometry.ridges import blurred_normals
 from materialist.geometry.slopes import Pairs, between, least_squares_change, slopes
 from materialist.geometry.symmetry import border_distance
 from materialist.types import Array
@@ -59,12 +60,3 @@ def _pairs(inside: Array, index: Array, log_depth: Array, demanded: tuple[Array,
         parts.append((index[near][both], index[far][both], change, np.where(jump, 1e-3, 1.0)))
     first, second, wanted, weight = (np.concatenate(column) for column in zip(*parts))
     return first, second, wanted, weight
-
-
-def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
-    """[H, W, 3] unit, the mean of those inside nearby."""
-    from scipy.ndimage import gaussian_filter
-
-    weighted = np.where(inside[..., None], normal, 0).astype(np.float64)
-    mixed = gaussian_filter(weighted, (sigma, sigma, 0)) if sigma > 0.1 else weighted
-    return mixed / np.maximum(np.linalg.norm(mixed, axis=-1, keepdims=True), 1e-9)
