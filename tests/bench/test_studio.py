@@ -20,3 +20,13 @@ def test_without_a_browser(monkeypatch):
     monkeypatch.setattr(studio.shutil, "which", lambda name: None)
     with pytest.raises(SetupError, match="apt-get install chromium"), studio._browser():
         pass
+
+
+def test_every_move_changes_the_picture():
+    last = {}
+    for name, value in studio.values(600, 4):
+        low, high = studio._RANGES[name]
+        assert low <= value <= high
+        assert abs(value - last.get(name, 99)) >= 0.05 * (high - low)
+        last[name] = value
+    assert set(last) == set(studio._RANGES)
