@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from materialist.train.data import materials as m
-from materialist.train.data import outdoors, things
 from materialist.train.data import solids as s
+from materialist.train.data import street_things, things
 from materialist.train.data.things import Parts
 from materialist.train.data.wheels import by, disc, paint, rubber, two_wheeler, wheel
 from materialist.train.data.world import Part
@@ -129,7 +129,7 @@ def statue(rng, meshes=()) -> Parts:
 
 def person(rng, meshes=()) -> Parts:
     """Somebody who stands there."""
-    return outdoors._person(rng)
+    return street_things.person(rng)
 
 
 def rack(rng: np.random.Generator, width: float, height: float, meshes: tuple[Path, ...] = ()) -> Parts:
