@@ -186,8 +186,9 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     depth = own + through / at(length)
     k, z, n = at_edges(front, facing, known, view.rays, place)
     own[k], front_normal[k] = z, n
-    k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
-    depth[k], back_normal[k] = z, n
+    if view.back is not None:  # those fitted to its depth are no face's next to an edge
+        k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
+        depth[k], back_normal[k] = z, n
     through = np.maximum((depth - own) * at(length), LEAST * own)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)

@@ -16,7 +16,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.geometry.contour import silhouette_field
 from materialist.geometry.symmetry import border_distance, object_size, spacing, surface_in
-from materialist.geometry.turning import Axis, turned_back
+from materialist.geometry.turning import Axis, turned_thickness
 from materialist.types import Array, Camera
 
 COARSE = 40
@@ -55,8 +55,6 @@ class HalfTurn:
 
     thickness: Array
     """[H, W] float32 along the camera ray, scene units; 0 outside the mask."""
-    back: Array
-    """[H, W, 3] float32 unit normals where the rays leave it, outwards; 0 outside the mask."""
     misfit: float
     """How badly the best turned front fits the visible one and the mask, as a part of the object's size."""
     up: Array
@@ -89,8 +87,8 @@ def half_turn(
     fit = Fit(depth, normal, inside, guess, rays, None if up is None else np.asarray(up, np.float64))
     misfit, _ = fit.search(fit.strangeness)
     _, axis = fit.search(fit.difference)
-    solid, back = turned_back(np.asarray(depth, np.float64), normal, inside, rays, axis)
-    return HalfTurn(solid, back, misfit, axis.up, axis.foot)
+    solid = turned_thickness(np.asarray(depth, np.float64), normal, inside, rays, axis)
+    return HalfTurn(solid, misfit, axis.up, axis.foot)
 
 
 def upright(depth: Array, normal: Array, plane: Array, camera: Camera) -> Array | None:

@@ -13,7 +13,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.geometry.half_turn import LOOKING_DOWN, TILTS, Fit
 from materialist.geometry.symmetry import surface_in
-from materialist.geometry.turning import Axis, turned_back
+from materialist.geometry.turning import Axis, turned_thickness
 from materialist.types import Array, Camera
 
 ROUND = 0.035
@@ -36,8 +36,6 @@ class Lathed:
 
     thickness: Array
     """[H, W] float32 along the camera ray, scene units; 0 outside the mask."""
-    back: Array
-    """[H, W, 3] float32 unit normals where the rays leave it, outwards; 0 outside the mask."""
     misfit: float
     """Mean sine between the visible normals and the planes through the axis."""
     axis: Axis
@@ -61,7 +59,7 @@ def lathed(depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Arra
     misfit = fit.unturned(axis)
     if misfit > ROUND or fit.astray(axis) > ASTRAY:
         return None
-    return Lathed(*turned_back(np.asarray(depth, np.float64), normal, inside, rays, axis, SWEEP), misfit, axis)
+    return Lathed(turned_thickness(np.asarray(depth, np.float64), normal, inside, rays, axis, SWEEP), misfit, axis)
 
 
 def _axis(fit: Fit) -> Axis:

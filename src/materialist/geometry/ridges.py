@@ -13,8 +13,9 @@ import numpy as np
 
 from materialist.types import Array
 
-CREASE = 40.0
-"""Angle between the normals of two pixels, degrees, from which they lie on different faces."""
+CREASE = 60.0
+"""Angle between the normals of two pixels, degrees, from which they lie on different faces: small round things turn by
+40 degrees from one pixel to the next."""
 REACH = 3
 """Pixels around an edge within which splines would swing: places there get means of their neighbours instead."""
 _CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])

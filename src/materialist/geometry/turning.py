@@ -51,51 +51,40 @@ class Axis:
         return np.where(self.base & (falling < -1e-6) & (reached > 0), reached, np.inf)
 
 
-def turned_back(
+def turned_thickness(
     depth: Array, normal: Array, inside: Array, rays: Array, axis: Axis, angles: Sequence[float] = (np.pi,)
-) -> tuple[Array, Array]:
-    """The way along the rays to the front turned by each angle, gaps spanned, cut at the base; and its normals there.
+) -> Array:
+    """[H, W] float32 along the rays, scene units: to the front turned by each angle, gaps spanned, cut at the base.
 
     Args:
         depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
         rays: [H, W, 3] through the pixels at z = -1, evenly spaced. angles: radians; pi alone for a half turn.
-
-    Returns:
-        [H, W] float32 scene units, and [H, W, 3] float32 unit, outwards; both 0 outside.
     """
-    exits, found = _drawn(depth, normal, inside, rays, axis, angles)
+    exits = _drawn(depth, normal, inside, rays, axis, angles)
     drawn = inside & (exits > 0)
     length = np.linalg.norm(rays, axis=-1)
-    normals = membrane(found, drawn)
     if axis.base:
         # The walls go on down to the base.
-        walls, ground = membrane(exits, drawn), axis.base_depth(rays)
-        normals[ground < walls] = -axis.up
-        squared = np.maximum((np.minimum(walls, ground) - depth) * length, 0) ** 2
+        exits = np.minimum(membrane(exits, drawn), axis.base_depth(rays))
+        squared = np.maximum((exits - depth) * length, 0) ** 2
     else:
         # At a silhouette that turns away the thickness ends; squares change evenly there.
         squared = membrane(np.maximum((exits - depth) * length, 0) ** 2, drawn | ~inside)
-    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9)
-    thickness = np.where(inside, np.sqrt(np.maximum(squared, 0)), 0).astype(np.float32)
-    return thickness, np.where(inside[..., None], normals, 0).astype(np.float32)
+    return np.where(inside, np.sqrt(np.maximum(squared, 0)), 0).astype(np.float32)
 
 
-def _drawn(
-    depth: Array, normal: Array, inside: Array, rays: Array, axis: Axis, angles: Sequence[float]
-) -> tuple[Array, Array]:
-    """[H, W] planar depth of the deepest turned surface at the centre of each pixel, 0 for none; [H, W, 3] its mean
-    normal."""
+def _drawn(depth: Array, normal: Array, inside: Array, rays: Array, axis: Axis, angles: Sequence[float]) -> Array:
+    """[H, W] planar depth of the deepest turned surface at the centre of each pixel, 0 for none."""
     points, normals = _points(depth, normal, inside, rays)
     turned = [_in_pixels(axis.turned(points, k), axis.spun(normals, k), rays) for k in angles]
-    row, column, own, centre, facing = (np.concatenate(parts) for parts in zip(*turned, strict=True))
+    row, column, own, centre = (np.concatenate(parts) for parts in zip(*turned, strict=True))
     deepest = np.zeros(depth.shape)
     np.maximum.at(deepest, (row, column), own)
     near = own > deepest[row, column] - LAYER * spacing(rays) * own
     place = row[near] * depth.shape[1] + column[near]
-    total = lambda values: np.bincount(place, values, minlength=depth.size).reshape(depth.shape)  # noqa: E731
-    count = np.maximum(total(np.ones(len(place))), 1)
-    mean = np.stack([total(facing[near, k]) for k in range(3)], -1)
-    return total(centre[near]) / count, mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-9)
+    count = np.bincount(place, minlength=depth.size)
+    total = np.bincount(place, centre[near], minlength=depth.size)
+    return (total / np.maximum(count, 1)).reshape(depth.shape)
 
 
 def _points(depth: Array, normal: Array, inside: Array, rays: Array) -> tuple[Array, Array]:
@@ -115,9 +104,8 @@ def _points(depth: Array, normal: Array, inside: Array, rays: Array) -> tuple[Ar
     return np.stack([right, above, -np.ones(len(i))], -1) * z[:, None], normals
 
 
-def _in_pixels(points: Array, normals: Array, rays: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Row, column, planar depth, depth of the tangent plane at the pixel's centre, and normal of points that face
-    away."""
+def _in_pixels(points: Array, normals: Array, rays: Array) -> tuple[Array, Array, Array, Array]:
+    """Row, column, planar depth, and depth of the tangent plane at the pixel's centre, of points that face away."""
     z = np.maximum(-points[:, 2], 1e-9)
     step = spacing(rays)
     column = np.round((points[:, 0] / z - rays[0, 0, 0]) / step).astype(int)
@@ -130,4 +118,4 @@ def _in_pixels(points: Array, normals: Array, rays: Array) -> tuple[Array, Array
     plane = (normals * points).sum(-1) / np.where(cosine > STEEP, facing, 1)
     centre = np.where(cosine > STEEP, np.clip(plane, (1 - NEAR) * z, (1 + NEAR) * z), z)
     away = cosine > LEAVING
-    return row[away], column[away], z[away], centre[away], normals[away]
+    return row[away], column[away], z[away], centre[away]

@@ -5,8 +5,6 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
-from materialist.geometry.lathe import Lathed
-from materialist.geometry.turning import Axis
 from materialist.predict.refraction import choice
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Camera
@@ -90,22 +88,7 @@ def test_a_turn_that_fits_only_about_is_believed_where_the_network_says_the_same
         network(guess.astype(np.float32))
         found = chosen(depth, normal, part, up=LEVEL)
         assert found.method == method
-
-
-def test_the_network_s_normals_stand_in_where_turned_ones_are_off_in_spots(monkeypatch):
-    depth, normal, mask, true = ball()
-    _, columns = np.indices((64, 64))
-    rays = pixel_rays(CAMERA).astype(float)
-    far = rays * (depth + true / np.linalg.norm(rays, axis=-1))[..., None]
-    back = np.where(mask[..., None], (far - [0, 0, -3.0]) / 0.6, 0).astype(np.float32)
-    spot = mask & (columns > 38)
-    for wrong, expected in ((spot, back), (mask, None)):  # a part of the turned normals is wrong; or the network is
-        turned = np.where(wrong[..., None], [0.0, 1, 0], back).astype(np.float32)
-        body = Lathed(true.astype(np.float32), turned, 0.0, Axis(LEVEL, np.array([0, 0, -3.0]), False))
-        monkeypatch.setattr(choice, "lathed", lambda *_, body=body, **__: body)
-        monkeypatch.setattr(choice, "thickness", lambda *_: Thickness(true.astype(np.float32), 0 * true, back))
-        found = chosen(depth, normal, mask).thickness.back
-        np.testing.assert_allclose(found[mask], (turned if expected is None else expected)[mask], atol=1e-6)
+    assert chosen(depth, normal, part, up=LEVEL, prefer="half-turn").thickness.back is None
 
 
 def test_without_weights_the_mirror_is_the_guess(monkeypatch, no_lathe):

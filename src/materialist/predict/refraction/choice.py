@@ -27,10 +27,6 @@ FAR = 0.75
 """Mean difference of the turn from the guess, relative to the guess, beyond which it is never believed."""
 AGREE = {"network": 0.1, "symmetry": 0.35}
 """The same up to which it is believed in any case, by what the guess comes from."""
-SPOT = 20.0
-"""Degrees from the network's normals beyond which turned ones are not believed in spots,"""
-SAME = 0.5
-"""where more than this part of the back agrees."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,8 @@ def best_thickness(
         prefer: `auto`, or `half-turn`: the turn in any case.
 
     Returns:
-        Thickness as of `thickness`; `hollow` is 0 where there are no weights, and `back` None where the mirror decides.
+        Thickness as of `thickness`; `hollow` is 0 where there are no weights, `back` None where the depth of the back
+        says more about it than the network.
 
     Raises:
         InputError: maps of different sizes, or a mask without any surface.
@@ -67,23 +64,15 @@ def best_thickness(
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
     if prefer == "auto" and (swept := lathed(front, normal, inside, camera, up=up)) is not None:
-        return Choice(_as_thick(guess, swept.thickness, swept.back), "lathe")
+        return Choice(_as_thick(guess, swept.thickness), "lathe")
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)
     away = float(np.abs(turn.thickness - guess.solid)[inside].sum() / max(float(guess.solid[inside].sum()), 1e-9))
     believed = (turn.misfit < CERTAIN and away < FAR) or away < AGREE[method]
     if not (believed or prefer == "half-turn"):
         return Choice(guess, method)
-    return Choice(_as_thick(guess, turn.thickness, turn.back), "half-turn")
+    return Choice(_as_thick(guess, turn.thickness), "half-turn")
 
 
-def _as_thick(guess: Thickness, solid: Array, back: Array) -> Thickness:
-    """The guess with another solid thickness [H, W] and the normals [H, W, 3] of its back.
-
-    Turned normals are sharp where they are right, and far off in spots: beyond the strip that the front does not show,
-    and next to edges. There the network's stand in, unless it sees another body altogether.
-    """
-    if guess.back is not None:
-        near = (back * guess.back).sum(-1, keepdims=True) > np.cos(np.radians(SPOT))
-        if near[solid > 0].mean() > SAME:
-            back = np.where(near, back, guess.back)
-    return replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid), back=back)
+def _as_thick(guess: Thickness, solid: Array) -> Thickness:
+    """The guess with another solid thickness [H, W], whose own slopes are those of the back."""
+    return replace(guess, solid=solid, hollow=np.minimum(guess.hollow, solid), back=None)
