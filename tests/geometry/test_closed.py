@@ -156,6 +156,19 @@ def test_the_back_stays_before_what_stands_behind():
     assert_watertight(shell)
 
 
+def test_edges_of_the_back_stay_before_what_stands_behind_too():
+    """The back ends in a ridge that points away; a wall cuts it off."""
+    mask = np.zeros((80, 96), bool)
+    mask[20:60, 28:68] = True
+    columns = np.indices(mask.shape)[1]
+    normal = np.tile([0.0, 0, 1], (80, 96, 1))
+    back = np.where((columns < 48)[..., None], [-0.8, 0, -0.6], [0.8, 0, -0.6])
+    depth = np.full(mask.shape, 3.0)
+    thick = np.where(mask, 0.5, 0)
+    shell = closed_proxy(depth, normal, mask, thick, CAMERA, behind=np.full(depth.shape, 3.1), back=back)
+    assert -shell.vertices[:, 2].min() < 3.086
+
+
 def test_the_silhouette_is_smoother_than_its_pixels():
     rows, columns = np.mgrid[:64, :64]
     found = region(silhouette_field(np.hypot(rows - 31.3, columns - 31.7) < 20))

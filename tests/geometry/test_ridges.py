@@ -35,13 +35,15 @@ def between(count=400, seed=0):
     return place, np.stack([x, y, -np.ones(count)], -1)
 
 
+@pytest.mark.parametrize("across", [0.013, 0.5 / CAMERA.focal * 3.0])  # between pixels, through their centres
 @pytest.mark.parametrize("sign", [1, -1])
-def test_places_beside_a_ridge_lie_on_the_side_that_is_there(sign):
+def test_places_beside_a_ridge_lie_on_the_side_that_is_there(sign, across, monkeypatch):
+    monkeypatch.setattr(f"{__name__}.TOP", np.array([across, 0, -3.0]))
     depth, normal = roof(RAYS, sign)
     place, rays = between()
     found = at_edges(depth, normal, KNOWN, RAYS, place)
     true, facing = roof(rays[found.number], sign)
-    assert len(found.number) > 200
+    assert len(found.number) == len(place)
     np.testing.assert_allclose(found.depth, true, rtol=1e-6)
     np.testing.assert_allclose(found.normal, facing, atol=1e-6)
 
@@ -67,6 +69,23 @@ def test_where_one_part_hides_another_nothing_is_said():
     found = at_edges(depth, normal, KNOWN, RAYS, place)
     beside = np.abs(place[:, 0] - 23.5) < 0.5
     assert not np.isin(found.number, np.flatnonzero(beside)).any()
+
+
+def test_rough_normals_move_a_place_by_a_few_pixels_at_most():
+    rng = np.random.default_rng(5)
+    normal = np.array([0, 0, 1]) + rng.normal(0, 1.0, (48, 48, 3))
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    found = at_edges(np.full((48, 48), 3.0), normal, KNOWN, RAYS, between()[0])
+    assert len(found.number) > 20
+    assert np.abs(found.depth / 3 - 1).max() < 3.01 / CAMERA.focal
+    assert np.isfinite(found.normal).all()
+
+
+def test_a_pixel_without_a_normal_says_nothing():
+    depth, normal = roof(RAYS)
+    normal[20, 23] = 0
+    found = at_edges(depth, normal, KNOWN, RAYS, between()[0])
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=-1), 1, atol=1e-6)
 
 
 def test_what_has_no_edge_is_left_alone():

@@ -20,7 +20,7 @@ PATIENCE = 3.0
 
 
 def worker_mb(size: int) -> float:
-    """Memory to count on for a worker at a working size, MB: a tenth more than was measured."""
+    """Memory to count on for a worker at a working size, MB: what was measured, 1.5 GB at 512 and 3.7 GB at 1024."""
     return 720 + 2.9e-3 * size**2
 
 

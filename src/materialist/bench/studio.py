@@ -77,7 +77,7 @@ _GLASS_VALUES = (
     ("glass_ior", 1.3), ("glass_ior", 1.7), ("glass_ior", 1.15), ("glass_roughness", 0.2), ("glass_roughness", 0.4),
     ("glass_roughness", 0.1), ("glass_roughness", 0.0), ("glass_ior", 1.45),
 )  # fmt: skip
-_RANGES = {"hue": (-180, 180), "saturation": (-0.8, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
+_RANGES = {"hue": (-170, 170), "saturation": (-0.8, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
 
 
 def run(
@@ -171,13 +171,14 @@ def _moved(server: psutil.Process, page: Any, moves: int, seed: int) -> dict[str
 
 
 def _material_moves(page: Any, moves: int, seed: int) -> list[float]:
-    return [page.evaluate(_MOVE, [name, value]) for name, value in values(moves, seed)]
+    stand = {name: float(page.input_value(f"#{name} input[type=range]")) for name in _RANGES}
+    return [page.evaluate(_MOVE, [name, value]) for name, value in values(moves, seed, stand)]
 
 
-def values(moves: int, seed: int) -> Iterator[tuple[str, float]]:
-    """Sliders in turn and where each goes: far enough from where it was that the picture must change."""
+def values(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tuple[str, float]]:
+    """Sliders in turn and where each goes: far enough from where it was (`stand`) that the picture must change."""
     rng = np.random.default_rng(seed)
-    last = dict.fromkeys(_RANGES, 9e9)
+    last = dict(stand)
     for k in range(moves):
         name = list(_RANGES)[k % len(_RANGES)]
         low, high = _RANGES[name]

@@ -189,6 +189,7 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     if view.back is not None:  # those fitted to its depth are no face's next to an edge
         k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
         depth[k], back_normal[k] = z, n
+        depth = np.minimum(depth, own + at(_room(view, front)) / at(length))
     through = np.maximum((depth - own) * at(length), LEAST * own)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from materialist.geometry.symmetry import spacing
 from materialist.types import Array
 
 CREASE = 60.0
@@ -18,6 +19,12 @@ CREASE = 60.0
 40 degrees from one pixel to the next."""
 REACH = 3
 """Pixels around an edge within which splines would swing: places there get means of their neighbours instead."""
+WIDEST = 6
+"""Reach, pixels, of the blur next to edges: it costs time by its square, and edges may be everywhere."""
+SAME = 1e-4
+"""Part of a pixel's size by which a pixel lies off a plane at most that goes through it."""
+FARTHEST = 3.0
+"""Pixels by which a plane may take the depth away from that of the pixels around a place."""
 _CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 """[4, 2] (x, y) from the upper left pixel around a place to all four."""
 
@@ -48,14 +55,18 @@ def blurred_normals(normal: Array, inside: Array, sigma: float, crease: float = 
 
     sigma: pixels; below 0.1 the normals stay as they are.
     """
-    from scipy.ndimage import binary_dilation, gaussian_filter
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     unit = np.where(inside[..., None], normal, 0).astype(np.float64)
     if sigma <= 0.1:
         return _unit(unit)
     mixed = gaussian_filter(unit, (sigma, sigma, 0))
-    reach = int(np.ceil(2.5 * sigma))
-    near = inside & binary_dilation(edges(unit, inside, crease), iterations=reach)
+    sharp = edges(unit, inside, crease)
+    if not sharp.any():
+        return _unit(mixed)
+    near = inside & (distance_transform_edt(~sharp) <= 4 * sigma)  # as far as the other blur reaches
+    reach = min(int(np.ceil(2.5 * sigma)), WIDEST)
+    sigma = min(sigma, reach / 2.5)
     rows, columns = np.nonzero(near)
     own, total = unit[near], np.zeros((len(rows), 3))
     framed, limit = np.pad(unit, ((reach, reach), (reach, reach), (0, 0))), np.cos(np.radians(crease))
@@ -96,36 +107,41 @@ def at_edges(depth: Array, normal: Array, known: Array, rays: Array, place: Arra
     own, z = normal[row, column], depth[row, column]  # [K, 4, 3], [K, 4]
     ray = (weight[..., None] * rays[row, column]).sum(1)  # [K, 3]
     points = z[..., None] * rays[row, column]  # [K, 4, 3]
-    planes = _on_planes(own, points, ray[:, None], z)  # [K, 4] depth of each pixel's plane at the place
-    side, edge, jump = _face(own, points, z, planes, weight, rays[row, column], np.cos(np.radians(crease)))
+    pixel = spacing(rays)
+    planes = _on_planes(own, points, ray[:, None], z, pixel)  # [K, 4] depth of each pixel's plane at the place
+    side, edge, jump = _face(own, points, z, planes, weight, rays[row, column], np.cos(np.radians(crease)), pixel)
     alike = (own * np.take_along_axis(own, side[:, None, None], 1)).sum(-1) > np.cos(np.radians(crease))
     share = np.where(alike, np.maximum(weight, 1e-3), 0)
-    share /= share.sum(-1, keepdims=True)
+    known_side = (own * own).sum(-1).min(-1) > 0.5  # a pixel without a normal lies on no face
+    share /= np.maximum(share.sum(-1, keepdims=True), 1e-9)
+    kept = known_side & ~jump
     found = np.where(edge, (share * planes).sum(-1), 1 / (weight / z).sum(-1))  # 1/z is linear on planes
-    return Sided(number[~jump], found[~jump], _unit((share[..., None] * own).sum(1))[~jump])
+    return Sided(number[kept], found[kept], _unit((share[..., None] * own).sum(1))[kept])
 
 
-def _face(own, points, z, planes, weight, rays, limit: float) -> tuple[Array, Array, Array]:
+def _face(own, points, z, planes, weight, rays, limit: float, pixel: float) -> tuple[Array, Array, Array]:
     """[K] which of four pixels a place shares its face with; [K] whether they lie on several that meet there; [K]
     whether one of them hides another instead: then each is behind the other's plane on one side only."""
     bulge, jump = np.zeros(len(own)), np.zeros(len(own), bool)
     for i, j in combinations(range(4), 2):
         apart = (own[:, i] * own[:, j]).sum(-1) < limit
-        steps = [
-            np.sign(z[:, b] - _on_planes(own[:, a], points[:, a], rays[:, b], z[:, a])) for a, b in ((i, j), (j, i))
-        ]
+        steps = []
+        for a, b in ((i, j), (j, i)):
+            step = z[:, b] / _on_planes(own[:, a], points[:, a], rays[:, b], z[:, a], pixel) - 1
+            steps.append(np.where(np.abs(step) > SAME * pixel, np.sign(step), 0))  # 0: a pixel on the edge itself
         bulge += np.where(apart, steps[0] + steps[1], 0)
-        jump |= apart & (steps[0] != steps[1])
+        jump |= apart & (steps[0] * steps[1] < 0)
     edge = (bulge != 0) & ~jump
     order = np.where(bulge[:, None] >= 0, planes, -planes)
     return np.where(edge, order.argmax(-1), weight.argmax(-1)), edge, jump
 
 
-def _on_planes(normal: Array, point: Array, ray: Array, otherwise: Array) -> Array:
-    """[...] planar depth at which rays (z = -1) meet the planes through points; `otherwise` where that is far away."""
+def _on_planes(normal: Array, point: Array, ray: Array, own: Array, pixel: float) -> Array:
+    """[...] planar depth at which rays (z = -1) meet the planes through points of depth `own`, not far from that."""
     facing = (normal * ray).sum(-1)
     found = (normal * point).sum(-1) / np.where(np.abs(facing) > 1e-9, facing, 1e-9)
-    return np.clip(np.where(found > 0, found, otherwise), 0.9 * otherwise, 1.1 * otherwise)
+    far = FARTHEST * pixel
+    return np.clip(np.where(found > 0, found, own), (1 - far) * own, (1 + far) * own)
 
 
 def _unit(v: Array) -> Array:

@@ -145,8 +145,25 @@ def test_large_things_stand_on_the_floor_and_fit_into_a_room(maker):
     for k in range(6):
         points = np.concatenate([p.solid.vertices for p in maker(np.random.default_rng([8, k]))])
         assert np.isfinite(points).all()
-        assert -0.06 < points[:, 1].min() < 0.06
+        assert -0.03 < points[:, 1].min() < 0.035  # feet of bars, soles of shoes
         assert 0.3 < np.ptp(points, axis=0).max() < 3.2
+
+
+def test_carts_of_any_size_roll_on_the_floor():
+    for k in range(40):
+        points = np.concatenate([p.solid.vertices for p in machines.cart(np.random.default_rng([10, k]))])
+        assert abs(points[:, 1].min()) < 0.005
+
+
+def test_tyres_are_round_all_along():
+    """No segment is pinched: every face stays away from the middle of the tube."""
+    solid = wheels.wheel(np.random.default_rng(2), np.zeros(3), 0.3, 0.0, True)[0].solid
+    middle = solid.vertices[solid.faces].mean(1)
+    radius = (np.hypot(solid.vertices[:, 0], solid.vertices[:, 1]).max(), np.abs(solid.vertices[:, 2]).max())
+    off = np.hypot(np.hypot(middle[:, 0], middle[:, 1]) - (radius[0] - radius[1]), middle[:, 2])
+    assert off.min() > 0.85 * radius[1]
+    out = (solid.normals * solid.vertices).sum(-1)
+    assert (out[np.hypot(solid.vertices[:, 0], solid.vertices[:, 1]) > radius[0] - 0.5 * radius[1]] > 0).all()
 
 
 def test_wheels_touch_the_floor_at_both_ends():

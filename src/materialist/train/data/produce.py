@@ -17,6 +17,8 @@ from materialist.train.data import heldout
 from materialist.train.data.sample import KINDS, Options, make_sample
 
 FORMAT = 1
+CONTENT = 2
+"""Counts the changes of what sample i of a training set shows; held-out sets have stayed the same."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -133,6 +135,7 @@ def _description(options: Options) -> dict:
 
     return {
         "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split,
+        "content": CONTENT if options.split == "train" else 1,
         "options": {"spp": options.spp, "meshes": [p.stem for p in options.meshes],
                     "envmaps": [p.stem for p in options.envmaps]} | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
@@ -152,7 +155,8 @@ def read_description(folder: str | Path) -> dict:
 
 
 def _same(old: dict, new: dict, folder: Path) -> None:
-    for name in ("size", "seed", "split", "options"):
+    old = {"content": 1, **old}
+    for name in ("size", "seed", "split", "options", "content"):
         if old.get(name) != new[name]:
             raise InputError(
                 f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; resume with that or name another."

@@ -98,19 +98,26 @@ def _engine(rng, seat, head, pedal, back, r, lacquer, metal, dark) -> Parts:
 
 def wheel(rng, hub, r: float, turn: float, fat: bool) -> Parts:
     """Tyre, rim, spokes and hub of a wheel that stands upright and rolls along X."""
-    phi = np.linspace(0, 2 * np.pi, 40)
-    ring = lambda radius: np.stack([np.cos(phi), np.sin(phi), 0 * phi], -1) * radius  # noqa: E731
-    tyre = rng.uniform(0.045, 0.07) if fat else rng.uniform(0.014, 0.028)
-    rim, made = m.metal(rng), [Part(s.tube(ring(r - tyre), tyre, 10), rubber(rng))]
-    made.append(Part(s.tube(ring(r - 2 * tyre), 0.012, 6), rim))
+    scale = min(1.0, r / 0.27)  # small wheels are thinner
+    tyre = scale * (rng.uniform(0.045, 0.07) if fat else rng.uniform(0.014, 0.028))
+    rim, made = m.metal(rng), [Part(_ring(r - tyre, tyre, 10), rubber(rng))]
+    made.append(Part(_ring(r - 2 * tyre, 0.012 * scale, 6), rim))
     count, broad = (
         (int(rng.integers(4, 9)), 0.016) if fat and rng.random() < 0.7 else (int(rng.integers(12, 24)), 0.003)
     )
     for a in np.arange(count) * 2 * np.pi / count:
         end = (r - 2 * tyre) * np.array([np.cos(a), np.sin(a), 0])
-        made.append(Part(s.tube([0.1 * end, end], broad, 5), rim))
-    made.append(Part(s.moved(disc(rng.uniform(0.04, 0.13) if fat else 0.03, 0.12), tip=np.pi / 2), rim))
+        made.append(Part(s.tube([0.1 * end, end], broad * scale, 5), rim))
+    hub_radius = scale * (rng.uniform(0.04, 0.13) if fat else 0.03)
+    made.append(Part(s.moved(disc(hub_radius, 0.12 * scale), tip=np.pi / 2), rim))
     return things.placed(made, hub, turn)
+
+
+def _ring(radius: float, thick: float, n: int) -> s.Solid:
+    """A torus about the Z axis."""
+    phi = np.linspace(0, 2 * np.pi, n + 1)
+    ring = shapes.lathe(np.stack([radius + thick * np.cos(phi), thick * np.sin(phi)], -1), 40)
+    return s.moved(s.metric(ring, np.pi * radius, 2 * np.pi * thick), tip=np.pi / 2)
 
 
 def paint(rng) -> m.Material:

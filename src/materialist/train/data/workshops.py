@@ -14,7 +14,7 @@ from materialist.train.data.world import Part, View, World, look
 
 
 def workshop(rng: np.random.Generator, meshes: tuple[Path, ...], captures: tuple[Path, ...]) -> World:
-    """A large thing of many parts seen from two to five metres, in a room with loaded shelves."""
+    """A large thing of many parts seen from one metre to five, in a room with loaded shelves."""
     size = rng.uniform(3.2, 8.0), rng.uniform(4.0, 9.0), rng.uniform(2.3, 4.0)
     w, d, _ = size
     parts, portals, envmap = rooms._shell(rng, rooms._walls(*size), size, captures)
