@@ -30,7 +30,7 @@ def layout(context: Context) -> None:
             object_fit="cover", interactive=False, buttons=[], elem_id="lights", format="jpeg",
         )  # fmt: skip
         parts["own_map"] = gr.File(
-            label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=110,
+            label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150,
             file_types=[".exr", ".hdr", ".png", ".jpg"],
         )  # fmt: skip
         parts["rotate"] = gr.Slider(-180, 180, 0, step=1, label="Turn the light, degrees", elem_id="rotate", buttons=[])

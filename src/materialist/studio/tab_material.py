@@ -33,7 +33,7 @@ def layout(context: Context) -> None:
             parts["own"] = gr.Button("Own colours again", size="sm", min_width=120)
         with gr.Accordion("Texture", open=False):
             parts["texture"] = gr.File(
-                label="A picture to lay on the surface", type="filepath", height=110, file_types=sorted(uploads.PHOTOS)
+                label="A picture to lay on the surface", type="filepath", height=150, file_types=sorted(uploads.PHOTOS)
             )
             parts["texture_scale"] = gr.Slider(0.1, 4, 1, step=0.05, label="Size of the texture", buttons=[])
         parts["as_fitted"] = gr.Button("Roughness and metallic as they were found", size="sm")

@@ -27,7 +27,7 @@ def layout(context: Context) -> None:
         gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
         parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
         parts["own_mesh"] = gr.File(
-            label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=110,
+            label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
             file_types=[".glb", ".ply", ".obj", ".stl"],
         )  # fmt: skip
         parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")

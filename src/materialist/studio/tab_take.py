@@ -45,7 +45,7 @@ def layout(context: Context) -> None:
             parts["make_stop"] = gr.Button("Stop", variant="stop", visible=False, min_width=80)
         parts["make_progress"] = gr.HTML("", js_on_load=None, elem_id="make_progress")
         parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
-        parts["recipe"] = gr.File(label="Load an edits.yaml", type="filepath", height=110, file_types=[".yaml", ".yml"])
+        parts["recipe"] = gr.File(label="Load an edits.yaml", type="filepath", height=150, file_types=[".yaml", ".yml"])
         parts["commands"] = gr.Textbox(
             "", label="The same on the command line", lines=4, interactive=False, buttons=["copy"], elem_id="commands"
         )
