@@ -92,13 +92,14 @@ def at_edges(depth: Array, normal: Array, known: Array, rays: Array, place: Arra
     """
     from scipy.ndimage import binary_dilation
 
-    if not edges(normal, known, crease).any():
+    sharp = edges(normal, known, crease)
+    if not sharp.any():
         return Sided(np.zeros(0, int), np.zeros(0), np.zeros((0, 3)))
     first = np.floor(place).astype(int)
     pixels = first[:, None] + _CORNERS  # [V, 4, 2]
     height, width = known.shape
     there = ((pixels >= 0) & (pixels < [width, height])).all((-1, -2))
-    near = binary_dilation(edges(normal, known, crease), iterations=REACH)
+    near = binary_dilation(sharp, iterations=REACH)
     column, row = np.clip(pixels, 0, [width - 1, height - 1]).transpose(2, 0, 1)
     number = np.flatnonzero(there & known[row, column].all(-1) & near[row, column].any(-1))
     column, row = column[number], row[number]
