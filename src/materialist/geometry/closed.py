@@ -175,7 +175,8 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
     through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
     own = np.exp(at(middle)) - through / (2 * at(length))
-    through = np.maximum(np.minimum(through, at(_room(view, front))), LEAST * own)
+    room = at(_room(view, front))
+    through = np.maximum(np.minimum(through, room), LEAST * own)
     sigma = smooth * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
@@ -189,7 +190,7 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     if view.back is not None:  # those fitted to its depth are no face's next to an edge
         k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
         depth[k], back_normal[k] = z, n
-        depth = np.minimum(depth, own + at(_room(view, front)) / at(length))
+        depth = np.minimum(depth, own + room / at(length))
     through = np.maximum((depth - own) * at(length), LEAST * own)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)

@@ -108,10 +108,10 @@ def at_edges(depth: Array, normal: Array, known: Array, rays: Array, place: Arra
     own, z = normal[row, column], depth[row, column]  # [K, 4, 3], [K, 4]
     ray = (weight[..., None] * rays[row, column]).sum(1)  # [K, 3]
     points = z[..., None] * rays[row, column]  # [K, 4, 3]
-    pixel = spacing(rays)
+    pixel, limit = spacing(rays), np.cos(np.radians(crease))
     planes = _on_planes(own, points, ray[:, None], z, pixel)  # [K, 4] depth of each pixel's plane at the place
-    side, edge, jump = _face(own, points, z, planes, weight, rays[row, column], np.cos(np.radians(crease)), pixel)
-    alike = (own * np.take_along_axis(own, side[:, None, None], 1)).sum(-1) > np.cos(np.radians(crease))
+    side, edge, jump = _face(own, points, z, planes, weight, rays[row, column], limit, pixel)
+    alike = (own * np.take_along_axis(own, side[:, None, None], 1)).sum(-1) > limit
     share = np.where(alike, np.maximum(weight, 1e-3), 0)
     known_side = (own * own).sum(-1).min(-1) > 0.5  # a pixel without a normal lies on no face
     share /= np.maximum(share.sum(-1, keepdims=True), 1e-9)

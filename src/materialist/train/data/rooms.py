@@ -44,8 +44,8 @@ def table_top(rng: np.random.Generator, meshes: tuple[Path, ...], captures: tupl
 
 def _world(rng, size, meshes, captures, close: bool) -> World:
     w, d, h = size
-    sides = _walls(w, d, h)
-    parts, portals, envmap = _shell(rng, sides, size, captures)
+    sides = four_walls(w, d, h)
+    parts, portals, envmap = shell(rng, sides, size, captures)
     standing = _furnish(rng, size, meshes, close)
     for p in standing:
         parts += things.placed(p.piece.parts, (p.x, 0, p.z), p.turn)
@@ -53,12 +53,12 @@ def _world(rng, size, meshes, captures, close: bool) -> World:
         a, b = w * rng.uniform(0.3, 0.7), d * rng.uniform(0.25, 0.6)
         flat = s.moved(s.slab(np.array([a, 0.012, b]), 0.004), (rng.normal() * 0.3, 0, rng.normal() * 0.4))
         parts.append(Part(flat, m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)))
-    parts += _lamps(rng, size, portals, envmap)
+    parts += lamps(rng, size, portals, envmap)
     view = _close_view(rng, size, standing) if close else _view(rng, size, standing)
     return World(parts, envmap, view, portals, "table" if close else "room")
 
 
-def _walls(w: float, d: float, h: float) -> list[Wall]:
+def four_walls(w: float, d: float, h: float) -> list[Wall]:
     """Back, right, front, left, seen from inside."""
     corners = [(-w / 2, -d / 2), (w / 2, -d / 2), (w / 2, d / 2), (-w / 2, d / 2)]
     way = [_X, _Z, -_X, -_Z]
@@ -66,8 +66,11 @@ def _walls(w: float, d: float, h: float) -> list[Wall]:
     return [Wall(np.array([x, 0, z]), r, n, h) for (x, z), r, n in zip(corners, way, length)]
 
 
-def _shell(rng, sides: list[Wall], size, captures):
-    """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
+def shell(rng, sides: list[Wall], size, captures, ground: m.Material | None = None):
+    """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms.
+
+    ground: what the floor is made of, if not what rooms have.
+    """
     w, d, h = size
     is_open = rng.random() < 0.25
     parts: Parts = []
@@ -96,7 +99,7 @@ def _shell(rng, sides: list[Wall], size, captures):
         parts += walls.hangings(rng, wall, int(rng.integers(0, 5)))
     floor = [m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric][rng.integers(5)](rng)
     ceiling = m.wood(rng, "planks") if rng.random() < 0.08 else walls._white(rng)
-    parts.append(Part(s.sheet((-w / 2, 0, d / 2), w * _X, -d * _Z), floor))
+    parts.append(Part(s.sheet((-w / 2, 0, d / 2), w * _X, -d * _Z), ground or floor))
     parts.append(Part(s.sheet((-w / 2, h, -d / 2), w * _X, d * _Z), ceiling))
     if rng.random() < 0.12:
         parts += [Part(s.moved(s.slab(np.array([0.14, 0.2, d])), (x, h - 0.2, 0)), m.wood(rng))
@@ -161,7 +164,7 @@ def kelvin(rng: np.random.Generator) -> np.ndarray:
     return colour / colour.mean()
 
 
-def _lamps(rng, size, portals, envmap) -> Parts:
+def lamps(rng, size, portals, envmap) -> Parts:
     """Ceiling panels, spots, globes and shades; their power against the windows varies by a factor of a hundred."""
     dark = not portals
     if not dark and rng.random() < 0.4:

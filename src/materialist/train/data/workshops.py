@@ -10,17 +10,15 @@ from materialist.train.data import furniture, machines, rooms, things
 from materialist.train.data import materials as m
 from materialist.train.data.things import Parts
 from materialist.train.data.wheels import by
-from materialist.train.data.world import Part, View, World, look
+from materialist.train.data.world import View, World, look
 
 
 def workshop(rng: np.random.Generator, meshes: tuple[Path, ...], captures: tuple[Path, ...]) -> World:
     """A large thing of many parts seen from one metre to five, in a room with loaded shelves."""
     size = rng.uniform(3.2, 8.0), rng.uniform(4.0, 9.0), rng.uniform(2.3, 4.0)
     w, d, _ = size
-    parts, portals, envmap = rooms._shell(rng, rooms._walls(*size), size, captures)
-    if rng.random() < 0.5:
-        floor = m.ground(rng) if rng.random() < 0.7 else m.stone(rng)
-        parts = [_refloored(p, floor, d) for p in parts]
+    ground = (m.ground(rng) if rng.random() < 0.7 else m.stone(rng)) if rng.random() < 0.5 else None
+    parts, portals, envmap = rooms.shell(rng, rooms.four_walls(*size), size, captures, ground)
     parts += _along_walls(rng, size, meshes)
     main = np.array([rng.uniform(-0.25, 0.25) * w, 0, rng.uniform(-0.3, 0.1) * d])
     parts += things.placed(machines.big_thing(rng, meshes), main, rng.normal() * 0.5)
@@ -30,15 +28,8 @@ def workshop(rng: np.random.Generator, meshes: tuple[Path, ...], captures: tuple
             parts += things.placed(machines.big_thing(rng, meshes), at, rng.uniform(0, 2 * np.pi))
     small = things.scattered(rng, int(rng.integers(0, 5)), (1.5, 1.2), (0.1, 0.5), meshes)
     parts += things.placed(small, main + by(0, 0, 0.3))
-    parts += rooms._lamps(rng, size, portals, envmap)
+    parts += rooms.lamps(rng, size, portals, envmap)
     return World(parts, envmap, _view(rng, size, main), portals, "workshop")
-
-
-def _refloored(part: Part, floor: m.Material, d: float) -> Part:
-    """The part, with another material where it is the floor."""
-    v = part.solid.vertices
-    flat = len(v) == 4 and np.abs(v[:, 1]).max() == 0 and np.ptp(v[:, 2]) > d * 0.99
-    return Part(part.solid, floor) if flat else part
 
 
 def _along_walls(rng, size, meshes) -> Parts:
