@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from materialist import bench
-from materialist.bench import glass, shapes
+from materialist.bench import glass, glass_backdrop, shapes
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.errors import InputError
@@ -44,7 +44,7 @@ def test_the_views_maps_belong_together(scene):
 def test_without_refraction_both_models_show_the_background(scene, mitsuba):
     envmap = np.full((16, 32, 3), 0.5, np.float32)
     room = scene.render(envmap, "room", spp=64)
-    behind = models.true_background(scene, room)
+    behind = models.true_background(scene, room, envmap)
     mask = scene.mask
     true = Thickness(scene.front.thickness, scene.front.thickness)
     bent = models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6)
@@ -56,9 +56,38 @@ def test_without_refraction_both_models_show_the_background(scene, mitsuba):
     assert (bent[~mask] == 0).all() and (traced[~mask] == 0).all()
 
 
+def test_the_background_looks_like_its_picture_in_the_light(scene, mitsuba):
+    envmap = np.full((16, 32, 3), 0.5, np.float32)
+    envmap[2:4, 10:12] = 20
+    room = scene.render(envmap, "room", spp=256)
+    behind = models.true_background(scene, room, envmap)
+    again = glass_backdrop.lit(scene, behind.depth, behind.normal, behind.albedo, envmap, length=6, spp=256, seed=5)
+    there = behind.depth > 0
+    # Between the pixels a fine pattern is blurred, no brighter or darker.
+    assert np.abs(again - room)[there].mean() < 0.08 * room[there].mean()
+    assert again[there].mean() == pytest.approx(room[there].mean(), rel=0.01)
+    assert behind.albedo[there].std() > 0.05 and behind.albedo.max() <= glass_backdrop.BRIGHTEST
+
+
+def test_glass_darkens_the_floor_that_it_stands_on(scene, mitsuba):
+    envmap = np.full((16, 32, 3), 0.1, np.float32)
+    envmap[1, 14:18] = 60
+    behind = models.true_background(scene, scene.render(envmap, "room", spp=256), envmap)
+    body = {"object": scenes._mesh(scene._mi, scene.item.solid, {"type": "dielectric", "int_ior": 1.5})}
+    pictures = [
+        glass_backdrop.lit(
+            scene, behind.depth, behind.normal, behind.albedo, envmap, things, length=40, spp=256, seed=5
+        )
+        for things in ({}, body)
+    ]
+    outside = ~scene.mask & (behind.depth > 0)
+    change = (pictures[1] - pictures[0])[outside].mean(-1) / pictures[0][outside].mean(-1)
+    assert np.percentile(change, 1) < -0.2 and abs(np.median(change)) < 0.05
+
+
 def test_the_hole_is_filled_and_its_surroundings_stay(scene):
     photo = np.random.default_rng(0).random((40, 40, 3)).astype(np.float32)
-    found = models.inpainted_background(scene, photo)
+    found = models.inpainted_background(scene, photo, np.full((16, 32, 3), 0.5, np.float32))
     mask = scene.mask
     near = np.zeros_like(mask)
     near[1:-1, 1:-1] = mask[2:, 1:-1] | mask[:-2, 1:-1] | mask[1:-1, 2:] | mask[1:-1, :-2] | mask[1:-1, 1:-1]
@@ -88,7 +117,7 @@ def test_noise_on_the_thickness_is_drawn_as_often_as_asked(scene, mitsuba):
     rows = glass.sensitivity(
         case,
         Thickness(scene.front.thickness, scene.front.thickness),
-        models.true_background(scene, room),
+        models.true_background(scene, room, envmap),
         draws=3,
         seed=0,
     )

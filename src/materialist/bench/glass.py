@@ -17,8 +17,8 @@ import numpy as np
 from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
+from materialist.bench.glass_backdrop import Background
 from materialist.bench.glass_latency import latencies
-from materialist.bench.glass_models import Background
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
@@ -47,8 +47,8 @@ NOTE = (
     "`network` RefractionNet alone; its error is mean absolute over mean true thickness. `noise` multiplies the "
     "predicted d by 1 + e, e uniform in [-0.5, 0.5], one e a draw. `background alone` shows the background "
     "without any refraction. `ceiling, true mesh` is the object's own mesh before the background that the closed "
-    "proxy stands before, `ceiling, truth again` the truth with other noise and as few paths as the predictions: "
-    "nothing can do better. The inpainted background is that of `materialist glass`: patterns that go on "
+    "proxy stands before, `ceiling, truth again` the truth with other noise and as few paths as the predictions, "
+    "not denoised. The inpainted background is that of `materialist glass`: patterns that go on "
     "and patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights "
     "are installed."
 )
@@ -74,15 +74,16 @@ class Case:
 
 def run(
     *, data: Path | None, output: Path, shapes: int = 2, envmaps: int = 2, iors: str | float = "1.1,1.3",
-    background: str = "room", size: int = 128, spp: int = 144, full: bool = False, draws: int = 10, pictures: int = 6,
-    latency: int = 0, seed: int = 0, device: str = "auto",
+    background: str = "room", size: int = 128, spp: int = 144, reference: int = 1024, full: bool = False,
+    draws: int = 10, pictures: int = 6, latency: int = 0, seed: int = 0, device: str = "auto",
 ) -> None:  # fmt: skip
     """Compare the two-interface model and the closed proxy with true glass.
 
     `shapes` objects of each group, each under `envmaps` lights with each of `iors` (comma-separated); `full` is the
     paper's 20 objects x 30 lights x 1.1 and 1.3. `background` is 'room', a patterned floor and wall, or 'envmap',
-    nothing but the light. `draws` noisy thicknesses a case; `pictures` cases are drawn. `latency`
-    is the size of a picture on which the preview is timed; `shapes` may then be 0.
+    nothing but the light. Predictions have `spp` paths a pixel, photos and truth `reference`. `draws` noisy
+    thicknesses a case; `pictures` cases are drawn. `latency` is the size of a picture on which the preview is timed;
+    `shapes` may then be 0.
     """
     from materialist.render.variant import setup
 
@@ -91,14 +92,15 @@ def run(
         shapes, envmaps, refraction = 10, 30, [1.1, 1.3]
     if (
         shapes < (not latency)
-        or min(envmaps, spp) < 1
+        or min(envmaps, spp, reference) < 1
         or size < 32
         or not (latency == 0 or latency >= 64)
         or not all(1 < x <= 3 for x in refraction)
     ):
         raise InputError(
-            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, size {size}, iors {iors}, latency {latency}: give at "
-            "least 1, 1, 1, 32 pixels, indices of refraction above 1 up to 3, and a latency of 0 or 64 pixels or more."
+            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, reference {reference}, size {size}, iors {iors}, latency "
+            f"{latency}: give at least 1, 1, 1, 1, 32 pixels, indices of refraction above 1 up to 3, and a latency of "
+            "0 or 64 pixels or more."
         )
     if background not in scenes.ENVMAP_ROWS:
         raise InputError(f"The background is {background!r}; choose room or envmap.")
@@ -106,11 +108,12 @@ def run(
     rows: list[dict[str, Any]] = []
     drawn: list[Array] = []
     settings = {"data": None if data is None else str(data), "shapes": shapes, "envmaps": envmaps, "iors": str(iors),
-                "background": background, "size": size, "spp": spp, "latency": latency, "seed": seed}  # fmt: skip
+                "background": background, "size": size, "spp": spp, "reference": reference, "latency": latency,
+                "seed": seed}  # fmt: skip
     report = Report("Glass", NOTE, settings, COLUMNS, rows, plotted=("psnr_symmetric", "psnr_asymmetric"))
-    options: dict[str, Any] = {"background": background, "size": size, "spp": spp, "seed": seed}
-    for case, room in cases(data, shapes, envmaps, refraction, **options) if shapes else ():
-        found, strip = compared(case, room, spp=spp, draws=draws, seed=seed)
+    options: dict[str, Any] = {"background": background, "size": size, "reference": reference, "seed": seed}
+    for case, behind in cases(data, shapes, envmaps, refraction, **options) if shapes else ():
+        found, strip = compared(case, behind, spp=spp, draws=draws, seed=seed)
         rows.extend(found)
         if len(drawn) < pictures:
             drawn.append(strip)
@@ -122,29 +125,39 @@ def run(
 
 
 def cases(
-    data: Path | None, shapes: int, envmaps: int, iors: list[float], *, background: str, size: int, spp: int, seed: int
-) -> Iterator[tuple[Case, Array]]:
-    """Every case with the picture [H, W, 3] of its room without the object."""
+    data: Path | None,
+    shapes: int,
+    envmaps: int,
+    iors: list[float],
+    *,
+    background: str,
+    size: int,
+    reference: int,
+    seed: int,
+) -> Iterator[tuple[Case, dict[str, Background]]]:  # fmt: skip
+    """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
     for k, thing in enumerate(scenes.things(data, shapes, seed)):
         scene = scenes.GlassScene(thing, size, seed, background)
         for j in range(envmaps):
             envmap = scenes.environment(k * envmaps + j, scene, data=data, seed=seed)
-            room = scene.render(envmap, "room", spp=spp, seed=1)
-            photo = scene.render(envmap, "diffuse", spp=spp, seed=2)
+            room = scene.render(envmap, "room", spp=reference, seed=1)
+            photo = scene.render(envmap, "diffuse", spp=reference, seed=2)
+            gain = scenes.exposure(room)
+            behind = {
+                "true": models.true_background(scene, room, envmap),
+                "inpainted": models.inpainted_background(scene, photo, envmap, gain),
+            }
             for ior in iors:
-                truth = scene.render(envmap, "glass", ior=ior, spp=4 * spp, seed=3)
-                name = f"{thing.name} light {j} ior {ior:g}"
-                yield Case(scene, envmap, photo, truth, scenes.exposure(room), ior, name), room
+                truth = scene.render(envmap, "glass", ior=ior, spp=reference, seed=3)
+                yield Case(scene, envmap, photo, truth, gain, ior, f"{thing.name} light {j} ior {ior:g}"), behind
 
 
-def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tuple[list[dict[str, Any]], Array]:
+def compared(
+    case: Case, behind: dict[str, Background], *, spp: int, draws: int, seed: int
+) -> tuple[list[dict[str, Any]], Array]:
     """The rows of all methods for one case, and a strip of pictures."""
     scene, shown = case.scene, {}
     seen = np.clip(case.photo * case.gain, 0, 1)
-    behind = {
-        "true": models.true_background(scene, room),
-        "inpainted": models.inpainted_background(scene, case.photo, case.gain),
-    }
     d = models.thicknesses(scene, seen, behind["true"])
     best = "predicted"
     rows = []
@@ -172,7 +185,7 @@ def compared(case: Case, room: Array, *, spp: int, draws: int, seed: int) -> tup
     add(f"two_interface, {best} d, back normal = front normal", same, d[best])
     rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
     order = ("two_interface, true d", f"two_interface, {best} d", f"closed, {best} d", f"closed, {best} d, inpainted")
-    return rows, _strip(case, room, [shown[name] for name in order])
+    return rows, _strip(case, behind["true"].picture, [shown[name] for name in order])
 
 
 def _two_interface(case: Case, found: Thickness, behind: Background, spp: int) -> Array:

@@ -3,37 +3,27 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _light, _mesh, path_traced
+from materialist.bench.glass_backdrop import Background, albedo_of, lit, suppress_missing
+from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
 
 
-@dataclass(frozen=True)
-class Background:
-    """What is taken to be behind the object."""
-
-    picture: Array
-    """[H, W, 3] linear radiance."""
-    depth: Array
-    """[H, W] planar, 0 for sky."""
-    normal: Array
-    """[H, W, 3] unit."""
-
-
-def true_background(scene: GlassScene, room: Array) -> Background:
+def true_background(scene: GlassScene, room: Array, envmap: Array) -> Background:
     """The room as it is, its picture [H, W, 3] rendered without the object."""
-    return Background(room, scene.behind.depth, scene.behind.normal)
+    depth, normal = scene.behind.depth, scene.behind.normal
+    return Background(room, depth, normal, albedo_of(scene, depth, normal, room, envmap))
 
 
-def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> Background:
+def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0) -> Background:
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
 
-    Surfaces go on as planes, the picture by patches of its own; `gain` is the photo's exposure.
+    Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
+    albedo is found with the object there, so that its shadow is not part of it.
     """
     from materialist.color import linear_to_srgb
     from materialist.edit.behind import SKY, behind
@@ -42,6 +32,11 @@ def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> 
     from materialist.geometry.membrane import membrane
 
     hole = _grown(scene.mask)
+    there = scene.mask[..., None]
+    albedo = albedo_of(
+        scene, np.where(scene.mask, scene.front.depth, scene.behind.depth),
+        np.where(there, scene.front.normal, scene.behind.normal), photo, envmap,
+    )  # fmt: skip
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
     label = np.full(hole.shape, SKY)
@@ -52,8 +47,8 @@ def inpainted_background(scene: GlassScene, photo: Array, gain: float = 1.0) -> 
     seen, anywhere = linear_to_srgb(photo * gain), np.ones_like(hole)
     told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
     plan = exemplar_plan(seen, hole, anywhere, label, told=told)
-    picture = membrane(photo, ~hole) if plan is None else plan.fill(photo)
-    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal)
+    picture, albedo = (membrane(x, ~hole) if plan is None else plan.fill(x) for x in (photo, albedo))
+    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal, albedo)
 
 
 def _grown(mask: Array) -> Array:
@@ -79,11 +74,7 @@ def two_interface(
 def closed_proxy(
     scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
 ) -> Array:
-    """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced.
-
-    The background is a surface that glows as its picture does; what the picture does not show of its planes glows
-    with the plane's mean. So the object's own shadow and caustics are left out.
-    """
+    """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
     from materialist.geometry.closed import closed_proxy as close
 
     front = scene.front
@@ -100,54 +91,26 @@ def before(
 
     Denoised as `materialist glass` does, where the denoiser is installed.
     """
-    mi = scene._mi
-    description: dict[str, Any] = {"type": "scene", **_light(mi, envmap), **_backdrop(scene, behind)}
-    description["object"] = _mesh(mi, body, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
-    picture = path_traced(
-        mi, description, scene.camera, depth=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask
+    things = {"object": _mesh(scene._mi, body, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})}
+    picture = lit(
+        scene, behind.depth, behind.normal, behind.albedo, envmap, things,
+        length=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask,
     )  # fmt: skip
     return np.where(scene.mask[..., None], _clean(picture, scene), 0)
 
 
 def _clean(picture: Array, scene: GlassScene) -> Array:
     """[H, W, 3] without noise in the rectangle around the object."""
-    from materialist.errors import SetupError
     from materialist.render.denoise import denoise
 
     rows, columns = np.flatnonzero(scene.mask.any(1)), np.flatnonzero(scene.mask.any(0))
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     part = np.ascontiguousarray(picture[window])
-    try:
-        clean = denoise(part, albedo=np.ones_like(part), normal=np.ascontiguousarray(scene.front.normal[window]))
-    except SetupError:
-        return picture
     whole = picture.copy()
-    whole[window] = clean
+    with suppress_missing():
+        normal = np.ascontiguousarray(scene.front.normal[window])
+        whole[window] = denoise(part, albedo=np.ones_like(part), normal=normal)
     return whole
-
-
-def _backdrop(scene: GlassScene, behind: Background) -> dict[str, Any]:
-    """The background as glowing meshes."""
-    from materialist.geometry.build import build_geometry
-    from materialist.render.buffers import tensor
-    from materialist.render.scene import part
-
-    mi = scene._mi
-    if not behind.depth.any():
-        return {}
-    geometry = build_geometry(behind.depth, behind.normal, scene.camera)
-    black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
-    found = {}
-    for k in np.unique(geometry.mesh.face_plane):
-        if k < 0:
-            glow = behind.picture
-        else:
-            members = geometry.plane_label == k
-            glow = np.broadcast_to(behind.picture[members].mean(0), (2, 2, 3))
-        texture = {"type": "bitmap", "data": tensor(mi, glow), "raw": True, "wrap_mode": "clamp"}
-        mesh = _mesh(mi, part(geometry.mesh, int(k)), black, {"type": "area", "radiance": texture})
-        found[f"backdrop{int(k) + 1}"] = mesh
-    return found
 
 
 def plain_background(scene: GlassScene, behind: Background) -> Array:

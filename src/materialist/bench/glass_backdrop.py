@@ -1,0 +1,83 @@
+"""What stands behind the object of `bench glass`, as one picture of it tells: meshes that reflect the light.
+
+They are lit, and do not glow: so the glass casts its shadow and its caustics on them, as in a fitted scene.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from materialist.bench.glass_scenes import DEPTH, GlassScene, _light, _mesh, path_traced
+from materialist.types import Array
+
+SPP = 256
+"""Paths a pixel from which the light that falls on the surfaces is read, denoised."""
+ROUNDS = 3
+"""Times the albedo is corrected: light goes to and fro between surfaces."""
+BRIGHTEST = 0.95
+"""Largest albedo found."""
+
+
+@dataclass(frozen=True)
+class Background:
+    """What is taken to be behind the object."""
+
+    picture: Array
+    """[H, W, 3] linear radiance."""
+    depth: Array
+    """[H, W] planar, 0 for sky."""
+    normal: Array
+    """[H, W, 3] unit."""
+    albedo: Array
+    """[H, W, 3] linear, in [0, 1], with which a rendering under the scene's light shows `picture`."""
+
+
+def albedo_of(scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array) -> Array:
+    """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`."""
+    from materialist.render.denoise import denoise
+
+    albedo = np.full(picture.shape, 0.5, np.float32)
+    for _ in range(ROUNDS if depth.any() else 0):
+        seen = lit(scene, depth, normal, albedo, envmap, length=DEPTH["diffuse"], spp=SPP)
+        with suppress_missing():
+            seen = denoise(seen, albedo=albedo, normal=normal)
+        albedo = np.clip(albedo * picture / np.maximum(seen, 1e-6), 0, BRIGHTEST).astype(np.float32)
+    return albedo
+
+
+def lit(
+    scene: GlassScene, depth: Array, normal: Array, albedo: Array, envmap: Array, things: dict[str, Any] | None = None,
+    *, length: int, spp: int, seed: int = 0, around: Array | None = None,
+) -> Array:  # fmt: skip
+    """[H, W, 3] linear: Mitsuba objects before the surfaces of the maps, by paths of `length` at most."""
+    surfaces = _surfaces(scene, depth, normal, albedo)
+    description = {"type": "scene", **_light(scene._mi, envmap), **surfaces, **(things or {})}
+    return path_traced(scene._mi, description, scene.camera, depth=length, spp=spp, seed=seed, around=around)
+
+
+def suppress_missing():
+    """A context in which a missing denoiser is passed over: the picture stays as it is."""
+    from materialist.errors import SetupError
+
+    return suppress(SetupError)
+
+
+def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array) -> dict[str, Any]:
+    """The maps' surfaces, planes going on beyond the picture with their mean albedo."""
+    from materialist.geometry.build import build_geometry
+    from materialist.render.buffers import tensor
+    from materialist.render.scene import part
+
+    if not depth.any():
+        return {}
+    geometry, found = build_geometry(depth, normal, scene.camera), {}
+    for k in np.unique(geometry.mesh.face_plane):
+        paint = albedo if k < 0 else np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
+        texture = {"type": "bitmap", "data": tensor(scene._mi, paint), "raw": True, "wrap_mode": "clamp"}
+        surface = {"type": "diffuse", "reflectance": texture}
+        found[f"backdrop{int(k) + 1}"] = _mesh(scene._mi, part(geometry.mesh, int(k)), surface)
+    return found
