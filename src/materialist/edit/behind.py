@@ -20,6 +20,8 @@ AROUND = 0.15
 """Surroundings that are looked at, as a part of the hole's extent."""
 STRAIGHT = 0.9
 """Planes part along straight lines if such lines sort this share of the pixels around rightly."""
+SLACK = 1e-7
+"""Penalty on the weights of those lines."""
 CLEAR = 1e-3
 """What was hidden lies at least this part of the depth behind what hid it."""
 
@@ -120,18 +122,32 @@ def _straight(known: Array, ring: Array, kinds: Array) -> Array | None:
     basis = at(rows.astype(float), columns.astype(float))
     wanted = known[rows, columns][:, None] == kinds  # [N, K]
     balance = 1 / np.maximum(wanted.sum(0), 1)[wanted.argmax(1)]
-    balance = balance / balance.sum()
-    weights = np.zeros((3, len(kinds)))
-    for _ in range(400):
-        score = basis @ weights
-        chance = np.exp(score - score.max(-1, keepdims=True))
-        chance /= chance.sum(-1, keepdims=True)
-        weights -= 4.0 * (basis.T @ ((chance - wanted) * balance[:, None]) + 1e-4 * weights)
+    weights = _softmax(basis, wanted, balance / balance.sum())
     right = (basis @ weights).argmax(-1) == wanted.argmax(-1)
     if right.mean() < STRAIGHT:
         return None
     y, x = np.mgrid[: known.shape[0], : known.shape[1]].astype(float)
     return kinds[(at(y, x) @ weights).argmax(-1)]
+
+
+def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:
+    """[F, K] weights of the softmax classifier of features [N, F] into wanted [N, K] bool, samples weighted [N].
+
+    Nearly without a penalty, and converged: where lines part the samples, they run in the middle of the gap.
+    """
+    from scipy.optimize import minimize
+    from scipy.special import log_softmax
+
+    shape = basis.shape[1], wanted.shape[1]
+
+    def loss(flat: Array) -> tuple[float, Array]:
+        at = flat.reshape(shape)
+        logs = log_softmax(basis @ at, axis=-1)
+        slope = basis.T @ ((np.exp(logs) - wanted) * weight[:, None]) + SLACK * at
+        return float(-(logs[wanted] * weight).sum() + SLACK / 2 * (at**2).sum()), slope.ravel()
+
+    found = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 500})
+    return found.x.reshape(shape)
 
 
 def _ring(hole: Array) -> Array:
