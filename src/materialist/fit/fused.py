@@ -14,6 +14,7 @@ import numpy as np
 import torch
 
 from materialist.fit.losses import CLIPPED, Encoding, encode
+from materialist.fit.materials import prices
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
 from materialist.render.buffers import floats, integers
@@ -48,14 +49,13 @@ class FusedLoss:
             roof = torch.where(photo >= CLIPPED, target, torch.full_like(target, torch.inf))
         else:
             roof = torch.full_like(target, torch.inf)
+        columns, per_value = [0, 0, 0, 1, 2], torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
+        held = settings.delta * prices(prior, settings)[:, columns] * per_value / count
         self._constants = [
-            _flat(v) for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, prior)
+            _flat(v) for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, prior, held)
         ]
-        per_value = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-        columns = [0, 0, 0, 1, 2]
-        held = settings.delta * torch.tensor([settings.weights[k] for k in columns]) * per_value / count
         smooth = torch.tensor([settings.smooth[k] for k in columns]) * per_value / count
-        self._held, self._smooth = _flat(held), _flat(smooth)
+        self._smooth = _flat(smooth)
         self._links = None if neighbours is None or not any(settings.smooth) else _links(neighbours)
 
     def __call__(self, maps: torch.Tensor) -> torch.Tensor:
@@ -64,7 +64,7 @@ class FusedLoss:
 
     def evaluate(self, maps: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Loss [] and its gradient [P, 5] at `maps` [P, 5]."""
-        loss, gradient = _kernel(_flat(maps), self._constants, self._held, self._smooth, self._links, self)
+        loss, gradient = _kernel(_flat(maps), self._constants, self._smooth, self._links, self)
         dr.eval(loss, *gradient)
         return loss.torch().cpu().double().sum().float(), torch.stack([g.torch().cpu() for g in gradient], 1)
 
@@ -81,9 +81,9 @@ class _Apply(torch.autograd.Function):
         return upstream * ctx.saved_tensors[0], None
 
 
-def _kernel(maps, constants, held, smooth, links, objective: FusedLoss):
+def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     """Per-pixel loss, and five arrays of gradients."""
-    diffuse, specular, factor, target, roof, prior = constants
+    diffuse, specular, factor, target, roof, prior, held = constants
     lane: Any = dr.arange(mi.UInt32, objective.count)
     value: list[Any] = [dr.gather(mi.Float, maps, lane * 5 + k) for k in range(5)]
     albedo: Any = mi.Color3f(*value[:3])
@@ -109,7 +109,7 @@ def _kernel(maps, constants, held, smooth, links, objective: FusedLoss):
     gradient = [by_albedo.x, by_albedo.y, by_albedo.z, by_rough, by_metal]
     for k in range(5):
         change = value[k] - dr.gather(mi.Float, prior, lane * 5 + k)
-        weight = dr.gather(mi.Float, held, k)
+        weight = dr.gather(mi.Float, held, lane * 5 + k)
         loss += weight * dr.abs(change)
         gradient[k] += weight * _sign(change)
         if links is not None:

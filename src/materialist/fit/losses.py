@@ -34,8 +34,12 @@ def l1_l2(error: torch.Tensor) -> torch.Tensor:
 
 
 def consistency(materials, prior, weights=(1.0, 1.0, 1.0)) -> torch.Tensor:
-    """L_cons: weighted sum over albedo, roughness, metallic of the mean L1 distance to the prior."""
-    return sum(w * (x - p).abs().mean() for x, p, w in zip(materials, prior, weights, strict=True))
+    """L_cons: weighted sum over albedo, roughness, metallic of the mean L1 distance to the prior.
+
+    A weight is a number, or [P] one for each pixel.
+    """
+    columns = lambda x: x.reshape(len(x), -1).mean(1)  # noqa: E731  [P], also of albedo [P, 3]
+    return sum((w * columns((x - p).abs())).mean() for x, p, w in zip(materials, prior, weights, strict=True))
 
 
 def log_total_variation(log_map: torch.Tensor, weight: torch.Tensor | None = None) -> torch.Tensor:

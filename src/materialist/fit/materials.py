@@ -19,8 +19,8 @@ from materialist.types import Camera
 
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 
-DIELECTRIC = 0.2
-"""Predicted metallic below which a surface counts as a dielectric, the surer the lower."""
+DIELECTRIC = (0.2, 0.04)
+"""Predicted metallic below which a surface may be, and is, a dielectric, the surer the lower."""
 
 
 def remapped(prior: torch.Tensor) -> torch.Tensor:
@@ -46,6 +46,18 @@ def material_field(
     return field if inside is None else Unified(field, inside)
 
 
+def prices(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
+    """[P, 3] weights of albedo, roughness and metallic in L_cons: metal is dearer where the prior says dielectric."""
+    rows = torch.tensor(settings.weights, dtype=torch.float32).repeat(len(prior), 1)
+    rows[:, 2] *= 1 + (settings.dielectric - 1) * _below(prior[:, 4], DIELECTRIC[1])
+    return rows
+
+
+def _below(metallic: torch.Tensor, limit: float) -> torch.Tensor:
+    """1 at 0, 0 from the limit."""
+    return 1 - (metallic / limit).clamp(0, 1)
+
+
 def better_start(
     problem: MaterialProblem,
     photo: torch.Tensor,
@@ -65,7 +77,8 @@ def better_start(
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
     share = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-    price = settings.delta * share * torch.tensor([settings.weights[k] for k in (0, 0, 0, 1, 2)])
+    weights = prices(prior, settings)
+    price = settings.delta * share * weights[:, [0, 0, 0, 1, 2]]
     short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
     candidates, costs = [], []
     for maps in (start, other):
@@ -76,8 +89,8 @@ def better_start(
             cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
-    sure = smooth(1 - (prior[:, 4:] / DIELECTRIC).clamp(0, 1))
-    return torch.where(costs[1] < costs[0] - settings.doubt * sure, candidates[1], candidates[0])
+    doubt = settings.doubt * _below(prior[:, 4], DIELECTRIC[0]) * weights[:, 2] / settings.weights[2]
+    return torch.where(costs[1] < costs[0] - smooth(doubt[:, None]), candidates[1], candidates[0])
 
 
 def fit_materials(
@@ -139,12 +152,14 @@ def material_objective(
 
         return FusedLoss(problem.tables, factor, photo, prior, settings, neighbours)
 
+    price = prices(prior, settings)
+
     def objective(values: torch.Tensor) -> torch.Tensor:
         rendered = problem.render(values) * factor
         value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped))
         parts = [values[:, c] for c in _COLUMNS.values()]
         priors = [prior[:, c] for c in _COLUMNS.values()]
-        value = value + settings.delta * consistency(parts, priors, settings.weights)
+        value = value + settings.delta * consistency(parts, priors, price.unbind(1))
         if neighbours is not None:
             for weight, part, held in zip(settings.smooth, parts, priors, strict=True):
                 if weight:

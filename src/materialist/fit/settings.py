@@ -61,6 +61,8 @@ class MaterialSettings:
     other_metallic: float | None = None
     """If set, the first fit of `maps` also starts from this metallic, and every region goes on from what fitted it
     better: between a dielectric and a metal the loss has a barrier that no gradient crosses."""
+    dielectric: float = 1.0
+    """Price of making a metal of what the prior calls a dielectric, as a multiple of its weight in L_cons."""
     doubt: float = 0.0
     """Least gain in cost (encoded error and price of leaving the prior, a pixel) for which a surface that the prior
     calls a dielectric goes on from `other_metallic`."""
@@ -121,6 +123,7 @@ DEFAULT = FitSettings(
         smooth=(0.002, 0.1, 0.03),
         stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
         other_metallic=0.95,
+        dielectric=3.3,
         doubt=0.004,
     ),
     rounds=3,
