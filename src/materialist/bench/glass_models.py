@@ -78,9 +78,12 @@ def closed_proxy(
     from materialist.geometry.closed import closed_proxy as close
 
     front = scene.front
-    shell = close(
-        front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=behind.depth, back=found.back
-    )  # fmt: skip
+    if found.lathe is not None:
+        shell = found.lathe.body(scene.camera)
+    else:
+        shell = close(
+            front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=behind.depth, back=found.back
+        )  # fmt: skip
     return before(scene, shell, behind, envmap, ior, spp=spp, seed=seed)
 
 
@@ -134,9 +137,8 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     front: Front = scene.front
     seen = (photo, scene.mask, front.normal, front.depth, scene.camera)
     up = upright(behind.depth, behind.normal, planes_of(scene, behind.depth, behind.normal), scene.camera)
-    found = {
-        "true": Thickness(front.thickness, front.thickness), "predicted": best_thickness(*seen, up=up).thickness
-    }  # fmt: skip
+    best = best_thickness(*seen, up=up, behind=behind.depth).thickness
+    found = {"true": Thickness(front.thickness, front.thickness), "predicted": best}
     with suppress(WeightsError):  # the others still tell something
         found["network"] = thickness(*seen)
     mirrored = symmetric_thickness(front.depth, front.normal, scene.mask, scene.camera)

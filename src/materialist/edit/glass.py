@@ -50,11 +50,10 @@ def glass(
     if model not in MODELS:
         raise InputError(f"The model is '{model}'; choose one of {', '.join(MODELS)}.")
     own = checked_region(scene, mask) > 0.5
-    found = object_thickness(scene, own, thickness) if own.any() else None
     removed = without(
         scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed
     )  # fmt: skip
-    assert found is not None  # an empty mask has been refused by `without`
+    found = object_thickness(scene, own, thickness, behind=removed.depth)
     if model == "two-interface":
         edited = _two_interface(scene, removed, own, found, ior, transmission, tint, roughness)
     else:
@@ -84,6 +83,8 @@ def glass_surface(
 
 def _shell(scene: Scene, removed: Scene, own: Array, found: ObjectThickness, hollow: bool, smooth: float) -> Shell:
     """The closed object in front of what is behind it now."""
+    if found.lathe is not None:
+        return found.lathe.body(scene.camera, wall=found.wall if hollow else None)
     return closed_proxy(
         scene.depth, scene.normal, own, found.solid, scene.camera, smooth=smooth,
         wall=found.wall if hollow else None, behind=removed.depth, back=found.back,

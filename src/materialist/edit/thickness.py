@@ -10,6 +10,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.front import smooth_front
+from materialist.geometry.lathe import Lathed
 from materialist.geometry.symmetry import object_size, surface_in, symmetric_thickness
 from materialist.types import Array, Scene
 
@@ -32,9 +33,13 @@ class ObjectThickness:
     """Which method it comes from: `lathe`, `half-turn`, `network`, `symmetry` or `given`."""
     back: Array | None = None
     """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
+    lathe: Lathed | None = None
+    """The whole object, where it was turned on a lathe."""
 
 
-def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "auto") -> ObjectThickness:
+def object_thickness(
+    scene: Scene, mask: Array, method: str | Array | Path = "auto", *, behind: Array | None = None
+) -> ObjectThickness:
     """The thickness of the object under a mask (paper, Thickness Prior Prediction).
 
     Args:
@@ -43,6 +48,7 @@ def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "au
             paper's assumption), `auto` (the front swept around where its normals meet one axis, the turn where it fits
             and agrees with the network, else the network, without weights symmetry), a map [H, W] of scene units along
             the rays, or a file with one.
+        behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
 
     Raises:
         InputError: an unknown method, a map of another size or with negative values, a mask without a surface.
@@ -54,7 +60,7 @@ def object_thickness(scene: Scene, mask: Array, method: str | Array | Path = "au
         if method == "network":
             return _by_network(scene, inside, size)
         if method != "symmetry":
-            return _chosen(scene, inside, size, method)
+            return _chosen(scene, inside, size, method, behind)
         return ObjectThickness(_mirrored(scene, inside), WALL * size, "symmetry")
     given = _given(method, inside.shape)
     if not (given[inside] > 0).any():
@@ -69,19 +75,19 @@ def _by_network(scene: Scene, inside: Array, size: float) -> ObjectThickness:
     return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network", found.back)
 
 
-def _chosen(scene: Scene, inside: Array, size: float, method: str) -> ObjectThickness:
+def _chosen(scene: Scene, inside: Array, size: float, method: str, behind: Array | None) -> ObjectThickness:
     from materialist.geometry.half_turn import upright
     from materialist.predict.refraction.choice import best_thickness
 
     up = upright(scene.depth, scene.normal, np.where(inside, -1, scene.geometry.plane_label), scene.camera)
     choice = best_thickness(
-        scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, prefer=method
+        scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, behind=behind, prefer=method,
     )  # fmt: skip
     solid = choice.thickness.solid
     if choice.method == "symmetry":
         solid = _mirrored(scene, inside)
     wall = _wall(scene, inside, choice.thickness, size)
-    return ObjectThickness(solid, wall, choice.method, choice.thickness.back)
+    return ObjectThickness(solid, wall, choice.method, choice.thickness.back, choice.thickness.lathe)
 
 
 def _wall(scene: Scene, inside: Array, found, size: float) -> float:

@@ -1,7 +1,7 @@
-"""Thickness of what was turned on a lathe: the visible front, swept around the axis that all its normals meet.
+"""What was turned on a lathe: bottles, bulbs, vases, balls, rings, cups without their handles.
 
-Bottles, bulbs, vases, balls, cups without their handles. The normals alone say where the axis stands and how it leans;
-no guess of the thickness is needed, and exact maps give it exactly.
+All its normals meet one axis, and say alone where that stands and how it leans. Around it every visible point tells a
+place of one profile (`geometry.revolution`): no guess of the thickness is needed, and exact maps give it exactly.
 """
 
 from __future__ import annotations
@@ -12,42 +12,49 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.geometry.half_turn import LOOKING_DOWN, TILTS, Fit
+from materialist.geometry.profile import Profile
+from materialist.geometry.revolution import profile_of, swept, thickness_of
+from materialist.geometry.shell import Shell
 from materialist.geometry.symmetry import surface_in
-from materialist.geometry.turning import Axis, turned_thickness
+from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
 
 ROUND = 0.035
 """Mean sine between normals and the planes through the axis up to which an object counts as turned on a lathe."""
-ASTRAY = 0.02
-"""How little the turned front may go with the mask and the front, as a part of the object's size."""
 BEHIND = (0.1, 0.3, 0.5)
 """Where the axis is first looked for, behind the middle of the front, in units of the object's size."""
 REACH = 1.5
 """Farthest place of the axis, in the same units: normals of one plane all meet at infinity."""
 LEVEL = 0.02
 """What the square of a deviation from the usual tilt costs: for balls any tilt will do."""
-SWEEP = tuple(np.radians(np.linspace(90, 270, 9)))
-"""Turns of the front. From a camera that is near, a half turn alone leaves out a strip at either side."""
 
 
 @dataclass(frozen=True)
 class Lathed:
-    """The back of an object as if turned on a lathe."""
+    """An object turned on a lathe."""
 
     thickness: Array
-    """[H, W] float32 along the camera ray, scene units; 0 outside the mask."""
+    """[H, W] float32 along the camera ray, scene units, to where it leaves the object; 0 outside the mask."""
     misfit: float
     """Mean sine between the visible normals and the planes through the axis."""
     axis: Axis
+    profile: Profile
+
+    def body(self, camera: Camera, *, wall: float | None = None) -> Shell:
+        """The closed object; with `wall`, its thickness in scene units, a hollow one."""
+        return swept(self.profile, self.axis, camera, wall=wall)
 
 
-def lathed(depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None) -> Lathed | None:
-    """The thickness of an object that was turned on a lathe, or None where its normals do not meet one axis.
+def lathed(
+    depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
+) -> Lathed | None:
+    """An object that was turned on a lathe, or None where its normals do not meet one axis, or no one profile fits.
 
     Args:
         depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
         up: [3] unit, the axis' direction in the camera's frame, where a support tells it; else the camera is taken
             not to lean sideways, and the angle at which it looks down is found with the axis.
+        behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
 
     Raises:
         InputError: maps of different sizes, or a mask without any surface.
@@ -57,9 +64,13 @@ def lathed(depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Arra
     fit = Fit(depth, normal, inside, depth, rays, None if up is None else np.asarray(up, np.float64))
     axis = _axis(fit)
     misfit = fit.unturned(axis)
-    if misfit > ROUND or fit.astray(axis) > ASTRAY:
+    if misfit > ROUND:
         return None
-    return Lathed(turned_thickness(np.asarray(depth, np.float64), normal, inside, rays, axis, SWEEP), misfit, axis)
+    front = np.asarray(depth, np.float64)
+    profile = profile_of(front, np.asarray(normal, np.float64), inside, rays, axis, behind)
+    if profile is None:
+        return None
+    return Lathed(thickness_of(profile, axis, front, inside, rays), misfit, axis, profile)
 
 
 def _axis(fit: Fit) -> Axis:

@@ -40,13 +40,14 @@ class Choice:
 
 def best_thickness(
     photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, up: Array | None = None,
-    prefer: str = "auto",
+    behind: Array | None = None, prefer: str = "auto",
 ) -> Choice:  # fmt: skip
     """The thickness of the object under a mask.
 
     Args:
         photo_linear, mask, normal, depth, camera: as for `thickness`.
         up: [3] unit, the upright direction in the camera's frame, where a support tells it.
+        behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
         prefer: `auto`, or `half-turn`: the turn in any case.
 
     Returns:
@@ -63,8 +64,8 @@ def best_thickness(
     except WeightsError:
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
-    if prefer == "auto" and (swept := lathed(front, normal, inside, camera, up=up)) is not None:
-        return Choice(_as_thick(guess, swept.thickness), "lathe")
+    if prefer == "auto" and (found := lathed(front, normal, inside, camera, up=up, behind=behind)) is not None:
+        return Choice(replace(_as_thick(guess, found.thickness), lathe=found), "lathe")
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)
     away = float(np.abs(turn.thickness - guess.solid)[inside].sum() / max(float(guess.solid[inside].sum()), 1e-9))
     believed = (turn.misfit < CERTAIN and away < FAR) or away < AGREE[method]

@@ -1,0 +1,224 @@
+"""The profile of a lathed body: where the half plane beside the axis is full, from points with normals on its border.
+
+A function that is 0 on the border, negative in the body, and rises by one a cell, as smooth as the points allow (the
+implicit surface of Turk and O'Brien 2002, on a grid): what no point tells goes on as it went.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.types import Array
+
+BEND = 0.03
+"""Weight of second differences against that of points."""
+LEAN = 2.0
+"""Weight of normals against that of places."""
+ROUNDS = 3
+"""How often the function is solved for; each time what rays pass freely, and lay in the body, is pushed out."""
+PUSHED, PUSH = 0.5, 0.3
+"""Value that such a cell is given, and its weight."""
+MARGIN = 12
+"""Cells around what is seen."""
+BELOW = 3.0
+"""Cells below the surface at which no ray passes."""
+GAP = 7
+"""Cells along a line without a point that are no gap in what is seen."""
+STRETCH = 0.2
+"""Part of the object's height over which its outside is looked at, to go on below."""
+BESIDE = 2.5
+"""Cells within which a line must have a point that is seen, to be of the object."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The function on a grid."""
+
+    values: Array
+    """[h, w] in cells: rows from the lowest, columns from the axis."""
+    cell: float
+    """Scene units."""
+    low: float
+    """Height of the first row, scene units."""
+    floor: float
+    """Height below which nothing is, scene units."""
+    seen: Array
+    """[N, 2] points (distance, height) that it was fitted to."""
+    off: float
+    """Root mean square of the function at them, cells."""
+    through: float
+    """Share of those points just below which rays pass freely."""
+
+    def at(self, places: Array) -> Array:
+        """[...] the function at places [..., 2]: below 0 in the body."""
+        flat = _read(self.values, ((places - [0, self.low]) / self.cell).reshape(-1, 2)).reshape(places.shape[:-1])
+        return np.maximum(flat, (self.floor - places[..., 1]) / self.cell)
+
+    def lines(self, level: float = 0.0) -> list[tuple[Array, Array]]:
+        """The border of what lies deeper than `level` scene units: lines [K, 2] and their outward normals [K, 2].
+
+        The body is to the left. Lines begin and end at the axis, or are closed.
+        """
+        from scipy.spatial import cKDTree
+        from skimage.measure import find_contours
+
+        bottom = (self.floor + level - self.low) / self.cell  # rows
+        rows = np.arange(self.values.shape[0])[:, None]
+        cut = np.maximum(self.values + level / self.cell, bottom - rows)
+        cut[[0, -1]], cut[:, -1] = np.maximum(cut[[0, -1]], 1), np.maximum(cut[:, -1], 1)
+        tree, found = cKDTree(self.seen), []
+        for line in find_contours(cut, 0.0):
+            line = line[:, ::-1]  # (column, row)
+            line = line[np.r_[True, np.abs(np.diff(line, axis=0)).max(1) > 1e-6]]
+            place = line * self.cell + [0, self.low]
+            ends = np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6
+            if len(line) < 4 or not ends or tree.query(place)[0].min() > BESIDE * self.cell + level:
+                continue
+            normal = np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
+            normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+            along = np.gradient(line, axis=0)
+            if np.sum(along[:, 0] * normal[:, 1] - along[:, 1] * normal[:, 0]) > 0:
+                place, normal = place[::-1], normal[::-1]
+            found.append((place, normal))
+        return found
+
+    def _slope(self, at: Array) -> Array:
+        """[K, 2] gradient at (column, row)."""
+        from scipy.ndimage import map_coordinates
+
+        whole = np.concatenate([self.values[:, 1:2], self.values], 1)  # the same on the other side of the axis
+        up, out = np.gradient(whole)
+        read = lambda v: map_coordinates(v, [at[:, 1], at[:, 0] + 1], order=1, mode="nearest")  # noqa: E731
+        return np.stack([read(out), read(up)], -1)
+
+
+def fitted(seen: Array, leaning: Array, passed: Array, cell: float, floor: float) -> Profile:
+    """The profile through points of its border.
+
+    Args:
+        seen: [N, 2] distance from the axis and height. leaning: [N, 2] unit normals there, outwards.
+        passed: [M, 2] places that are free for certain.
+        cell, floor: as of `Profile`.
+    """
+    first = _fitted(seen, leaning, len(seen), passed, cell, floor)
+    hidden, turning = _rounded(first, leaning)
+    if not len(hidden):
+        return first
+    both = np.concatenate([seen, hidden]), np.concatenate([leaning, turning])
+    return _fitted(*both, len(seen), passed, cell, floor)
+
+
+def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: float, floor: float) -> Profile:
+    """The profile of points of which the first `count` are seen."""
+    from scipy.sparse.linalg import splu
+
+    seen = points[:count]
+    low = min(float(seen[:, 1].min()), max(floor, float(seen[:, 1].min() - np.ptp(seen[:, 1])))) - MARGIN * cell
+    shape = (
+        int(np.ceil((seen[:, 1].max() - low) / cell)) + MARGIN,
+        int(np.ceil(seen[:, 0].max() / cell)) + MARGIN,
+    )
+    at = lambda places: (places - [0, low]) / cell  # noqa: E731  (column, row)
+    free = _cells(at(passed), shape)
+    rows, wanted = _points(at(points), leaning, shape)
+    matrix = rows.T @ rows + BEND * _bending(shape)
+    right = rows.T @ wanted
+    pushed = np.zeros(shape, bool)
+    for _ in range(ROUNDS):
+        values = splu((matrix + _diagonal(PUSH * pushed)).tocsc()).solve(right + PUSH * PUSHED * pushed.ravel())
+        values = values.reshape(shape)
+        pushed |= free & (values < PUSHED / 2)
+    off = float(np.sqrt(np.mean(_read(values, at(seen)) ** 2)))
+    below = np.clip(np.round(at(seen) - BELOW * leaning[:count]).astype(int), 0, np.array(shape[::-1]) - 1)
+    return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
+
+
+def _rounded(profile: Profile, leaning: Array) -> tuple[Array, Array]:
+    """Places [K, 2] and normals [K, 2] where the outside goes on below what is seen of it, turning as it did.
+
+    From the lowest that is seen, with the curvature of the stretch above, until the ground, or level.
+    """
+    from scipy.ndimage import maximum_filter1d
+    from scipy.spatial import cKDTree
+
+    tree, cell = cKDTree(profile.seen), profile.cell
+    for line, _ in profile.lines():
+        away, nearest = tree.query(line)
+        known = maximum_filter1d(away < BESIDE * cell, GAP, mode="nearest")
+        starts = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))
+        if not len(starts) or line[starts[0], 0] < GAP * cell:
+            continue
+        k = starts[0] + int(np.argmax(away[starts[0] :] < cell))  # there is a point right here
+        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line[k:], axis=0), axis=1))])
+        part = along < STRETCH * np.ptp(profile.seen[:, 1])
+        lean = leaning[nearest[k:][part]]
+        angle = np.unwrap(np.arctan2(lean[:, 1], lean[:, 0]))
+        if part.sum() < GAP or angle[0] < -np.pi / 2:
+            continue
+        rate, first = np.polyfit(along[part], angle, 1)
+        places, angles, at = [], [], line[k].copy()
+        while rate > 0 and at[0] > 0 and at[1] > profile.floor and -np.pi / 2 < first < np.pi / 2:
+            places.append(at.copy())
+            angles.append(first)
+            first -= rate * cell
+            at = at + cell * np.array([np.sin(first), -np.cos(first)])  # down: the normal is (cos, sin)
+        if len(places) > 1:
+            return np.array(places[1:]), np.stack([np.cos(angles[1:]), np.sin(angles[1:])], -1)
+    return np.zeros((0, 2)), np.zeros((0, 2))
+
+
+def _read(values: Array, at: Array) -> Array:
+    from scipy.ndimage import map_coordinates
+
+    return map_coordinates(values, [at[:, 1], at[:, 0]], order=1, mode="nearest")
+
+
+def _cells(at: Array, shape: tuple[int, int]) -> Array:
+    """[h, w] bool: cells with one of the places [M, 2] (column, row)."""
+    column, row = np.round(at).astype(int).T
+    there = (row >= 0) & (row < shape[0]) & (column < shape[1])
+    found = np.zeros(shape, bool)
+    found[row[there], column[there]] = True
+    return found
+
+
+def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:
+    """Rows of the least squares of places and normals, every cell with points weighing the same."""
+    from scipy.sparse import coo_matrix
+
+    low = np.minimum(np.floor(at).astype(int), np.array(shape[::-1]) - 2)
+    x, y = (at - low).T
+    index = low[:, 1] * shape[1] + low[:, 0]
+    corners = np.stack([index, index + 1, index + shape[1], index + shape[1] + 1], 1)  # [N, 4]
+    value = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], 1)
+    out = np.stack([y - 1, 1 - y, -y, y], 1)
+    up = np.stack([x - 1, -x, 1 - x, x], 1)
+    weight = 1 / np.sqrt(np.bincount(index, minlength=shape[0] * shape[1])[index])
+    parts, wanted = [], []
+    for columns, target, strength in ((value, 0 * x, 1.0), (out, leaning[:, 0], LEAN), (up, leaning[:, 1], LEAN)):
+        parts.append(columns * (weight * strength)[:, None])
+        wanted.append(target * weight * strength)
+    rows = np.repeat(np.arange(3 * len(at)), 4)
+    entries = np.concatenate(parts).ravel(), (rows, np.tile(corners, (3, 1)).ravel())
+    return coo_matrix(entries, (3 * len(at), shape[0] * shape[1])).tocsr(), np.concatenate(wanted)
+
+
+def _bending(shape: tuple[int, int]):
+    """Quadratic form [n, n] of second differences of a grid, mirrored at the axis (the first column)."""
+    from scipy.sparse import diags, eye, kron
+
+    h, w = shape
+    second = lambda n: diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(n - 2, n))  # noqa: E731
+    first = lambda n: diags([-1.0, 1.0], [0, 1], shape=(n - 1, n))  # noqa: E731
+    axis = diags([[-2.0], [2.0]], [0, 1], shape=(1, w))
+    terms = [kron(eye(h), second(w)), kron(second(h), eye(w)), kron(eye(h), axis)]
+    cross = kron(first(h), first(w))
+    return sum(t.T @ t for t in terms) + 2 * cross.T @ cross
+
+
+def _diagonal(weights: Array):
+    from scipy.sparse import diags
+
+    return diags(weights.ravel().astype(float))
