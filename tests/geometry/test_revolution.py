@@ -1,5 +1,7 @@
 """Bodies swept from one profile: balls, rings and bottles come out whole, from what one view shows of them."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -90,7 +92,7 @@ def test_edges_keep_their_normals(ground):
     """A cylinder: its side looks aside, its top up, and there is little between."""
     step = np.linspace(0.001, 0.999, 60)[:, None]
     corners = np.array([(0, 0), (0.35, 0), (0.35, 0.7), (0, 0.7)])
-    sides = np.concatenate([a + step * (b - a) for a, b in zip(corners[:-1], corners[1:], strict=True)])
+    sides = np.concatenate([a + step * (b - a) for a, b in itertools.pairwise(corners)])
     found, *_ = profile_from(standing(sides), ground)
     assert found is not None
     shell = swept(found, AXIS, CAMERA)
