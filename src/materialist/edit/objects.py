@@ -107,10 +107,10 @@ def outline_score(region: Array, edges: Array, lab: Array) -> float:
     if length == 0:
         return -np.inf
     strongest = cv2.dilate(edges, kernel)
-    strength = float((1 - np.exp(-2 * strongest[outline])).mean()) + float(contrast(region, lab)[outline].mean())
+    strength = float((1 - np.exp(-2 * strongest[outline])).mean()) + 0.3 * float(contrast(region, lab)[outline].mean())
     compact = 4 * np.pi * region.sum() / max((length + on_frame) ** 2, 1)
     frame = on_frame / (length + on_frame)
-    return 0.5 * strength - 0.4 * frame + 0.12 * min(compact, 1.0) + 0.03 * float(np.log(area))
+    return strength - 0.5 * frame + 0.15 * min(compact, 1.0) + 0.03 * float(np.log(area))
 
 
 def contrast(region: Array, lab: Array, window: int = 11) -> Array:
