@@ -67,7 +67,7 @@ def profile_of(
     seen = plane.of(points)
     wide, high, low = float(seen[:, 0].max()), float(np.ptp(seen[:, 1])), float(seen[:, 1].min())
     cell = max(2 * wide, high) / CELLS
-    ground = _ground(axis, behind, inside, rays) + AIR * high
+    ground = ground_height(axis, behind, inside, rays) + AIR * high
     floor = low if axis.base and not np.isfinite(ground) else max(low - SUNK * high, ground)
     passed = _passed(depth, inside, rays, plane, (wide, high), cell)
     profile = fitted(seen, plane.leaning(points, normal[inside]), passed, cell, floor)
@@ -97,7 +97,7 @@ def swept(profile: Profile, axis: Axis, camera: Camera, *, wall: float | None = 
     return joined([*outer, *(turned(sheet) for sheet in (inner if wall else []))])
 
 
-def _ground(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
+def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
     """Height above the foot of the lowest of what stands behind the object; -inf where there is nothing."""
     if behind is None or not (known := inside & (np.asarray(behind) > 0)).any():
         return -np.inf

@@ -1,0 +1,204 @@
+"""What was turned on a lathe, known by its outline: predicted normals are rarely clean enough to meet one axis.
+
+The outline of such a thing is its own image in the plane through the camera and the axis. What of the half plane beside
+the axis stays inside the outline at every turn is the largest body with that outline (its visual hull), and for what
+bulges and waves gently it is the thing itself, but for the two ends that the camera sees from above and below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.camera import pixel_rays, project
+from materialist.geometry.contour import silhouette_field
+from materialist.geometry.half_turn import LOOKING_DOWN
+from materialist.geometry.lathe import Lathed
+from materialist.geometry.profile import Profile, fitted
+from materialist.geometry.revolution import AIR, CELLS, ground_height, thickness_of
+from materialist.geometry.symmetry import surface_in
+from materialist.geometry.turning import Axis
+from materialist.types import Array, Camera
+
+ALIKE = 0.965
+"""Share of the mask that must lie in its image."""
+TURNED = 25.0
+"""Mean angle, degrees, between the normals of the map and those of the body, up to which the two are one thing."""
+ELSEWHERE = 0.3
+"""How far, relatively, the place on the ground may be from where the depth map has the object."""
+TURNS = 64
+"""Turns at which a place beside the axis must stay inside the outline."""
+FLAT = 1.25
+"""Slopes up to this multiple of that at which the camera looks down are of the end caps, of which the outline says no
+more than how high they are."""
+
+
+def outlined(
+    depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
+) -> Lathed | None:
+    """An object turned on a lathe by its outline, or None where that, or the normals, are of something else.
+
+    Arguments and errors as of `lathe.lathed`; where nothing tells the upright direction the camera is taken to look
+    down as it usually does. An object that the frame cuts is none.
+    """
+    inside = surface_in(mask, depth, camera)
+    edge = np.zeros_like(inside)
+    edge[[0, -1]] = edge[:, [0, -1]] = True
+    if (inside & edge).any():
+        return None
+    rays, depth = pixel_rays(camera).astype(np.float64), np.asarray(depth, np.float64)
+    upright = np.array([0, np.cos(LOOKING_DOWN[0]), np.sin(LOOKING_DOWN[0])]) if up is None else np.asarray(up, float)
+    across, alike = _mirror(inside, rays, upright, camera)
+    if alike < ALIKE:
+        return None
+    ahead = np.cross(across, upright)
+    ahead *= np.sign(ahead @ rays[inside].mean(0))
+    field = silhouette_field(inside)
+    axis, profile = _standing(field, inside, depth, rays, upright, ahead, behind, camera)
+    found, leaning = seen_from(profile, axis, inside, rays)
+    there = inside & (found > 0)
+    cosine = np.clip((leaning * normal).sum(-1), -1, 1)[there]
+    if there.sum() < 0.9 * inside.sum() or np.degrees(np.arccos(cosine)).mean() > TURNED:
+        return None
+    thick = thickness_of(profile, axis, np.where(there, found, depth), inside, rays)
+    return Lathed(thick, 1 - alike, axis, profile)
+
+
+def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
+    """[3] unit: across the upright plane through the camera in which the mask is its own image best, and how well."""
+    from scipy.optimize import minimize_scalar
+
+    own = rays[inside]
+    middle = own.mean(0)
+    first = np.cross(up, -middle)
+    first /= np.linalg.norm(first)  # across the plane through the middle of the mask
+    second = np.cross(up, first)
+
+    def plane(angle: float) -> Array:
+        return np.cos(angle) * first + np.sin(angle) * second
+
+    def unlike(angle: float) -> float:
+        normal = plane(angle)
+        place, ahead = project(own - 2 * (own @ normal)[:, None] * normal, camera)
+        x, y = np.floor(place).astype(int).T
+        there = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+        return 1 - float((inside[np.where(there, y, 0), np.where(there, x, 0)] & there).mean())
+
+    width = np.ptp(own @ first) / np.linalg.norm(middle)
+    best = min(np.linspace(-0.2, 0.2, 21) * width, key=unlike)
+    found = minimize_scalar(unlike, bounds=(best - 0.02 * width, best + 0.02 * width), method="bounded")
+    angle = min((best, float(found.x)), key=unlike)
+    return plane(angle), 1 - unlike(angle)
+
+
+def _standing(
+    field: Array, inside: Array, depth: Array, rays: Array, up: Array, ahead: Array, behind: Array | None,
+    camera: Camera,
+) -> tuple[Axis, Profile]:  # fmt: skip
+    """The axis and profile: as far away as the ground that the object stands on, or as the depth map has its front."""
+    height, width = np.nonzero(inside)
+    middle = rays[inside].mean(0)
+    tilt = max(-float(middle @ up) / float(np.linalg.norm(middle)), 0.02)  # sine of looking down
+    first = Axis(up, ahead, True)  # at distance 1
+    trial = _profile(field, first, tilt, camera, None)
+    front, _ = seen_from(trial, first, inside, rays)
+    both = inside & (front > 0)
+    away = float(np.median(depth[both] / front[both])) if both.any() else 1.0
+    ground = ground_height(Axis(up, np.zeros(3), True), behind, inside, rays)
+    if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < ELSEWHERE:
+        away = ground / trial.floor
+    axis = Axis(up, away * ahead, True)
+    return axis, _profile(field, axis, tilt, camera, ground if np.isfinite(ground) else None)
+
+
+def _profile(field: Array, axis: Axis, tilt: float, camera: Camera, ground: float | None) -> Profile:
+    """The profile of the visual hull, its caps rounded."""
+    from skimage.measure import find_contours
+
+    far = float(np.linalg.norm(axis.foot))
+    pixel = far / camera.focal
+    rows, columns = np.nonzero(field > 0)
+    extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
+    cell = extent / CELLS
+    place, _ = project(axis.foot[None], camera)
+    middle = (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
+    base = middle - float((camera.height / 2 - place[0, 1]) * pixel) / max(float(axis.up[1]), 0.3)
+    low = base - 0.7 * extent
+    r = np.arange(int(0.6 * extent / cell)) * cell
+    h = low + np.arange(int(1.4 * extent / cell)) * cell
+    values = -_hull(field, axis, r, h, camera) * pixel / cell
+    line = max(find_contours(values, 0.0), key=len)[:, ::-1] * cell + [0, low]  # (distance, height)
+    if line[0, 1] > line[-1, 1]:
+        line = line[::-1]
+    return _capped(line, axis, tilt, cell, ground)
+
+
+def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array:
+    """[len(h), len(r)] pixels by which places beside the axis are inside the outline at every turn."""
+    from scipy.ndimage import map_coordinates
+
+    first = np.cross(axis.up, axis.foot)
+    first /= np.linalg.norm(first)
+    found = np.full((len(h), len(r)), np.inf)
+    for angle in 2 * np.pi * np.arange(TURNS) / TURNS:
+        out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
+        points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
+        place, _ = project(points, camera)
+        read = map_coordinates(field, [place[..., 1] - 0.5, place[..., 0] - 0.5], order=1, mode="nearest")
+        beyond = np.maximum(np.abs(place - np.array([camera.width, camera.height]) / 2) - 0.5 * np.array(
+            [camera.width, camera.height]), 0).max(-1)  # fmt: skip
+        found = np.minimum(found, read - beyond)
+    return found
+
+
+def _capped(line: Array, axis: Axis, tilt: float, cell: float, ground: float | None) -> Profile:
+    """A profile through a line from the lower to the upper end, whose caps are those of a thing seen from a tilt."""
+    from scipy.ndimage import gaussian_filter1d
+
+    smooth = gaussian_filter1d(line, 3.0, axis=0, mode="nearest")
+    step = np.gradient(smooth, axis=0)
+    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
+    slope = np.tan(np.arcsin(min(tilt, 0.9)))
+    steep = np.abs(step[:, 1]) > FLAT * slope * np.abs(step[:, 0])
+    first, last = np.flatnonzero(steep)[[0, -1]]
+    side, along = smooth[first : last + 1], step[first : last + 1]
+    leaning = np.stack([along[:, 1], -along[:, 0]], -1)
+    # A round end of the same slope where it begins, level at the axis.
+    wide, top = side[-1]
+    r = np.arange(0, wide, cell)[::-1]
+    cap = np.stack([r, top + slope * (wide**2 - r**2) / (2 * max(wide, cell))], -1)
+    lean = np.stack([slope * r / max(wide, cell), np.ones_like(r)], -1)
+    lean /= np.linalg.norm(lean, axis=1, keepdims=True)
+    seen, leaning = np.concatenate([side, cap]), np.concatenate([leaning, lean])
+    high = float(np.ptp(seen[:, 1]))
+    floor = float(side[0, 1])
+    if ground is not None:
+        floor = float(np.clip(ground + AIR * high, floor - 0.1 * high, floor + 0.1 * high))
+    return fitted(seen, leaning, np.zeros((0, 2)), cell, floor)
+
+
+def seen_from(profile: Profile, axis: Axis, inside: Array, rays: Array) -> tuple[Array, Array]:
+    """[H, W] planar depth at which rays enter a body, 0 where they pass, and its normals [H, W, 3] there."""
+    from materialist.geometry.revolution import Meridian
+
+    ray, plane = rays[inside], Meridian(axis)
+    length = np.linalg.norm(ray, axis=-1)
+    reach = 1.2 * float(np.hypot(profile.seen[:, 0].max(), np.ptp(profile.seen[:, 1]) / 2))
+    middle = axis.foot + profile.seen[:, 1].mean() * axis.up
+    at = ((ray @ middle) / length**2)[:, None] + np.arange(-reach, reach, 0.5 * profile.cell) / length[:, None]
+    within = profile.at(plane.of(ray[:, None] * at[..., None])) < 0
+    hit = within.any(1)
+    front = at[np.arange(len(at)), within.argmax(1)]
+    points = ray * front[:, None]
+    where = plane.of(points)
+    step = profile.cell
+    lean = np.stack(
+        [profile.at(where + [step, 0]) - profile.at(where - [step, 0]), profile.at(where + [0, step]) - profile.at(where - [0, step])], -1
+    )
+    away = points - axis.foot
+    out = away - (away @ axis.up)[:, None] * axis.up
+    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+    turned = lean[:, :1] * out + lean[:, 1:] * axis.up
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+    depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
+    depth[inside], normal[inside] = np.where(hit, front, 0), turned
+    return depth, normal
