@@ -11,18 +11,22 @@ import numpy as np
 
 from materialist.camera import pixel_rays, project
 from materialist.geometry.contour import silhouette_field
-from materialist.geometry.half_turn import LOOKING_DOWN
 from materialist.geometry.lathe import Lathed
 from materialist.geometry.profile import Profile, fitted
-from materialist.geometry.revolution import AIR, CELLS, ground_height, thickness_of
+from materialist.geometry.revolution import AIR, CELLS, Meridian, ground_height, thickness_of
 from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
 
-ALIKE = 0.965
-"""Share of the mask that must lie in its image."""
-TURNED = 25.0
-"""Mean angle, degrees, between the normals of the map and those of the body, up to which the two are one thing."""
+ALIKE, COVERED = 0.962, 0.955
+"""Shares of the mask that must lie in its image, and that the body must cover: boxes have edges where it is round."""
+LEANING = 0.12
+"""Least slope of how far the map's normals lean sideways over how far the body's do: a face seen straight on has 0, and
+predicted normals of round things, however blurred, 0.2 and more."""
+STEPPED, SIDE = 0.9, 0.5
+"""Least `_stepped`, over what of the body looks up or down by less than this."""
+TILTS = (0.05, 0.15, 0.28, 0.42, 0.58)
+"""Radians that the camera may look down, where no ground tells it, or the body does not fill the outline then."""
 ELSEWHERE = 0.3
 """How far, relatively, the place on the ground may be from where the depth map has the object."""
 TURNS = 64
@@ -45,22 +49,52 @@ def outlined(
     edge[[0, -1]] = edge[:, [0, -1]] = True
     if (inside & edge).any():
         return None
-    rays, depth = pixel_rays(camera).astype(np.float64), np.asarray(depth, np.float64)
-    upright = np.array([0, np.cos(LOOKING_DOWN[0]), np.sin(LOOKING_DOWN[0])]) if up is None else np.asarray(up, float)
-    across, alike = _mirror(inside, rays, upright, camera)
+    rays, depth, normal = pixel_rays(camera).astype(np.float64), np.asarray(depth, np.float64), np.asarray(normal)
+    told = [] if up is None else [(np.asarray(up, np.float64), behind)]
+    # A predicted ground may lean: then the outline says how far the camera looks down, and the ground says nothing.
+    guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in TILTS]
+    best: tuple[float, Lathed | None] = (COVERED, None)
+    for tries in (told, guessed):
+        for upright, below in tries:
+            best = max(best, _turned(inside, depth, normal, rays, upright, below, camera), key=lambda one: one[0])
+        if best[1] is not None:
+            break
+    return best[1]
+
+
+def _turned(
+    inside: Array, depth: Array, normal: Array, rays: Array, up: Array, behind: Array | None, camera: Camera
+) -> tuple[float, Lathed | None]:
+    """The body that stands along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
+    across, alike = _mirror(inside, rays, up, camera)
     if alike < ALIKE:
-        return None
-    ahead = np.cross(across, upright)
+        return 0.0, None
+    ahead = np.cross(across, up)
     ahead *= np.sign(ahead @ rays[inside].mean(0))
-    field = silhouette_field(inside)
-    axis, profile = _standing(field, inside, depth, rays, upright, ahead, behind, camera)
+    axis, profile = _standing(silhouette_field(inside), inside, depth, rays, up, ahead, behind, camera)
     found, leaning = seen_from(profile, axis, inside, rays)
     there = inside & (found > 0)
-    cosine = np.clip((leaning * normal).sum(-1), -1, 1)[there]
-    if there.sum() < 0.9 * inside.sum() or np.degrees(np.arccos(cosine)).mean() > TURNED:
-        return None
+    own, other = ((values @ across)[there] for values in (leaning, normal))
+    side = np.abs((leaning @ up)[there]) < SIDE
+    if (own * other).sum() < LEANING * (own * own).sum() or _stepped(own[side], other[side]) < STEPPED:
+        return 0.0, None
     thick = thickness_of(profile, axis, np.where(there, found, depth), inside, rays)
-    return Lathed(thick, 1 - alike, axis, profile)
+    return float(there.sum() / inside.sum()), Lathed(thick, 1 - alike, axis, profile)
+
+
+def _stepped(own: Array, other: Array) -> float:
+    """Squares left of `other` [N] by the best step of `own` [N], over those left by a straight line.
+
+    Towards the sides the normals of a round thing turn evenly, those of a box by one step at its edge.
+    """
+    order = np.argsort(own)
+    x, y = own[order], other[order] - other.mean()
+    if len(x) < 8:
+        return np.inf
+    line = float((y**2).sum() - ((x - x.mean()) @ y) ** 2 / max(float(((x - x.mean()) ** 2).sum()), 1e-12))
+    count, total = np.arange(1, len(y)), np.cumsum(y)[:-1]
+    explained = total**2 / count + total**2 / (len(y) - count)  # y sums to 0
+    return float((y**2).sum() - explained.max()) / max(line, 1e-9)
 
 
 def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
@@ -95,11 +129,8 @@ def _standing(
     camera: Camera,
 ) -> tuple[Axis, Profile]:  # fmt: skip
     """The axis and profile: as far away as the ground that the object stands on, or as the depth map has its front."""
-    height, width = np.nonzero(inside)
-    middle = rays[inside].mean(0)
-    tilt = max(-float(middle @ up) / float(np.linalg.norm(middle)), 0.02)  # sine of looking down
     first = Axis(up, ahead, True)  # at distance 1
-    trial = _profile(field, first, tilt, camera, None)
+    trial = _profile(field, first, camera, None)
     front, _ = seen_from(trial, first, inside, rays)
     both = inside & (front > 0)
     away = float(np.median(depth[both] / front[both])) if both.any() else 1.0
@@ -107,10 +138,10 @@ def _standing(
     if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < ELSEWHERE:
         away = ground / trial.floor
     axis = Axis(up, away * ahead, True)
-    return axis, _profile(field, axis, tilt, camera, ground if np.isfinite(ground) else None)
+    return axis, _profile(field, axis, camera, ground if np.isfinite(ground) else None)
 
 
-def _profile(field: Array, axis: Axis, tilt: float, camera: Camera, ground: float | None) -> Profile:
+def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> Profile:
     """The profile of the visual hull, its caps rounded."""
     from skimage.measure import find_contours
 
@@ -129,7 +160,7 @@ def _profile(field: Array, axis: Axis, tilt: float, camera: Camera, ground: floa
     line = max(find_contours(values, 0.0), key=len)[:, ::-1] * cell + [0, low]  # (distance, height)
     if line[0, 1] > line[-1, 1]:
         line = line[::-1]
-    return _capped(line, axis, tilt, cell, ground)
+    return _capped(line, far, cell, ground)
 
 
 def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array:
@@ -142,23 +173,26 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     for angle in 2 * np.pi * np.arange(TURNS) / TURNS:
         out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
         points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
-        place, _ = project(points, camera)
-        read = map_coordinates(field, [place[..., 1] - 0.5, place[..., 0] - 0.5], order=1, mode="nearest")
-        beyond = np.maximum(np.abs(place - np.array([camera.width, camera.height]) / 2) - 0.5 * np.array(
-            [camera.width, camera.height]), 0).max(-1)  # fmt: skip
-        found = np.minimum(found, read - beyond)
+        x, y = np.moveaxis(project(points, camera)[0], -1, 0)
+        inner = map_coordinates(field, [y - 0.5, x - 0.5], order=1, mode="nearest")
+        beyond = np.maximum(np.maximum(-x, x - camera.width), np.maximum(-y, y - camera.height))
+        found = np.minimum(found, inner - np.maximum(beyond, 0))
     return found
 
 
-def _capped(line: Array, axis: Axis, tilt: float, cell: float, ground: float | None) -> Profile:
-    """A profile through a line from the lower to the upper end, whose caps are those of a thing seen from a tilt."""
+def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profile:
+    """A profile through a line from the lower to the upper end, `far` from the camera, heights those above it."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth = gaussian_filter1d(line, 3.0, axis=0, mode="nearest")
     step = np.gradient(smooth, axis=0)
     step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
-    slope = np.tan(np.arcsin(min(tilt, 0.9)))
-    steep = np.abs(step[:, 1]) > FLAT * slope * np.abs(step[:, 0])
+    # The lower end is seen from above over its near rim, the upper one over its far rim.
+    lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
+    half = np.arange(len(line)) < np.argmax(smooth[:, 0])
+    limit = FLAT * np.where(half, lower, upper)
+    steep = np.abs(step[:, 1]) > limit * np.abs(step[:, 0])
+    slope = float(upper[np.flatnonzero(steep)[-1]])
     first, last = np.flatnonzero(steep)[[0, -1]]
     side, along = smooth[first : last + 1], step[first : last + 1]
     leaning = np.stack([along[:, 1], -along[:, 0]], -1)
@@ -177,28 +211,16 @@ def _capped(line: Array, axis: Axis, tilt: float, cell: float, ground: float | N
 
 
 def seen_from(profile: Profile, axis: Axis, inside: Array, rays: Array) -> tuple[Array, Array]:
-    """[H, W] planar depth at which rays enter a body, 0 where they pass, and its normals [H, W, 3] there."""
-    from materialist.geometry.revolution import Meridian
-
+    """[H, W] planar depth at which rays enter a body, 0 where they pass, and its unit normals [H, W, 3] there."""
     ray, plane = rays[inside], Meridian(axis)
     length = np.linalg.norm(ray, axis=-1)
     reach = 1.2 * float(np.hypot(profile.seen[:, 0].max(), np.ptp(profile.seen[:, 1]) / 2))
     middle = axis.foot + profile.seen[:, 1].mean() * axis.up
     at = ((ray @ middle) / length**2)[:, None] + np.arange(-reach, reach, 0.5 * profile.cell) / length[:, None]
     within = profile.at(plane.of(ray[:, None] * at[..., None])) < 0
-    hit = within.any(1)
     front = at[np.arange(len(at)), within.argmax(1)]
     points = ray * front[:, None]
-    where = plane.of(points)
-    step = profile.cell
-    lean = np.stack(
-        [profile.at(where + [step, 0]) - profile.at(where - [step, 0]), profile.at(where + [0, step]) - profile.at(where - [0, step])], -1
-    )
-    away = points - axis.foot
-    out = away - (away @ axis.up)[:, None] * axis.up
-    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
-    turned = lean[:, :1] * out + lean[:, 1:] * axis.up
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
     depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
-    depth[inside], normal[inside] = np.where(hit, front, 0), turned
+    depth[inside] = np.where(within.any(1), front, 0)
+    normal[inside] = plane.spread(points, profile.slope(plane.of(points)))
     return depth, normal

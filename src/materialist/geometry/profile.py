@@ -56,6 +56,12 @@ class Profile:
         flat = _read(self.values, ((places - [0, self.low]) / self.cell).reshape(-1, 2)).reshape(places.shape[:-1])
         return np.maximum(flat, (self.floor - places[..., 1]) / self.cell)
 
+    def slope(self, places: Array) -> Array:
+        """[N, 2] how the function rises at places [N, 2]; at the floor straight down."""
+        column, row = ((places - [0, self.low]) / self.cell).T
+        at_floor = row <= (self.floor - self.low) / self.cell + 1
+        return np.where(at_floor[:, None], [0.0, -1], self._slope(np.stack([column, row], -1)))
+
     def lines(self, level: float = 0.0) -> list[tuple[Array, Array]]:
         """The border of what lies deeper than `level` scene units: lines [K, 2] and their outward normals [K, 2].
 

@@ -46,11 +46,19 @@ class Meridian:
 
     def leaning(self, points: Array, normals: Array) -> Array:
         """[N, 2] unit normals of the profile at points [N, 3] with normals [N, 3]."""
+        found = np.stack([(normals * self._out(points)).sum(-1), normals @ self.axis.up], -1)
+        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+
+    def spread(self, points: Array, leaning: Array) -> Array:
+        """[N, 3] unit normals at points [N, 3] where the profile leans by [N, 2]."""
+        found = leaning[:, :1] * self._out(points) + leaning[:, 1:] * self.axis.up
+        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-12)
+
+    def _out(self, points: Array) -> Array:
+        """[N, 3] unit, across the axis, to points [N, 3]."""
         away = points - self.axis.foot
         out = away - (away @ self.axis.up)[:, None] * self.axis.up
-        out /= np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-12)
-        found = np.stack([(normals * out).sum(-1), normals @ self.axis.up], -1)
-        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+        return out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-12)
 
 
 def profile_of(

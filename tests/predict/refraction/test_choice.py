@@ -43,7 +43,8 @@ def chosen(depth, normal, mask, **options):
 @pytest.fixture
 def no_lathe(monkeypatch):
     """Nothing is taken for turned on a lathe."""
-    monkeypatch.setattr(choice, "lathed", lambda *_, **__: None)
+    for name in ("lathed", "outlined"):
+        monkeypatch.setattr(choice, name, lambda *_, **__: None)
 
 
 def test_a_ball_is_known_by_its_normals_whatever_the_network_says(network):

@@ -1,6 +1,6 @@
 """Which estimate of an object's thickness to believe: its front swept or turned around, RefractionNet's, the mirror's.
 
-What was turned on a lathe is known by its normals, and its back with it.
+What was turned on a lathe is known by its normals, or by its outline, and its back with it.
 
 The turned front has the object's own edges, and is taken where it fits the front and the mask very well (boxes,
 pyramids, bottles), or where the network says the same. Elsewhere RefractionNet's backs lean less wrongly.
@@ -17,6 +17,7 @@ from materialist.errors import WeightsError
 from materialist.geometry.front import smooth_front
 from materialist.geometry.half_turn import half_turn
 from materialist.geometry.lathe import lathed
+from materialist.geometry.outline import outlined
 from materialist.geometry.symmetry import surface_in, symmetric_thickness
 from materialist.predict.refraction.thickness import Thickness, thickness
 from materialist.types import Array, Camera
@@ -35,7 +36,7 @@ class Choice:
 
     thickness: Thickness
     method: str
-    """`lathe`, `half-turn`, `network` or `symmetry`."""
+    """`lathe`, `outline`, `half-turn`, `network` or `symmetry`."""
 
 
 def best_thickness(
@@ -64,8 +65,9 @@ def best_thickness(
     except WeightsError:
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
-    if prefer == "auto" and (found := lathed(front, normal, inside, camera, up=up, behind=behind)) is not None:
-        return Choice(replace(_as_thick(guess, found.thickness), lathe=found), "lathe")
+    for name, known in (("lathe", lathed), ("outline", outlined)) if prefer == "auto" else ():
+        if (found := known(front, normal, inside, camera, up=up, behind=behind)) is not None:
+            return Choice(replace(_as_thick(guess, found.thickness), lathe=found), name)
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)
     away = float(np.abs(turn.thickness - guess.solid)[inside].sum() / max(float(guess.solid[inside].sum()), 1e-9))
     believed = (turn.misfit < CERTAIN and away < FAR) or away < AGREE[method]
