@@ -7,13 +7,15 @@ bulges and waves gently it is the thing itself, but for the two ends that the ca
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from materialist.camera import pixel_rays, project
 from materialist.geometry.contour import silhouette_field
 from materialist.geometry.lathe import Lathed
 from materialist.geometry.profile import Profile, fitted
-from materialist.geometry.revolution import AIR, CELLS, Meridian, ground_height, thickness_of
+from materialist.geometry.revolution import AIR, Meridian, ground_height, thickness_of
 from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
@@ -29,8 +31,10 @@ TILTS = (0.05, 0.15, 0.28, 0.42, 0.58)
 """Radians that the camera may look down, where no ground tells it, or the body does not fill the outline then."""
 ELSEWHERE = 0.3
 """How far, relatively, the place on the ground may be from where the depth map has the object."""
-TURNS = 64
+TURNS = 40
 """Turns at which a place beside the axis must stay inside the outline."""
+FINE = 120
+"""Cells of the hull along the object."""
 FLAT = 1.25
 """Slopes up to this multiple of that at which the camera looks down are of the end caps, of which the outline says no
 more than how high they are."""
@@ -53,18 +57,33 @@ def outlined(
     told = [] if up is None else [(np.asarray(up, np.float64), behind)]
     # A predicted ground may lean: then the outline says how far the camera looks down, and the ground says nothing.
     guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in TILTS]
-    best: tuple[float, Lathed | None] = (COVERED, None)
+    best: tuple[float, Standing | None] = (COVERED, None)
     for tries in (told, guessed):
         for upright, below in tries:
-            best = max(best, _turned(inside, depth, normal, rays, upright, below, camera), key=lambda one: one[0])
+            found = _standing_along(upright, inside, depth, normal, rays, below, camera)
+            best = max(best, found, key=lambda one: one[0])
         if best[1] is not None:
             break
-    return best[1]
+    if best[1] is None:
+        return None
+    alike, axis, profile = best[1]
+    front, _ = seen_from(profile, axis, inside, rays)
+    thick = thickness_of(profile, axis, np.where(front > 0, front, depth), inside, rays)
+    return Lathed(thick, 1 - alike, axis, profile)
 
 
-def _turned(
-    inside: Array, depth: Array, normal: Array, rays: Array, up: Array, behind: Array | None, camera: Camera
-) -> tuple[float, Lathed | None]:
+class Standing(NamedTuple):
+    """A body that an outline may be of."""
+
+    alike: float
+    """Share of the mask that lies in its image."""
+    axis: Axis
+    profile: Profile
+
+
+def _standing_along(
+    up: Array, inside: Array, depth: Array, normal: Array, rays: Array, behind: Array | None, camera: Camera
+) -> tuple[float, Standing | None]:
     """The body that stands along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
     across, alike = _mirror(inside, rays, up, camera)
     if alike < ALIKE:
@@ -78,8 +97,7 @@ def _turned(
     side = np.abs((leaning @ up)[there]) < SIDE
     if (own * other).sum() < LEANING * (own * own).sum() or _stepped(own[side], other[side]) < STEPPED:
         return 0.0, None
-    thick = thickness_of(profile, axis, np.where(there, found, depth), inside, rays)
-    return float(there.sum() / inside.sum()), Lathed(thick, 1 - alike, axis, profile)
+    return float(there.sum() / inside.sum()), Standing(alike, axis, profile)
 
 
 def _stepped(own: Array, other: Array) -> float:
@@ -149,7 +167,7 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
     pixel = far / camera.focal
     rows, columns = np.nonzero(field > 0)
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
-    cell = extent / CELLS
+    cell = extent / FINE
     place, _ = project(axis.foot[None], camera)
     middle = (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
     base = middle - float((camera.height / 2 - place[0, 1]) * pixel) / max(float(axis.up[1]), 0.3)
@@ -164,20 +182,26 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
 
 
 def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array:
-    """[len(h), len(r)] pixels by which places beside the axis are inside the outline at every turn."""
+    """[len(h), len(r)] pixels by which places beside the axis are inside the outline at every turn.
+
+    The mean of what the left and what the right half of the outline say: a mask is never quite its own image.
+    """
     from scipy.ndimage import map_coordinates
 
     first = np.cross(axis.up, axis.foot)
     first /= np.linalg.norm(first)
-    found = np.full((len(h), len(r)), np.inf)
-    for angle in 2 * np.pi * np.arange(TURNS) / TURNS:
-        out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
-        points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
-        x, y = np.moveaxis(project(points, camera)[0], -1, 0)
-        inner = map_coordinates(field, [y - 0.5, x - 0.5], order=1, mode="nearest")
-        beyond = np.maximum(np.maximum(-x, x - camera.width), np.maximum(-y, y - camera.height))
-        found = np.minimum(found, inner - np.maximum(beyond, 0))
-    return found
+    halves = []
+    for half in (0.0, np.pi):
+        least = np.full((len(h), len(r)), np.inf)
+        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, TURNS // 2):
+            out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
+            points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
+            x, y = np.moveaxis(project(points, camera)[0], -1, 0)
+            inner = map_coordinates(field, [y - 0.5, x - 0.5], order=1, mode="nearest")
+            beyond = np.maximum(np.maximum(-x, x - camera.width), np.maximum(-y, y - camera.height))
+            least = np.minimum(least, inner - np.maximum(beyond, 0))
+        halves.append(least)
+    return (halves[0] + halves[1]) / 2
 
 
 def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profile:

@@ -135,7 +135,9 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     for _ in range(ROUNDS):
         values = splu((matrix + _diagonal(PUSH * pushed)).tocsc()).solve(right + PUSH * PUSHED * pushed.ravel())
         values = values.reshape(shape)
-        pushed |= free & (values < PUSHED / 2)
+        before, pushed = pushed, pushed | (free & (values < PUSHED / 2))
+        if (before == pushed).all():
+            break
     off = float(np.sqrt(np.mean(_read(values, at(seen)) ** 2)))
     below = np.clip(np.round(at(seen) - BELOW * leaning[:count]).astype(int), 0, np.array(shape[::-1]) - 1)
     return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
