@@ -20,14 +20,14 @@ from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
 
-ALIKE, COVERED = 0.962, 0.955
+ALIKE, COVERED = 0.964, 0.955
 """Shares of the mask that must lie in its image, and that the body must cover: boxes have edges where it is round."""
 LEANING = 0.12
 """Least slope of how far the map's normals lean sideways over how far the body's do: a face seen straight on has 0, and
 predicted normals of round things, however blurred, 0.2 and more."""
 STEPPED, SIDE = 0.9, 0.5
 """Least `_stepped`, over what of the body looks up or down by less than this."""
-TILTS = (0.05, 0.15, 0.28, 0.42, 0.58)
+TILTS = (0.05, 0.15, 0.28, 0.42)
 """Radians that the camera may look down, where no ground tells it, or the body does not fill the outline then."""
 ELSEWHERE = 0.3
 """How far, relatively, the place on the ground may be from where the depth map has the object."""
