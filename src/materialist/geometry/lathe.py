@@ -19,6 +19,8 @@ from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
 
+FEWEST = 64
+"""Pixels below which an object is too small to tell."""
 ROUND = 0.035
 """Mean sine between normals and the planes through the axis up to which an object counts as turned on a lathe."""
 BEHIND = (0.1, 0.3, 0.5)
@@ -36,7 +38,7 @@ class Lathed:
     thickness: Array
     """[H, W] float32 along the camera ray, scene units, to where it leaves the object; 0 outside the mask."""
     misfit: float
-    """Mean sine between the visible normals and the planes through the axis."""
+    """Mean sine between the visible normals and the planes through the axis; of an outline, its part not in its image."""
     axis: Axis
     profile: Profile
 
@@ -60,6 +62,8 @@ def lathed(
         InputError: maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
+    if inside.sum() < FEWEST:
+        return None
     rays = pixel_rays(camera).astype(np.float64)
     fit = Fit(depth, normal, inside, depth, rays, None if up is None else np.asarray(up, np.float64))
     axis = _axis(fit)

@@ -13,9 +13,9 @@ import numpy as np
 
 from materialist.camera import pixel_rays, project
 from materialist.geometry.contour import silhouette_field
-from materialist.geometry.lathe import Lathed
+from materialist.geometry.lathe import FEWEST, Lathed
 from materialist.geometry.profile import Profile, fitted
-from materialist.geometry.revolution import AIR, Meridian, ground_height, thickness_of
+from materialist.geometry.revolution import AIR, Meridian, along, ground_height, thickness_of
 from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
 from materialist.types import Array, Camera
@@ -45,10 +45,12 @@ def outlined(
 ) -> Lathed | None:
     """An object turned on a lathe by its outline, or None where that, or the normals, are of something else.
 
-    Arguments and errors as of `lathe.lathed`; where nothing tells the upright direction the camera is taken to look
-    down as it usually does. An object that the frame cuts is none.
+    Arguments and errors as of `lathe.lathed`; where nothing tells the upright direction, or it does not fit, the camera
+    looks down as the body fills the outline best. An object that the frame cuts is none.
     """
     inside = surface_in(mask, depth, camera)
+    if inside.sum() < FEWEST:
+        return None
     edge = np.zeros_like(inside)
     edge[[0, -1]] = edge[:, [0, -1]] = True
     if (inside & edge).any():
@@ -90,7 +92,10 @@ def _standing_along(
         return 0.0, None
     ahead = np.cross(across, up)
     ahead *= np.sign(ahead @ rays[inside].mean(0))
-    axis, profile = _standing(silhouette_field(inside), inside, depth, rays, up, ahead, behind, camera)
+    body = _standing(silhouette_field(inside), inside, depth, rays, up, ahead, behind, camera)
+    if body is None:
+        return 0.0, None
+    axis, profile = body
     found, leaning = seen_from(profile, axis, inside, rays)
     there = inside & (found > 0)
     own, other = ((values @ across)[there] for values in (leaning, normal))
@@ -145,10 +150,12 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
 def _standing(
     field: Array, inside: Array, depth: Array, rays: Array, up: Array, ahead: Array, behind: Array | None,
     camera: Camera,
-) -> tuple[Axis, Profile]:  # fmt: skip
+) -> tuple[Axis, Profile] | None:  # fmt: skip
     """The axis and profile: as far away as the ground that the object stands on, or as the depth map has its front."""
     first = Axis(up, ahead, True)  # at distance 1
     trial = _profile(field, first, camera, None)
+    if trial is None:
+        return None
     front, _ = seen_from(trial, first, inside, rays)
     both = inside & (front > 0)
     away = float(np.median(depth[both] / front[both])) if both.any() else 1.0
@@ -156,11 +163,12 @@ def _standing(
     if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < ELSEWHERE:
         away = ground / trial.floor
     axis = Axis(up, away * ahead, True)
-    return axis, _profile(field, axis, camera, ground if np.isfinite(ground) else None)
+    profile = _profile(field, axis, camera, ground if np.isfinite(ground) else None)
+    return None if profile is None else (axis, profile)
 
 
-def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> Profile:
-    """The profile of the visual hull, its caps rounded."""
+def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> Profile | None:
+    """The profile of the visual hull, its caps rounded; None where nothing stays inside the outline."""
     from skimage.measure import find_contours
 
     far = float(np.linalg.norm(axis.foot))
@@ -175,7 +183,10 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
     r = np.arange(int(0.6 * extent / cell)) * cell
     h = low + np.arange(int(1.4 * extent / cell)) * cell
     values = -_hull(field, axis, r, h, camera) * pixel / cell
-    line = max(find_contours(values, 0.0), key=len)[:, ::-1] * cell + [0, low]  # (distance, height)
+    lines = find_contours(values, 0.0)
+    if not lines or len(longest := max(lines, key=len)) < 12:
+        return None
+    line = longest[:, ::-1] * cell + [0, low]  # (distance, height)
     if line[0, 1] > line[-1, 1]:
         line = line[::-1]
     return _capped(line, far, cell, ground)
@@ -204,7 +215,7 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     return (halves[0] + halves[1]) / 2
 
 
-def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profile:
+def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profile | None:
     """A profile through a line from the lower to the upper end, `far` from the camera, heights those above it."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -216,6 +227,8 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
     limit = FLAT * np.where(half, lower, upper)
     steep = np.abs(step[:, 1]) > limit * np.abs(step[:, 0])
+    if steep.sum() < 4:
+        return None
     slope = float(upper[np.flatnonzero(steep)[-1]])
     first, last = np.flatnonzero(steep)[[0, -1]]
     side, along = smooth[first : last + 1], step[first : last + 1]
@@ -240,11 +253,13 @@ def seen_from(profile: Profile, axis: Axis, inside: Array, rays: Array) -> tuple
     length = np.linalg.norm(ray, axis=-1)
     reach = 1.2 * float(np.hypot(profile.seen[:, 0].max(), np.ptp(profile.seen[:, 1]) / 2))
     middle = axis.foot + profile.seen[:, 1].mean() * axis.up
-    at = ((ray @ middle) / length**2)[:, None] + np.arange(-reach, reach, 0.5 * profile.cell) / length[:, None]
-    within = profile.at(plane.of(ray[:, None] * at[..., None])) < 0
-    front = at[np.arange(len(at)), within.argmax(1)]
+    first, steps = (ray @ middle) / length**2, np.arange(-reach, reach, 0.5 * profile.cell)
+    hit, front = np.zeros(len(ray), bool), first.copy()
+    for part, values in along(profile, axis, ray, first, steps):
+        hit[part] = (values < 0).any(1)
+        front[part] += steps[(values < 0).argmax(1)] / length[part]
     points = ray * front[:, None]
     depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
-    depth[inside] = np.where(within.any(1), front, 0)
+    depth[inside] = np.where(hit, front, 0)
     normal[inside] = plane.spread(points, profile.slope(plane.of(points)))
     return depth, normal

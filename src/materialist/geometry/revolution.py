@@ -7,6 +7,7 @@ shoulder are known, which maps of front and back have no place for.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ from materialist.types import Array, Camera
 
 CELLS = 180
 """Cells of the profile's plane along the object."""
+RAYS, BLOCK = 6000, 4096
+"""Rays, at most, that tell where the object is not, and rays that are followed at once: bounds on memory."""
 AROUND = 256
 """Corners of the swept circles."""
 NEAR = 6
@@ -84,16 +87,32 @@ def profile_of(
 
 def thickness_of(profile: Profile, axis: Axis, depth: Array, inside: Array, rays: Array) -> Array:
     """[H, W] float32 scene units along the rays: from the front [H, W] planar depth to the last surface of the body."""
-    front, ray, plane = depth[inside], rays[inside], Meridian(axis)
+    ray = rays[inside]
     reach = 2.5 * max(float(profile.seen[:, 0].max()), float(np.ptp(profile.seen[:, 1])))
-    length = np.linalg.norm(ray, axis=-1)
-    steps = np.arange(0, reach, 0.5 * profile.cell)
-    at = front[:, None] + steps / length[:, None]
-    inner = profile.at(plane.of(ray[:, None] * at[..., None])) < 0
-    last = inner.shape[1] - 1 - inner[:, ::-1].argmax(1)
+    steps = np.arange(0, reach, profile.cell)
+    last = np.zeros(len(ray))
+    for part, values in along(profile, axis, ray, depth[inside], steps):
+        inner = values < 0
+        k = inner.shape[1] - 1 - inner[:, ::-1].argmax(1)
+        row, after = np.arange(len(inner)), np.minimum(k + 1, inner.shape[1] - 1)
+        before, beyond = values[row, k], values[row, after]
+        share = np.where(beyond > before, -before / np.maximum(beyond - before, 1e-12), 0)
+        last[part] = np.where(inner.any(1), steps[k] + np.clip(share, 0, 1) * profile.cell, 0)
     found = np.zeros(depth.shape, np.float32)
-    found[inside] = np.where(inner.any(1), steps[last], 0)
+    found[inside] = last
     return found
+
+
+def along(profile: Profile, axis: Axis, ray: Array, first: Array, steps: Array) -> Iterator[tuple[slice, Array]]:
+    """Values [n, S] of the profile's function on rays [N, 3], some at once, from planar depth `first` [N] on.
+
+    steps: [S] scene units along the rays.
+    """
+    plane, length = Meridian(axis), np.linalg.norm(ray, axis=-1)
+    for k in range(0, len(ray), BLOCK):
+        part = slice(k, k + BLOCK)
+        at = first[part, None] + steps / length[part, None]
+        yield part, profile.at(plane.of(ray[part, None] * at[..., None]))
 
 
 def swept(profile: Profile, axis: Axis, camera: Camera, *, wall: float | None = None) -> Shell:
@@ -120,8 +139,9 @@ def _passed(
     import cv2
 
     near = cv2.dilate(inside.astype(np.uint8), np.ones((2 * NEAR + 1,) * 2, np.uint8)) > 0
-    front = np.where(inside, depth - BEFORE * cell, np.inf)[near]
-    ray, length = rays[near], np.linalg.norm(rays[near], axis=-1)
+    stride = max(1, int(near.sum()) // RAYS)
+    front, ray = np.where(inside, depth - BEFORE * cell, np.inf)[near][::stride], rays[near][::stride]
+    length = np.linalg.norm(ray, axis=-1)
     # Along the rays, through the ball around the object.
     reach = 1.2 * float(np.hypot(*extent))
     middle = plane.axis.foot + extent[1] / 2 * plane.axis.up
