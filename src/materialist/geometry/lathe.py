@@ -38,7 +38,7 @@ class Lathed:
     thickness: Array
     """[H, W] float32 along the camera ray, scene units, to where it leaves the object; 0 outside the mask."""
     misfit: float
-    """Mean sine between the visible normals and the planes through the axis; of an outline, its part not in its image."""
+    """Mean sine between visible normals and planes through the axis; of an outline, its part not in its image."""
     axis: Axis
     profile: Profile
 

@@ -25,6 +25,8 @@ ALIKE, COVERED = 0.964, 0.955
 LEANING = 0.12
 """Least slope of how far the map's normals lean sideways over how far the body's do: a face seen straight on has 0, and
 predicted normals of round things, however blurred, 0.2 and more."""
+ABOVE = 0.3
+"""Sine of the angle between the axis and the way to the object below which its outline, from above, says nothing."""
 STEPPED, SIDE = 0.9, 0.5
 """Least `_stepped`, over what of the body looks up or down by less than this."""
 TILTS = (0.05, 0.15, 0.28, 0.42)
@@ -87,11 +89,14 @@ def _standing_along(
     up: Array, inside: Array, depth: Array, normal: Array, rays: Array, behind: Array | None, camera: Camera
 ) -> tuple[float, Standing | None]:
     """The body that stands along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
+    middle = rays[inside].mean(0)
+    if np.linalg.norm(np.cross(up, middle)) < ABOVE * np.linalg.norm(middle):
+        return 0.0, None
     across, alike = _mirror(inside, rays, up, camera)
     if alike < ALIKE:
         return 0.0, None
     ahead = np.cross(across, up)
-    ahead *= np.sign(ahead @ rays[inside].mean(0))
+    ahead *= np.sign(ahead @ middle)
     body = _standing(silhouette_field(inside), inside, depth, rays, up, ahead, behind, camera)
     if body is None:
         return 0.0, None
