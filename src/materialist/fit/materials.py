@@ -49,8 +49,13 @@ def material_field(
 def prices(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
     """[P, 3] weights of albedo, roughness and metallic in L_cons: metal is dearer where the prior says dielectric."""
     rows = torch.tensor(settings.weights, dtype=torch.float32).repeat(len(prior), 1)
-    rows[:, 2] *= 1 + (settings.dielectric - 1) * _below(prior[:, 4], DIELECTRIC[1])
+    rows[:, 2] *= _dearer(prior, settings)
     return rows
+
+
+def _dearer(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
+    """[P] how many times dearer metal is than its weight."""
+    return 1 + (settings.dielectric - 1) * _below(prior[:, 4], DIELECTRIC[1])
 
 
 def _below(metallic: torch.Tensor, limit: float) -> torch.Tensor:
@@ -77,8 +82,7 @@ def better_start(
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
     share = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-    weights = prices(prior, settings)
-    price = settings.delta * share * weights[:, [0, 0, 0, 1, 2]]
+    price = settings.delta * share * prices(prior, settings)[:, [0, 0, 0, 1, 2]]
     short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
     candidates, costs = [], []
     for maps in (start, other):
@@ -89,7 +93,7 @@ def better_start(
             cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
-    doubt = settings.doubt * _below(prior[:, 4], DIELECTRIC[0]) * weights[:, 2] / settings.weights[2]
+    doubt = settings.doubt * _below(prior[:, 4], DIELECTRIC[0]) * _dearer(prior, settings)
     return torch.where(costs[1] < costs[0] - smooth(doubt[:, None]), candidates[1], candidates[0])
 
 

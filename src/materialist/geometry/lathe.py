@@ -72,7 +72,7 @@ def lathed(
         return None
     front = np.asarray(depth, np.float64)
     profile = profile_of(front, np.asarray(normal, np.float64), inside, rays, axis, behind)
-    if profile is None:
+    if profile is None or not profile.lines():
         return None
     return Lathed(thickness_of(profile, axis, front, inside, rays), misfit, axis, profile)
 

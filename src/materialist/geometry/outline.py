@@ -68,7 +68,7 @@ def outlined(
             best = max(best, found, key=lambda one: one[0])
         if best[1] is not None:
             break
-    if best[1] is None:
+    if best[1] is None or not best[1].profile.lines():
         return None
     alike, axis, profile = best[1]
     front, _ = seen_from(profile, axis, inside, rays)

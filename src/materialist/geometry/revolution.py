@@ -120,8 +120,9 @@ def swept(profile: Profile, axis: Axis, camera: Camera, *, wall: float | None = 
 
     Every edge has two faces that run through it in opposite directions.
     """
-    outer, inner = (_sheets(profile, axis, level, camera) for level in (0.0, wall or 0.0))
-    return joined([*outer, *(turned(sheet) for sheet in (inner if wall else []))])
+    outer = _sheets(profile, axis, 0.0, camera)
+    inner = _sheets(profile, axis, wall, camera) if wall else []
+    return joined([*outer, *(turned(sheet) for sheet in inner)])
 
 
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
