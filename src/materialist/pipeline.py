@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,7 +113,7 @@ def invert(
         depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": best.completion, "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
+            "completion": best.completion, "ends": [asdict(e) for e in best.ends], "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
     )  # fmt: skip

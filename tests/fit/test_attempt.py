@@ -7,10 +7,13 @@ import pytest
 
 from materialist import metrics
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.fit.attempt import FLOORS, FULL, Attempt, Begun, Job
+from materialist.fit.attempt import FULL, Attempt, Begun, Job
+from materialist.fit.ends import Found
+from materialist.geometry.ends import Ends
 from materialist.types import Camera
 
 PHOTO = np.full((8, 8, 3), 0.5, np.float32)
+END = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.0, -1.0, 1.0)
 
 
 def picture_at(decibel: float) -> np.ndarray:
@@ -19,39 +22,27 @@ def picture_at(decibel: float) -> np.ndarray:
 
 
 def job(
-    monkeypatch,
-    results: dict[str, float],
-    *,
-    planes: bool = True,
-    walls: bool = False,
-    errors: tuple = (0.1, 0.1),
-    trust: float = 1.0,
+    monkeypatch, results: dict[str, float], *, planes: bool = True, found: Found | None = None, trust: float = 1.0
 ) -> tuple[Job, list[str]]:
     """A job whose attempts come to the given PSNR by completion, and the list of those finished.
 
-    `errors`: what the prior leaves unexplained with and without walls.
+    `found`: what the search for the ends of walls comes to.
     """
     finished: list[str] = []
 
-    def begin(self, completion: str) -> Begun:
-        normals = np.array([[0, 0.0 if walls and completion == FULL else 1.0, 0]] * 3)
-        faces = np.array([[0, 1, 2]])
-        vertices = np.array([[9.0, 0, -1]] * 3)  # beside the picture
-        mesh = SimpleNamespace(
-            face_plane=np.array([0 if planes else -1]), faces=faces, normals=normals, vertices=vertices
-        )
-        fit = SimpleNamespace(prior_error=lambda: errors[completion != FULL])
-        return Begun(completion, SimpleNamespace(mesh=mesh), fit, None, [])
+    def begin(self, completion: str, ends=()) -> Begun:
+        mesh = SimpleNamespace(face_plane=np.array([0 if planes else -1]))
+        return Begun(completion, tuple(ends), SimpleNamespace(mesh=mesh), None, None, [])
 
     def finish(self, begun: Begun) -> Attempt:
         finished.append(begun.completion)
         picture = picture_at(results[begun.completion])
-        return Attempt(
-            begun.completion, begun.geometry, None, None, picture, ({"name": begun.completion, "prior_trust": trust},)
-        )
+        stage = {"name": begun.completion, "prior_trust": trust}
+        return Attempt(begun.completion, begun.ends, begun.geometry, None, None, picture, (stage,))
 
     monkeypatch.setattr(Job, "begin", begin)
     monkeypatch.setattr(Job, "finish", finish)
+    monkeypatch.setattr(Job, "_ends", lambda self: found)
     settings = SimpleNamespace(trust=0.08)
     rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
     return Job(SimpleNamespace(linear=PHOTO, camera=Camera(8, 8, 40.0)), *rest), finished
@@ -97,16 +88,16 @@ def test_a_completion_that_was_asked_for_is_kept(monkeypatch):
     assert (best.completion, notes, made) == (FULL, (), [FULL])
 
 
-@pytest.mark.parametrize(("errors", "kept"), [((0.05, 0.03), FLOORS), ((0.05, 0.0495), FULL), ((0.03, 0.05), FULL)])
-def test_walls_stay_unless_the_prior_explains_the_photo_better_without(monkeypatch, errors, kept):
-    task, made = job(monkeypatch, {FULL: 35, FLOORS: 35}, walls=True, errors=errors)
+@pytest.mark.parametrize("told", [True, False])
+def test_walls_end_where_the_light_says_if_it_does(monkeypatch, told):
+    task, made = job(monkeypatch, {FULL: 35}, found=Found((END,), 0.03, 0.05) if told else None)
     best, notes = task.best("auto")
-    assert (best.completion, made) == (kept, [kept])
-    assert bool(notes) == (kept == FLOORS)
+    assert (best.completion, best.ends, made) == (FULL, (END,) if told else (), [FULL])
+    assert bool(notes) == told
     if notes:
-        assert "error 0.030, not 0.050" in notes[0]
+        assert "error 0.030, not 0.050" in notes[0] and f"--completion {FULL}" in notes[0]
 
 
-def test_only_walls_are_asked_about(monkeypatch):
-    task, made = job(monkeypatch, {FULL: 35, FLOORS: 35}, errors=(0.05, 0.01))
-    assert task.best("auto")[0].completion == FULL and made == [FULL]
+def test_only_auto_asks_the_light(monkeypatch):
+    task, _ = job(monkeypatch, {FULL: 35}, found=Found((END,), 0.03, 0.05))
+    assert task.best(FULL)[0].ends == ()

@@ -217,11 +217,13 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Arr
 
 def _geometry(scene: Scene, found: Behind):
     from materialist.geometry.build import build_geometry, completion_of
+    from materialist.geometry.ends import told
 
     options = scene.provenance
     return build_geometry(
         found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
-        completion=completion_of(scene.geometry, options.get("completion")), seed=int(options.get("seed", 0) or 0),
+        completion=completion_of(scene.geometry, options.get("completion")), ends=told(options),
+        seed=int(options.get("seed", 0) or 0),
     )  # fmt: skip
 
 

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import torch
 
 from materialist import metrics
+from materialist.fit.ends import Found, Search, farthest
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
 from materialist.fit.inverse import Fit
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import walled
+from materialist.geometry.completion import walls_of
+from materialist.geometry.ends import Ends
+from materialist.geometry.planes import find_planes
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
-AUTO, FULL, FLOORS = "auto", "planes,backs", "floors,backs"
-EXPLAINED = 0.98
-"""What must be left of the error of the prior's materials under their best light for `auto` to end walls at
-the frame."""
+AUTO, FULL = "auto", "planes,backs"
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
@@ -33,6 +34,8 @@ class Attempt:
     """What a fit on one geometry came to."""
 
     completion: str
+    ends: tuple[Ends, ...]
+    """Where walls end beyond the picture; empty: all alike."""
     geometry: Geometry
     materials: Materials
     envmap: Array
@@ -52,6 +55,8 @@ class Begun:
     """A geometry and a fit on it that has not run."""
 
     completion: str
+    ends: tuple[Ends, ...]
+    """Where walls end beyond the picture; empty: all alike."""
     geometry: Geometry
     fit: Fit
     judge: Callable[..., Array]
@@ -84,10 +89,10 @@ class Job:
     def best(self, completion: str) -> tuple[Attempt, tuple[str, ...]]:
         """The attempt for `completion`, which may be `auto`, and what the report should say about the choice.
 
-        A continued wall can shut out light that the photo shows. `auto` ends walls at the frame where the prior's
-        materials then explain the photo better (`EXPLAINED`), and leaves out everything where the re-rendering stays
-        poor and is clearly better without. Not so where the prior explains the photo well: then a good re-rendering
-        would be bought with materials that are worse.
+        A continued wall can shut out light that the photo shows. `auto` ends walls where the prior's materials then
+        explain the photo best (`fit.ends`), and leaves out everything where the re-rendering stays poor and is clearly
+        better without. Not so where the prior explains the photo well: then a good re-rendering would be bought with
+        materials that are worse.
         """
         begun, notes = self.choose(completion)
         full = self.finish(begun)
@@ -109,32 +114,37 @@ class Job:
         return replace(bare, stages=stages), (note,)
 
     def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
-        """The fit to run for `completion`: for `auto`, with walls that go on beyond the frame or end there."""
-        full = self.begin(FULL if completion == AUTO else completion)
-        if completion != AUTO or self.settings.trust is None or not walled(full.geometry, self.picture.camera):
-            return full, ()
-        floors = self.begin(FLOORS)
-        with_walls, without = full.fit.prior_error(), floors.fit.prior_error()
-        if without > EXPLAINED * with_walls:
-            return full, ()
+        """The fit to run for `completion`: for `auto`, with walls that end where the light says."""
+        if completion != AUTO or self.settings.trust is None:
+            return self.begin(FULL if completion == AUTO else completion), ()
+        stages: list[dict] = []
+        found = timed(stages, "walls", self._ends)
+        begun = self.begin(FULL, found.ends if found else ())
+        begun.stages[:0] = stages
+        if not found:
+            return begun, ()
         note = (
-            f"Walls and steep planes end at the frame: so light explains the photo better with the predicted materials "
-            f"(error {without:.3f}, not {with_walls:.3f}); --completion {FULL} continues them."
+            f"Walls beyond the picture end where light explains the photo best with the predicted materials (error "
+            f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
         )
-        return floors, (note,)
+        return begun, (note,)
 
-    def begin(self, completion: str) -> Begun:
+    def _ends(self) -> Found | None:
+        """Where walls end, if light tells."""
+        prior, camera = self.prior, self.picture.camera
+        walls = walls_of(find_planes(prior.depth, prior.normal, camera, seed=self.seed), prior.depth, camera)
+        if not walls:
+            return None
+        geometry = self._geometry(FULL, [farthest(wall) for wall in walls])
+        engine = TransportEngine(geometry, camera, self.picture.linear, light_height=self.settings.light_grid)
+        photo = torch.from_numpy(np.ascontiguousarray(self.picture.linear.reshape(-1, 3), np.float32))
+        return Search(engine, prior.materials, photo, self.settings.light, walls, self.seed).found()
+
+    def begin(self, completion: str, ends: Sequence[Ends] = ()) -> Begun:
         """The mesh, and an engine that has not traced anything yet."""
         stages: list[dict] = []
         self._tick("geometry")
-        geometry = timed(
-            stages,
-            "geometry",
-            lambda: build_geometry(
-                self.prior.depth, self.prior.normal, self.picture.camera, tau=self.tau, completion=completion,
-                seed=self.seed,
-            ),
-        )  # fmt: skip
+        geometry = timed(stages, "geometry", lambda: self._geometry(completion, ends))
         renderer = timed(stages, "scene", lambda: RenderScene(geometry, self.picture.camera, device=self.device))
         judge = _judge(renderer)
         engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
@@ -142,7 +152,13 @@ class Job:
             self.picture, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
         )  # fmt: skip
-        return Begun(completion, geometry, fit, judge, stages)
+        return Begun(completion, tuple(ends), geometry, fit, judge, stages)
+
+    def _geometry(self, completion: str, ends: Sequence[Ends]) -> Geometry:
+        prior, camera = self.prior, self.picture.camera
+        return build_geometry(
+            prior.depth, prior.normal, camera, tau=self.tau, completion=completion, ends=ends, seed=self.seed
+        )
 
     def finish(self, begun: Begun) -> Attempt:
         """Light, materials, path-traced re-rendering."""
@@ -156,7 +172,7 @@ class Job:
         self._tick("rerender")
         stages += state.stages
         rerender = timed(stages, "rerender", lambda: begun.judge(materials, state.envmap, self.spp, self.seed + 1))
-        return Attempt(begun.completion, begun.geometry, materials, state.envmap, rerender, tuple(stages))
+        return Attempt(begun.completion, begun.ends, begun.geometry, materials, state.envmap, rerender, tuple(stages))
 
     def _tick(self, stage: str) -> None:
         if self.progress is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from materialist.errors import InputError
@@ -9,6 +11,7 @@ from materialist.geometry.backs import backs_of
 from materialist.geometry.boundary import depth_to_mesh
 from materialist.geometry.completion import complete, join, structural
 from materialist.geometry.creases import split_creases
+from materialist.geometry.ends import Ends
 from materialist.geometry.inflate import inflated
 from materialist.geometry.objects import find_objects
 from materialist.geometry.planes import find_planes
@@ -21,21 +24,30 @@ do not face up) ending at the frame, planes alone, nothing."""
 
 
 def build_geometry(
-    depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0, completion: str = "planes", seed: int = 0
+    depth: Array,
+    normal: Array,
+    camera: Camera,
+    *,
+    tau: float = 6.0,
+    completion: str = "planes",
+    ends: Sequence[Ends] = (),
+    seed: int = 0,
 ) -> Geometry:
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
-    completion: one of `COMPLETIONS`. Raises InputError for maps or options that cannot be used.
+    completion: one of `COMPLETIONS`. ends: where continued walls end, if that is known.
+    Raises InputError for maps or options that cannot be used.
     """
     if completion not in COMPLETIONS:
         raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
-    mesh, label = _completed(depth_to_mesh(depth, normal, camera, tau=tau), depth, normal, camera, completion, seed)
+    bare = depth_to_mesh(depth, normal, camera, tau=tau)
+    mesh, label = _completed(bare, depth, normal, camera, completion, ends, seed)
     return Geometry(split_creases(mesh, depth, normal), label)
 
 
 def _completed(
-    mesh: Mesh, depth: Array, normal: Array, camera: Camera, completion: str, seed: int
+    mesh: Mesh, depth: Array, normal: Array, camera: Camera, completion: str, ends: Sequence[Ends], seed: int
 ) -> tuple[Mesh, Array]:
     """The mesh of a depth map with what its picture does not show, and the plane of each pixel [H, W] int8."""
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W]
@@ -49,11 +61,11 @@ def _completed(
     objects = find_objects(mesh, depth, normal, taken) if completion.endswith("backs") else None
     walls = completion != "floors,backs"
     if objects is None or not (objects.label >= 0).any():
-        return complete(mesh, planes, depth, camera, walls=walls), label
+        return complete(mesh, planes, depth, camera, walls=walls, ends=ends), label
     thickness = inflated(objects, depth, 1 / camera.focal)  # [H, W] scene units
     mesh = set_back_rims(mesh, objects, thickness, depth, normal, camera)
     backs = backs_of(mesh, objects, thickness, depth, bounds)
-    return join([complete(mesh, planes, depth, camera, walls=walls), backs]), label
+    return join([complete(mesh, planes, depth, camera, walls=walls, ends=ends), backs]), label
 
 
 def completion_of(geometry: Geometry, told: str | None = None) -> str:

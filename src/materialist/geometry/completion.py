@@ -6,15 +6,17 @@ where the picture shows open sky nothing is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from materialist.camera import unproject
+from materialist.geometry.ends import Ends, axes, ends_of
 from materialist.geometry.planes import Plane
 from materialist.geometry.polygon import clip, triangulate
-from materialist.types import Array, Camera, Geometry, Mesh
+from materialist.types import Array, Camera, Mesh
 
 BEHIND = 0.01
 """Inside the picture a continuation lies at least this fraction of the depth behind the observed surface."""
@@ -62,27 +64,61 @@ class _Sheet:
     bounding: bool
     touches: tuple[bool, ...]
     """[4] whether its pixels reach the frame's bottom, left, right, top."""
-    half_size: float
-    """Half the side of the square it may fill beyond the picture, scene units."""
+    ends: Ends
+    """The rectangle it may fill beyond the picture."""
     behind: float
     """Radius about its middle within which it goes on behind what the picture shows, scene units."""
 
 
+@dataclass(frozen=True)
+class Wall:
+    """A plane that does not face up, and that `complete` continues."""
+
+    index: int
+    """Its number among the planes."""
+    usual: Ends
+    """Where it ends unless told otherwise."""
+    seen: Ends
+    """The smallest rectangle around what the picture shows of it."""
+    size: float
+    """The farthest that is seen of it from the middle of that, scene units."""
+
+
+def walls_of(planes: list[Plane], depth: Array, camera: Camera) -> list[Wall]:
+    """The walls and ceilings that `complete` continues."""
+    found = []
+    for sheet in _sheets(planes, np.asarray(depth, np.float64), camera, EXTENT):
+        if sheet.plane.normal[1] < UPWARD:
+            place = sheet.points @ axes(sheet.plane.normal).T
+            (left, down), (right, up) = place.min(0), place.max(0)
+            seen = replace(sheet.ends, left=float(left), right=float(right), down=float(down), up=float(up))
+            found.append(Wall(sheet.index, sheet.ends, seen, _size(sheet.points)))
+    return found
+
+
 def complete(
-    mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, extent: float = EXTENT, walls: bool = True
+    mesh: Mesh,
+    planes: list[Plane],
+    depth: Array,
+    camera: Camera,
+    *,
+    extent: float = EXTENT,
+    walls: bool = True,
+    ends: Sequence[Ends] = (),
 ) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
     extent: how far from its visible middle a plane is continued, in scene radii (see `EXTENT`).
     walls: whether planes that do not face up (`UPWARD`) go on beyond the picture, too, not only behind what it shows.
+    ends: where walls end beyond the picture, if that is known, in place of `WALL_REACH`.
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
-    of the scene nor cross the frame (the flat side of an object) are left alone. Walls go on by `WALL_REACH` only.
+    of the scene nor cross the frame (the flat side of an object) are left alone.
     """
     depth = np.asarray(depth, np.float64)
-    sheets = _sheets(planes, depth, camera, extent)
+    sheets = _sheets(planes, depth, camera, extent, ends)
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
@@ -94,25 +130,20 @@ def complete(
     return join(parts)
 
 
-def walled(geometry: Geometry, camera: Camera) -> bool:
-    """Whether a plane that does not face up goes on beyond the picture."""
-    mesh = geometry.mesh
-    steep = mesh.faces[(mesh.face_plane >= 0) & (mesh.normals[mesh.faces[:, 0], 1] < UPWARD)]
-    x, y, z = np.moveaxis(mesh.vertices[steep].mean(1), -1, 0)  # middles of faces, scene units
-    half = np.array([camera.width, camera.height]) / (2 * camera.focal)
-    return bool(((z >= 0) | (np.abs(x) > -z * half[0]) | (np.abs(y) > -z * half[1])).any())
-
-
 def structural(planes: list[Plane], depth: Array, camera: Camera) -> list[Plane]:
     """The planes that `complete` continues: floors, walls and table tops, not the flat sides of objects."""
     return [sheet.plane for sheet in _sheets(planes, np.asarray(depth, np.float64), camera, EXTENT)]
 
 
-def _sheets(planes: list[Plane], depth: Array, camera: Camera, extent: float) -> list[_Sheet]:
-    return [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent))]
+def _sheets(
+    planes: list[Plane], depth: Array, camera: Camera, extent: float, ends: Sequence[Ends] = ()
+) -> list[_Sheet]:
+    return [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent, ends))]
 
 
-def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float) -> _Sheet | None:
+def _sheet(
+    index: int, plane: Plane, depth: Array, camera: Camera, extent: float, ends: Sequence[Ends] = ()
+) -> _Sheet | None:
     """Measure a plane; None if it is not part of the scene's structure."""
     surface = depth > 0
     points = unproject(depth, camera).astype(np.float64)
@@ -131,10 +162,20 @@ def _sheet(index: int, plane: Plane, depth: Array, camera: Camera, extent: float
     own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
     outdoors = np.mean(~surface) > SKY_SHARE and plane.normal[1] > UPWARD
     half_size = behind = (GROUND_EXTENT if outdoors else extent) * radius
+    told = None
     if plane.normal[1] < UPWARD:
-        farthest = float(np.linalg.norm(own - own.mean(0), axis=-1).max())
-        half_size, behind = min(half_size, WALL_REACH * farthest), min(behind, WALL_BEHIND * farthest)
-    return _Sheet(index, plane, own, pixels, bool(bounding), touches, half_size, behind)
+        half_size, behind = min(half_size, WALL_REACH * _size(own)), min(behind, WALL_BEHIND * _size(own))
+        told = ends_of(plane, ends)
+    x, y = axes(plane.normal) @ own.mean(0)
+    square = Ends(
+        tuple(map(float, plane.normal)), float(plane.offset),
+        float(x - half_size), float(x + half_size), float(y - half_size), float(y + half_size),
+    )  # fmt: skip
+    return _Sheet(index, plane, own, pixels, bool(bounding), touches, told or square, behind)
+
+
+def _size(points: Array) -> float:
+    return float(np.linalg.norm(points - points.mean(0), axis=-1).max())
 
 
 def _farthest_shown(mesh: Mesh, depth: Array) -> Array:
@@ -200,12 +241,9 @@ def _within_hull(pixels: Array, xs: Array, ys: Array, width: int) -> Array:
 
 def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     """[T, 3, 3] triangles of the plane outside the view frustum, scene units."""
-    normal = sheet.plane.normal
-    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    across /= np.linalg.norm(across)
-    basis = np.stack([across, np.cross(normal, across)])  # [2, 3] right-handed with the normal: faces the camera
+    basis = axes(sheet.plane.normal)  # [2, 3] right-handed with the normal: faces the camera
     origin = sheet.points.mean(0)
-    square = sheet.half_size * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    square = sheet.ends.corners() - basis @ origin
     for wall in walls:
         square = clip(square, _line(wall, basis, origin))
     side_x, side_y = (camera.width / 2 + RIM) / camera.focal, (camera.height / 2 + RIM) / camera.focal

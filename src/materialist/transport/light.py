@@ -112,6 +112,16 @@ def light_matrix(
 
 def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool):
     """Directions [N, 3], slots [N] and lobe weights (each [N]) of `count` samples of each row, sample-major."""
+    ray, above, weights = rays(cache, rows, rough, count, diffuse)
+    scene: Any = cache.scene
+    pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
+    slot = dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), mi.UInt32(MISS))
+    dr.eval(ray, slot, *weights)
+    return np.array(ray.d).T, np.array(slot), [np.array(w) for w in weights]
+
+
+def rays(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool):
+    """`count` rays of each row [Q], sample-major, which of them leave above the surface, and their lobes' weights."""
     q = len(rows)
     lane = dr.arange(mi.UInt32, q * count)
     source = dr.gather(mi.UInt32, integers(mi, rows), lane % q)
@@ -131,14 +141,8 @@ def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffu
         weights = [(1 - fresnel) * g1, fresnel * g1]
     above = wi.z > 0
     world = lifted(frame.to_world(wi), take(cache.face))
-    scene: Any = cache.scene
-    pi = scene.ray_intersect_preliminary(
-        spawn(take(cache.position), take(cache.geometric_normal), world), coherent=False, active=above
-    )
-    slot = dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), mi.UInt32(MISS))
-    weights = [dr.select(above, w / count, 0) for w in weights]
-    dr.eval(world, slot, *weights)
-    return np.array(world).T, np.array(slot), [np.array(w) for w in weights]
+    ray = spawn(take(cache.position), take(cache.geometric_normal), world)
+    return ray, above, [dr.select(above, w / count, 0) for w in weights]
 
 
 def _scatter(direction, slot, weight, row, rows: int, shape: tuple[int, int]) -> torch.Tensor:

@@ -1,0 +1,209 @@
+"""Where walls end beyond the picture, as the light on what the picture shows tells.
+
+A wall that goes on shuts out the light from beside and above, and its shadow's edge may lie in the picture. Which ends
+are right nobody sees; but with the wrong ones no light explains the photo as well (`prior_error` of the fit).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+
+from materialist.fit.engine import TransportEngine
+from materialist.fit.losses import encode, residual
+from materialist.fit.settings import LightSettings
+from materialist.geometry.completion import Wall
+from materialist.geometry.ends import Ends
+from materialist.transport.light import DIELECTRIC_R0, LightMatrix
+from materialist.transport.walls import WallMatrix
+from materialist.types import Array, Materials
+
+FARTHEST = 2.0
+LEVELS = (0.0, 0.25, 0.5, 1.0, FARTHEST)
+"""How far beyond what is seen of it a wall may go on, in its seen size."""
+STARTS = (0.0, 0.5, 1.0)
+"""Levels of all sides with which the search begins, beside the usual ends."""
+DESCENTS = 2
+"""Of all beginnings, the search goes on from this many."""
+SWEEPS = 2
+GAIN = 0.04
+"""Relative gain for which a side is moved: a little is had from any wall, by light that then comes from elsewhere."""
+SIDES = ("left", "right", "up")
+PIXELS = 1024
+ROUNDS = 2
+"""Reweightings towards the absolute error of encoded radiance,"""
+DESCENT = 30
+"""and steps of projected gradients after each."""
+RIDGE = 1e-3
+"""Price of bright texels that hardly reach anything, relative to that of a mean texel's error."""
+SMALL = 0.02
+"""Encoded errors below this count by their square."""
+
+
+def farthest(wall: Wall) -> Ends:
+    """The rectangle that holds every one that is tried."""
+    return _at(wall, {side: FARTHEST for side in SIDES})
+
+
+def _at(wall: Wall, levels: dict[str, float]) -> Ends:
+    """The usual lower side, and the others at levels beyond what is seen."""
+    seen, size = wall.seen, wall.size
+    sides = {"left": seen.left - levels["left"] * size, "right": seen.right + levels["right"] * size,
+             "up": seen.up + levels["up"] * size}  # fmt: skip
+    return replace(wall.usual, down=min(wall.usual.down, seen.down), **sides)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search came to."""
+
+    ends: tuple[Ends, ...]
+    error: float
+    """Mean absolute error (encoded) that the best light leaves."""
+    usual: float
+    """The same with the usual ends."""
+
+
+@dataclass
+class Search:
+    """The error that the best light leaves, as a function of where walls end."""
+
+    engine: TransportEngine
+    """Of the mesh whose walls go on to `farthest`."""
+    materials: Materials
+    photo: torch.Tensor
+    """[H * W, 3] linear."""
+    settings: LightSettings
+    walls: Sequence[Wall]
+    seed: int = 0
+    tried: dict[tuple[Ends, ...], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        engine = self.engine
+        rng = np.random.default_rng(self.seed + 29)
+        count = min(PIXELS, len(engine.cache.pixels))
+        rows = np.sort(rng.permutation(len(engine.cache.pixels))[:count])
+        planes = [(np.array(wall.usual.normal), wall.index) for wall in self.walls]
+        slots = engine.cache.slot_radiance(engine.radiance)
+        self._matrix = WallMatrix(engine.cache, self.materials, rows, engine.light_height, planes, slots)
+        self._light: torch.Tensor | None = None
+
+    def error(self, ends: tuple[Ends, ...]) -> float:
+        """Mean absolute error (encoded) under the best light."""
+        if ends not in self.tried:
+            matrix, indirect = self._matrix.ended(ends)
+            self.tried[ends], self._light = explained(
+                _per_channel(matrix), matrix.combine(indirect), self.photo[matrix.pixels], self.settings, self._light
+            )
+        return self.tried[ends]
+
+    def found(self) -> Found | None:
+        """Where the walls end; None where no ends are clearly better than the usual ones."""
+        usual = tuple(wall.usual for wall in self.walls)
+        best = self.best(usual)
+        error, before = self.error(best), self.error(usual)
+        return Found(best, error, before) if error < (1 - GAIN) * before else None
+
+    def best(self, usual: tuple[Ends, ...]) -> tuple[Ends, ...]:
+        """The ends of least error that a descent from the usual ones, or from even ones, comes to."""
+        even = [tuple(_at(wall, dict.fromkeys(SIDES, level)) for wall in self.walls) for level in STARTS]
+        none = tuple(map(_nowhere, self.walls))
+        begun = sorted([usual, none, *even], key=self.error)[:DESCENTS]
+        return min((self._descended(ends) for ends in begun), key=self.error)
+
+    def _descended(self, ends: tuple[Ends, ...]) -> tuple[Ends, ...]:
+        """One side of one wall after the other at its best level, while that helps."""
+        for _ in range(SWEEPS):
+            before = self.error(ends)
+            for k, wall in enumerate(self.walls):
+                ends = self._better(ends, k, [_nowhere(wall)])
+                for side in SIDES:
+                    ends = self._better(ends, k, [_moved(ends[k], wall, side, level) for level in LEVELS])
+            if self.error(ends) > (1 - GAIN) * before:
+                break
+        return ends
+
+    def _better(self, ends: tuple[Ends, ...], k: int, others: list[Ends]) -> tuple[Ends, ...]:
+        """The ends with the best of `others` for wall k, where that is clearly better."""
+        every = [(*ends[:k], other, *ends[k + 1 :]) for other in others]
+        least = min(map(self.error, every))
+        best = next(other for other in every if self.error(other) <= (1 + GAIN / 2) * least)  # the shortest as good
+        return best if self.error(best) < (1 - GAIN) * self.error(ends) else ends
+
+
+def _nowhere(wall: Wall) -> Ends:
+    """No continuation."""
+    return replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
+
+
+def _moved(end: Ends, wall: Wall, side: str, level: float) -> Ends:
+    """The ends with one side at a level; a wall that went nowhere has the others where the picture shows them."""
+    if end.right <= end.left:
+        end = _at(wall, dict.fromkeys(SIDES, 0.0))
+    return replace(end, **{side: getattr(_at(wall, dict.fromkeys(SIDES, level)), side)})
+
+
+def _per_channel(matrix: LightMatrix) -> torch.Tensor:
+    """[3, Q, texels] direct transport of red, green and blue."""
+    a, m = matrix.albedo, matrix.metallic
+    diffuse, tinted, white = matrix.lobes
+    every = [
+        a[:, c : c + 1] * (1 - m) * diffuse + (DIELECTRIC_R0 * (1 - m) + m * a[:, c : c + 1]) * tinted + white
+        for c in range(3)
+    ]
+    return torch.stack(every)
+
+
+def explained(
+    transport: torch.Tensor, rest: torch.Tensor, photo: torch.Tensor, settings: LightSettings,
+    start: torch.Tensor | None = None,
+) -> tuple[float, torch.Tensor]:  # fmt: skip
+    """How well the best light E >= 0 explains a photo by transport E + rest, and that light.
+
+    Least squares, reweighted so that absolute differences of encoded radiance count.
+
+    Args:
+        transport: [3, Q, texels] per channel. rest: [Q, 3]. photo: [Q, 3] linear.
+        start: [3, texels] a light to begin with.
+
+    Returns:
+        Mean absolute encoded error, and the light [3, texels].
+    """
+    rest, photo = rest.T, photo.T  # [3, Q]
+    if start is None:
+        start = torch.full(transport.shape[::2], 0.5)
+    light = start
+    for _ in range(ROUNDS):
+        radiance = (transport @ light[..., None])[..., 0] + rest
+        error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+        away = radiance - photo
+        away = torch.where(away.abs() < 1e-4, 1e-4, away)
+        slope = ((encode(photo + away, settings.encoding) - encode(photo, settings.encoding)) / away).abs()
+        weight = slope * torch.where(
+            (error == 0) & (away > 0), 0.0, error.abs().clamp_min(SMALL).rsqrt()
+        )  # [3, Q]
+        light = _nonnegative(transport * weight[..., None], (photo - rest) * weight, light)
+    radiance = (transport @ light[..., None])[..., 0] + rest
+    error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+    return float(error.abs().mean()), light
+
+
+def _nonnegative(matrix: torch.Tensor, target: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
+    """[3, texels] x >= 0 of least |matrix x - target|^2 + ridge, by accelerated projected gradients from `start`."""
+    gram = matrix.transpose(1, 2) @ matrix  # [3, texels, texels]
+    mean = gram.diagonal(dim1=1, dim2=2).mean(1)  # [3]
+    gram = gram + RIDGE * mean[:, None, None] * torch.eye(gram.shape[-1])
+    right = (matrix.transpose(1, 2) @ target[..., None])[..., 0]
+    # Rows by the square roots of their sums: an upper bound of the largest eigenvalue becomes 1 everywhere.
+    scale = gram.sum(-1).clamp_min(1e-12).reciprocal()  # [3, texels]; gram >= 0
+    x, y, t = start, start, 1.0
+    for _ in range(DESCENT):
+        new = (y - scale * ((gram @ y[..., None])[..., 0] - right)).clamp_min(0)
+        if bool(((y - new) * (new - x)).sum() > 0):
+            t = 1.0
+        after = (1 + (1 + 4 * t * t) ** 0.5) / 2
+        y, x, t = new + (t - 1) / after * (new - x), new, after
+    return x

@@ -1,0 +1,64 @@
+"""Where the continuation of a wall or ceiling ends beyond the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from materialist.geometry.planes import Plane
+from materialist.types import Array
+
+SAME_NORMAL = np.cos(np.radians(15.0))
+"""Planes found anew on changed maps are taken for the same one within this angle,"""
+SAME_OFFSET = 0.15
+"""and within this relative difference of their distances from the camera."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """A rectangle on one plane, in the plane's own `axes`, whose origin is the point nearest to the camera."""
+
+    normal: tuple[float, float, float]
+    """Unit, camera frame, facing the camera."""
+    offset: float
+    """Scene units, < 0, as `Plane.offset`."""
+    left: float
+    right: float
+    down: float
+    up: float
+    """Coordinates of its sides, scene units; left < right, down < up, as seen by one who faces the wall."""
+
+    def corners(self) -> Array:
+        """[4, 2] counter-clockwise."""
+        return np.array([[self.left, self.down], [self.right, self.down], [self.right, self.up], [self.left, self.up]])
+
+    def holds(self, x: Array, y: Array) -> Array:
+        """[N] bool: whether coordinates [N] and [N] in `axes` are inside."""
+        return (x > self.left) & (x < self.right) & (y > self.down) & (y < self.up)
+
+
+def told(provenance: dict[str, Any]) -> tuple[Ends, ...]:
+    """What a scene's provenance says about the ends of its walls; nothing if it is of an older version."""
+    return tuple(Ends(**{**one, "normal": tuple(one["normal"])}) for one in provenance.get("ends", ()))
+
+
+def axes(normal: Array) -> Array:
+    """[2, 3] unit: to the right and up for one who faces a plane with this normal [3]; of a ceiling, any such pair."""
+    normal = np.asarray(normal, np.float64)
+    across = np.cross([0.0, 1, 0] if abs(normal[1]) < 0.9 else [0.0, 0, 1], normal)
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(normal, across)])
+
+
+def ends_of(plane: Plane, ends: Iterable[Ends]) -> Ends | None:
+    """Those of this plane, if any."""
+    close = [
+        (float(np.dot(e.normal, plane.normal)), e)
+        for e in ends
+        if np.dot(e.normal, plane.normal) > SAME_NORMAL
+        and abs(e.offset - plane.offset) <= SAME_OFFSET * max(-e.offset, -plane.offset)
+    ]
+    return max(close, key=lambda pair: pair[0])[1] if close else None

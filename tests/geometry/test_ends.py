@@ -1,0 +1,71 @@
+"""Ends of walls: told, found again on changed maps, and kept to by the mesh."""
+
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from geometry_scenes import room, trace
+
+from materialist.geometry.build import build_geometry
+from materialist.geometry.completion import walls_of
+from materialist.geometry.ends import Ends, axes, ends_of, told
+from materialist.geometry.planes import Plane, find_planes
+from materialist.types import Camera
+
+CAMERA = Camera(64, 48, 60.0)
+NONE = np.zeros((48, 64), bool)
+
+
+def wall_at(mesh, x: float, y: float) -> bool:
+    """Whether a ray along -z from (x, y, -3) meets the wall at z = -6."""
+    distance, face = trace(mesh, np.array([x, y, -3.0]), np.array([[0.0, 0, -1]]))
+    return bool(face[0] >= 0 and distance[0] == pytest.approx(3, abs=0.05))
+
+
+@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 0, 0), (-0.6, 0.2, 0.77), (0, -1, 0), (0.02, -0.99, 0.1)])
+def test_axes_are_right_handed_and_upright(normal):
+    normal = np.array(normal) / np.linalg.norm(normal)
+    across, up = axes(normal)
+    np.testing.assert_allclose(np.cross(across, up), normal, atol=1e-12)
+    assert abs(normal[1]) >= 0.9 or (abs(across[1]) < 1e-12 and up[1] > 0)
+
+
+def test_a_wall_ends_where_it_is_told():
+    depth, normal, _ = room(CAMERA)
+    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    np.testing.assert_allclose(wall.usual.normal, (0, 0, 1), atol=0.02)
+    half = 6 * CAMERA.width / (2 * CAMERA.focal)
+    assert wall.seen.left == pytest.approx(-half, rel=0.03) and wall.seen.right == pytest.approx(half, rel=0.03)
+    for right, up in ((half + 1, wall.seen.up), (half + 1, wall.seen.up + 2), (half + 3, wall.seen.up + 2)):
+        ends = replace(wall.usual, left=-half - 0.5, right=right, up=up)
+        mesh = build_geometry(depth, normal, CAMERA, ends=[ends]).mesh
+        for x, y in ((half + 0.8, 0), (half + 2, 1), (half + 3.5, 0), (-half - 0.3, 0), (-half - 0.8, 0), (0, up + 0.2),
+                     (0, up - 0.2)):  # fmt: skip
+            inside = -half - 0.5 < x < right and y < up
+            assert wall_at(mesh, x, y) == inside, (right, up, x, y)
+
+
+def test_a_wall_may_go_nowhere():
+    depth, normal, label = room(CAMERA)
+    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    nowhere = replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
+    meshes = [build_geometry(depth, normal, CAMERA, **o).mesh for o in ({"ends": [nowhere]}, {"completion": "planes"})]
+    faces = [int((mesh.face_plane == wall.index).sum()) for mesh in meshes]
+    floors = build_geometry(depth, normal, CAMERA, completion="floors,backs").mesh
+    assert faces[0] == int((floors.face_plane == wall.index).sum()) < faces[1]
+
+
+def test_ends_are_those_of_the_nearest_plane():
+    first = Ends((0.0, 0.0, 1.0), -3.0, -1, 1, -1, 1)
+    tilted = replace(first, normal=(0.2, 0.0, 0.98))
+    plane = Plane(np.array([0.05, 0, 0.9987]), -3.1, NONE)
+    assert ends_of(plane, [tilted, first]) is first
+    assert ends_of(replace(plane, offset=-4.0), [first]) is None
+    assert ends_of(replace(plane, normal=np.array([1.0, 0, 0])), [first]) is None
+
+
+def test_provenance_holds_ends():
+    ends = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.5, -1.0, 2.0)
+    assert told(json.loads(json.dumps({"ends": [asdict(ends)]}))) == (ends,)
+    assert told({}) == ()
