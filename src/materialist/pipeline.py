@@ -113,7 +113,8 @@ def invert(
         depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": best.completion, "ends": [asdict(e) for e in best.ends], "tau": tau, "strategy": strategy, "seed": seed, "spp": spp, "size": size,
+            "completion": best.completion, "ends": [asdict(e) for e in best.ends], "tau": tau, "strategy": strategy,
+            "seed": seed, "spp": spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
     )  # fmt: skip

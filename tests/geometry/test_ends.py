@@ -47,7 +47,7 @@ def test_a_wall_ends_where_it_is_told():
 
 
 def test_a_wall_may_go_nowhere():
-    depth, normal, label = room(CAMERA)
+    depth, normal, _ = room(CAMERA)
     (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
     nowhere = replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
     meshes = [build_geometry(depth, normal, CAMERA, **o).mesh for o in ({"ends": [nowhere]}, {"completion": "planes"})]

@@ -184,6 +184,7 @@ class _Stage:
     def relit(self) -> Iterator[dict[str, Any]]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
         from materialist import pipeline
+        from materialist.render.scene import RenderScene
 
         truth = self.sample.truth
         for completion, suffix in ADDED.items():
@@ -197,7 +198,9 @@ class _Stage:
             yield {
                 "method": "inversion" + suffix,
                 **self._of_light(found.envmap),
-                **self._on_mesh(found.provenance["completion"], found.materials, found.envmap),
+                **self._on(
+                    RenderScene(found.geometry, found.camera, device=self.device), found.materials, found.envmap
+                ),
                 "albedo_l1": float(np.abs(found.materials.albedo - truth.materials.albedo)[surface].mean()),
                 **cost,
             }
@@ -210,9 +213,9 @@ class _Stage:
                 taken = _all(completion)
                 mesh = self.mesh(taken)[1]
             clock = _Clock()
-            envmap, steps, taken = fit(self.sample, method, taken, mesh=mesh, seed=self.seed, device=self.device)
+            envmap, steps, mesh = fit(self.sample, method, taken, mesh=mesh, seed=self.seed, device=self.device)
             cost = clock.read()
-            on_mesh = self._on_mesh(taken, self.sample.truth.materials, envmap)
+            on_mesh = self._on(mesh, self.sample.truth.materials, envmap)
             yield {
                 "method": name,
                 **self._of_light(envmap),
@@ -233,7 +236,10 @@ class _Stage:
 
     def _on_mesh(self, completion: str, materials: Materials, envmap: Array) -> dict[str, float]:
         """PSNR of the depth mesh with these materials, under this light and under the other."""
-        _, mesh = self.mesh(completion)
+        return self._on(self.mesh(completion)[1], materials, envmap)
+
+    def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
+        """The same of any RenderScene."""
         mesh.set_materials(materials)
         mesh.set_envmap(envmap)
         picture = mesh.render(spp=self.spp, seed=self.seed + 1)
@@ -244,9 +250,9 @@ class _Stage:
 
 def fit(
     sample: SyntheticSample, method: Method, completion: str, *, mesh: Any = None, seed: int = 0, device: str = "auto"
-) -> tuple[Array, int, str]:
+) -> tuple[Array, int, Any]:
     """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth, in how many
-    steps, and which completion that mesh had. `mesh` is the scene that the path engine renders."""
+    steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
     import torch
 
     from materialist.fit.attempt import Job
@@ -254,6 +260,7 @@ def fit(
     from materialist.fit.inverse import paste_visible_sky
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
+    from materialist.render.scene import RenderScene
 
     photo, truth = sample.photo, sample.truth
     named = preset(method.preset)
@@ -272,12 +279,12 @@ def fit(
             photo, given, named, "transport", height, 6.0, None, "default", seed, device, 0, None, lambda *_: None
         )
         begun, _ = job.choose(completion)
-        engine, completion = begun.fit.engine, begun.completion
+        engine, mesh = begun.fit.engine, RenderScene(begun.geometry, photo.camera, device=device)
     problem = engine.light_problem(given.materials)
     field = envmap_field(light, seed=seed)
     result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
     envmap = prepared_envmap(field(max(light.height, 16)), height)
-    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, completion
+    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, mesh
 
 
 def _all(completion: str) -> str:

@@ -168,7 +168,7 @@ def _sheet(
         told = ends_of(plane, ends)
     x, y = axes(plane.normal) @ own.mean(0)
     square = Ends(
-        tuple(map(float, plane.normal)), float(plane.offset),
+        (float(plane.normal[0]), float(plane.normal[1]), float(plane.normal[2])), float(plane.offset),
         float(x - half_size), float(x + half_size), float(y - half_size), float(y + half_size),
     )  # fmt: skip
     return _Sheet(index, plane, own, pixels, bool(bounding), touches, told or square, behind)
