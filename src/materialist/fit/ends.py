@@ -98,6 +98,8 @@ class Search:
     def found(self) -> Found | None:
         """Where the walls end; None where no ends are clearly better than the usual ones."""
         usual = tuple(wall.usual for wall in self.walls)
+        self.error(usual)
+        self.tried.clear()  # the first light began from nothing; from now on all begin alike
         best = self.best(usual)
         error, before = self.error(best), self.error(usual)
         return Found(best, error, before) if error < (1 - GAIN) * before else None
