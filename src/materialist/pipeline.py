@@ -61,7 +61,8 @@ def invert(
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
             `floors,backs` ends walls at the frame, `planes` leaves objects open behind, `none` adds nothing. `auto` is
-            the first, or one with less where the first shuts out light that the photo shows; the report then says so.
+            the first with walls that end where light explains the photo best, or `none` where that shuts out light
+            that the photo shows; the report then says so.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).

@@ -7,6 +7,7 @@ import pytest
 
 from materialist import metrics
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.fit import attempt
 from materialist.fit.attempt import FULL, Attempt, Begun, Job
 from materialist.fit.ends import Found
 from materialist.geometry.ends import Ends
@@ -42,7 +43,7 @@ def job(
 
     monkeypatch.setattr(Job, "begin", begin)
     monkeypatch.setattr(Job, "finish", finish)
-    monkeypatch.setattr(Job, "_ends", lambda self: found)
+    monkeypatch.setattr(attempt, "find_ends", lambda *_, **__: found)
     settings = SimpleNamespace(trust=0.08)
     rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
     return Job(SimpleNamespace(linear=PHOTO, camera=Camera(8, 8, 40.0)), *rest), finished

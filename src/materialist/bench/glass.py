@@ -17,7 +17,7 @@ import numpy as np
 from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
-from materialist.bench.glass_backdrop import Background
+from materialist.bench.glass_backdrop import Background, wall_ends
 from materialist.bench.glass_latency import latencies
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.color import linear_to_srgb
@@ -49,7 +49,8 @@ NOTE = (
     "without any refraction. `ceiling, true mesh` is the object's own mesh before the background that the closed "
     "proxy stands before, `ceiling, truth again` the truth with other noise and as few paths as the predictions, "
     "not denoised. The inpainted background is that of `materialist glass`: patterns that go on "
-    "and patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights "
+    "and patches of the photo, on the continued planes of floor and wall, which end beyond the picture where "
+    "`materialist invert` ends them, given the true maps. LPIPS only where the package and its weights "
     "are installed."
 )
 NOISE = 0.5
@@ -143,9 +144,10 @@ def cases(
             room = scene.render(envmap, "room", spp=reference, seed=1)
             photo = scene.render(envmap, "diffuse", spp=reference, seed=2)
             gain = scenes.exposure(room)
+            ends = wall_ends(scene, np.clip(photo * gain, 0, 1))
             behind = {
-                "true": models.true_background(scene, room, envmap),
-                "inpainted": models.inpainted_background(scene, photo, envmap, gain),
+                "true": models.true_background(scene, room, envmap, ends),
+                "inpainted": models.inpainted_background(scene, photo, envmap, gain, ends),
             }
             for ior in iors:
                 truth = scene.render(envmap, "glass", ior=ior, spp=reference, seed=3)

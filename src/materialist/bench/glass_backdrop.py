@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.glass_scenes import DEPTH, GlassScene, _light, _mesh, path_traced
+from materialist.geometry.ends import Ends
 from materialist.types import Array
 
 SPP = 256
@@ -34,15 +35,38 @@ class Background:
     """[H, W, 3] unit."""
     albedo: Array
     """[H, W, 3] linear, in [0, 1], with which a rendering under the scene's light shows `picture`."""
+    ends: tuple[Ends, ...] = ()
+    """Where its walls end beyond the picture, if light tells."""
 
 
-def albedo_of(scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array) -> Array:
+def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
+    """Where walls end as `invert` finds it from the exposed photo [H, W, 3] linear in [0, 1] and the true maps."""
+    from materialist.fit.ends import find_ends
+    from materialist.fit.settings import preset
+    from materialist.types import Materials, Prediction
+
+    there, flat = scene.mask[..., None], np.ones(scene.mask.shape, np.float32)
+    truth = Prediction(
+        Materials(scene.albedo, flat, 0 * flat),
+        np.where(there, scene.front.normal, scene.behind.normal).astype(np.float32),
+        np.where(scene.mask, scene.front.depth, scene.behind.depth).astype(np.float32),
+        "truth",
+    )
+    if not (truth.depth > 0).any():
+        return ()
+    found = find_ends(photo, truth, scene.camera, preset("default"))
+    return found.ends if found else ()
+
+
+def albedo_of(
+    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[Ends, ...] = ()
+) -> Array:
     """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`."""
     from materialist.render.denoise import denoise
 
     albedo = np.full(picture.shape, 0.5, np.float32)
     for _ in range(ROUNDS if depth.any() else 0):
-        seen = lit(scene, depth, normal, albedo, envmap, length=DEPTH["diffuse"], spp=SPP)
+        seen = lit(scene, depth, normal, albedo, envmap, ends=ends, length=DEPTH["diffuse"], spp=SPP)
         with suppress_missing():
             seen = denoise(seen, albedo=albedo, normal=normal)
         albedo = np.clip(albedo * picture / np.maximum(seen, 1e-6), 0, BRIGHTEST).astype(np.float32)
@@ -51,10 +75,10 @@ def albedo_of(scene: GlassScene, depth: Array, normal: Array, picture: Array, en
 
 def lit(
     scene: GlassScene, depth: Array, normal: Array, albedo: Array, envmap: Array, things: dict[str, Any] | None = None,
-    *, length: int, spp: int, seed: int = 0, around: Array | None = None,
+    *, ends: tuple[Ends, ...] = (), length: int, spp: int, seed: int = 0, around: Array | None = None,
 ) -> Array:  # fmt: skip
     """[H, W, 3] linear: Mitsuba objects before the surfaces of the maps, by paths of `length` at most."""
-    surfaces = _surfaces(scene, depth, normal, albedo)
+    surfaces = _surfaces(scene, depth, normal, albedo, ends)
     description = {"type": "scene", **_light(scene._mi, envmap), **surfaces, **(things or {})}
     return path_traced(scene._mi, description, scene.camera, depth=length, spp=spp, seed=seed, around=around)
 
@@ -66,7 +90,7 @@ def suppress_missing():
     return suppress(SetupError)
 
 
-def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array) -> dict[str, Any]:
+def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array, ends: tuple[Ends, ...]) -> dict[str, Any]:
     """The maps' surfaces, planes going on beyond the picture with their mean albedo."""
     from materialist.geometry.build import build_geometry
     from materialist.render.buffers import tensor
@@ -74,7 +98,7 @@ def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array) -> 
 
     if not depth.any():
         return {}
-    geometry, found = build_geometry(depth, normal, scene.camera), {}
+    geometry, found = build_geometry(depth, normal, scene.camera, ends=ends), {}
     for k in np.unique(geometry.mesh.face_plane):
         paint = albedo if k < 0 else np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
         texture = {"type": "bitmap", "data": tensor(scene._mi, paint), "raw": True, "wrap_mode": "clamp"}

@@ -9,17 +9,20 @@ import numpy as np
 
 from materialist.bench.glass_backdrop import Background, albedo_of, lit, suppress_missing
 from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh
+from materialist.geometry.ends import Ends
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
 
 
-def true_background(scene: GlassScene, room: Array, envmap: Array) -> Background:
+def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[Ends, ...] = ()) -> Background:
     """The room as it is, its picture [H, W, 3] rendered without the object."""
     depth, normal = scene.behind.depth, scene.behind.normal
-    return Background(room, depth, normal, albedo_of(scene, depth, normal, room, envmap))
+    return Background(room, depth, normal, albedo_of(scene, depth, normal, room, envmap, ends), ends)
 
 
-def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0) -> Background:
+def inpainted_background(
+    scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0, ends: tuple[Ends, ...] = ()
+) -> Background:
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
 
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
@@ -35,7 +38,7 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
     there = scene.mask[..., None]
     albedo = albedo_of(
         scene, np.where(scene.mask, scene.front.depth, scene.behind.depth),
-        np.where(there, scene.front.normal, scene.behind.normal), photo, envmap,
+        np.where(there, scene.front.normal, scene.behind.normal), photo, envmap, ends,
     )  # fmt: skip
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
@@ -48,7 +51,7 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
     told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
     plan = exemplar_plan(seen, hole, anywhere, label, told=told)
     picture, albedo = (membrane(x, ~hole) if plan is None else plan.fill(x) for x in (photo, albedo))
-    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal, albedo)
+    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal, albedo, ends)
 
 
 def _grown(mask: Array) -> Array:
@@ -97,7 +100,7 @@ def before(
     things = {"object": _mesh(scene._mi, body, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})}
     picture = lit(
         scene, behind.depth, behind.normal, behind.albedo, envmap, things,
-        length=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask,
+        ends=behind.ends, length=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask,
     )  # fmt: skip
     return np.where(scene.mask[..., None], _clean(picture, scene), 0)
 

@@ -170,6 +170,17 @@ class GlassScene:
         """[H, W] bool: where the object is."""
         return self.front.depth > 0
 
+    @cached_property
+    def albedo(self) -> Array:
+        """[H, W, 3] linear: of what the camera sees first, the object grey."""
+        mi = self._mi
+        description: dict[str, Any] = {
+            f"room{k}": _mesh(mi, i.solid, _paint(mi, i.albedo)) for k, i in enumerate(self.room)
+        }
+        description["object"] = _mesh(mi, self.item.solid, _paint(mi, self.item.albedo))
+        seen = {"type": "aov", "aovs": "albedo:albedo"}
+        return path_traced(mi, {"type": "scene", **description}, self.camera, spp=64, seed=0, integrator=seen)
+
     def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it).
 
@@ -223,9 +234,20 @@ def exposure(background: Array) -> float:
 
 
 def path_traced(
-    mi, description: dict[str, Any], camera: Camera, *, depth: int, spp: int, seed: int, around: Array | None = None
+    mi,
+    description: dict[str, Any],
+    camera: Camera,
+    *,
+    depth: int = 0,
+    spp: int,
+    seed: int,
+    around: Array | None = None,
+    integrator: dict[str, Any] | None = None,
 ) -> Array:
-    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor, or of the rectangle around a mask of it."""
+    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor, or of the rectangle around a mask of it.
+
+    By paths of `depth` at most, or by another `integrator`.
+    """
     from materialist.bench.synthetic import _sensor
 
     sensor, window = _sensor(camera), np.s_[:, :]
@@ -237,9 +259,9 @@ def path_traced(
             "crop_width": int(columns[-1] - columns[0] + 1), "crop_height": int(rows[-1] - rows[0] + 1),
         }  # fmt: skip
     scene = mi.load_dict({**description, "sensor": sensor})
-    integrator = mi.load_dict({"type": "path", "max_depth": depth, "rr_depth": 64})
+    how = mi.load_dict(integrator or {"type": "path", "max_depth": depth, "rr_depth": 64})
     side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
-    picture = np.array(mi.render(scene, integrator=integrator, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
+    picture = np.array(mi.render(scene, integrator=how, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
     whole = np.zeros((camera.height, camera.width, 3), np.float32)
     whole[window] = np.nan_to_num(picture)
     return whole

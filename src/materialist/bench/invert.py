@@ -34,6 +34,7 @@ paper's."""
 
 STAGES = {
     "predict": "prior",
+    "walls": "walls",
     "geometry": "mesh",
     "scene": "scene",
     "engine": "cache",

@@ -31,7 +31,7 @@ linear and unclipped). `render` figures compare the true scene under the fitted 
 depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
 `ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
 whole inversion by the default preset, light and materials, with the true maps as its prior; it and `default` end
-walls at the frame where they keep out the light of the photograph (`--completion auto`), the ceiling does not. `w/o
+walls where light explains the photograph best (`--completion auto`), the ceiling does not. `w/o
 backs`: with objects open behind (`--completion planes`); `w/o planes`: without continued planes, either (`none`). `w/o
 mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit and
 its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds add up all

@@ -5,20 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
-import torch
 
 from materialist import metrics
-from materialist.fit.ends import Found, Search, farthest
+from materialist.fit.ends import find_ends
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
 from materialist.fit.inverse import Fit
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import walls_of
 from materialist.geometry.ends import Ends
-from materialist.geometry.planes import find_planes
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
@@ -118,7 +116,10 @@ class Job:
         if completion != AUTO or self.settings.trust is None:
             return self.begin(FULL if completion == AUTO else completion), ()
         stages: list[dict] = []
-        found = timed(stages, "walls", self._ends)
+        self._tick("walls")
+        camera, settings = self.picture.camera, self.settings
+        search = partial(find_ends, self.picture.linear, self.prior, camera, settings, tau=self.tau, seed=self.seed)
+        found = timed(stages, "walls", search)
         begun = self.begin(FULL, found.ends if found else ())
         begun.stages[:0] = stages
         if not found:
@@ -128,17 +129,6 @@ class Job:
             f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
         )
         return begun, (note,)
-
-    def _ends(self) -> Found | None:
-        """Where walls end, if light tells."""
-        prior, camera = self.prior, self.picture.camera
-        walls = walls_of(find_planes(prior.depth, prior.normal, camera, seed=self.seed), prior.depth, camera)
-        if not walls:
-            return None
-        geometry = self._geometry(FULL, [farthest(wall) for wall in walls])
-        engine = TransportEngine(geometry, camera, self.picture.linear, light_height=self.settings.light_grid)
-        photo = torch.from_numpy(np.ascontiguousarray(self.picture.linear.reshape(-1, 3), np.float32))
-        return Search(engine, prior.materials, photo, self.settings.light, walls, self.seed).found()
 
     def begin(self, completion: str, ends: Sequence[Ends] = ()) -> Begun:
         """The mesh, and an engine that has not traced anything yet."""

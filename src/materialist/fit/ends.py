@@ -14,11 +14,13 @@ import torch
 
 from materialist.fit.engine import TransportEngine
 from materialist.fit.leastsquares import explained, per_channel
-from materialist.fit.settings import LightSettings
-from materialist.geometry.completion import Wall
+from materialist.fit.settings import FitSettings, LightSettings
+from materialist.geometry.build import build_geometry
+from materialist.geometry.completion import Wall, walls_of
 from materialist.geometry.ends import Ends
+from materialist.geometry.planes import find_planes
 from materialist.transport.walls import WallMatrix
-from materialist.types import Materials
+from materialist.types import Array, Camera, Materials, Prediction
 
 FARTHEST = 2.0
 LEVELS = (0.0, 0.25, 0.5, 1.0, FARTHEST)
@@ -60,6 +62,22 @@ class Found:
     """Mean absolute error (encoded) that the best light leaves."""
     usual: float
     """The same with the usual ends."""
+
+
+def find_ends(
+    photo: Array, prior: Prediction, camera: Camera, settings: FitSettings, *, tau: float = 6.0, seed: int = 0
+) -> Found | None:
+    """Where the walls of a photo [H, W, 3] linear end; None if there are none, or light does not tell."""
+    walls = walls_of(find_planes(prior.depth, prior.normal, camera, seed=seed), prior.depth, camera)
+    if not walls:
+        return None
+    geometry = build_geometry(
+        prior.depth, prior.normal, camera, tau=tau, completion="planes,backs", ends=[farthest(w) for w in walls],
+        seed=seed,
+    )  # fmt: skip
+    engine = TransportEngine(geometry, camera, photo, seed=seed, light_height=settings.light_grid)
+    flat = torch.from_numpy(np.ascontiguousarray(photo.reshape(-1, 3), np.float32))
+    return Search(engine, prior.materials, flat, settings.light, walls, seed).found()
 
 
 @dataclass
