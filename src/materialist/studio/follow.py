@@ -14,7 +14,8 @@ _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
     "walls": "Finding where walls end", "geometry": "Building the surface", "trace": "Tracing light paths",
     "light": "Finding the light", "materials": "Finding the materials", "rerender": "Rendering the result",
-    "save": "Saving", "load": "Loading", "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
+    "save": "Saving", "load": "Loading", "render": "Path tracing", "frames": "Path tracing the frames",
+    "export": "Writing the file",
 }  # fmt: skip
 _SHARE = {
     "start": (0.0, 0.08), "read": (0.08, 0.1), "predict": (0.1, 0.14), "walls": (0.14, 0.24),
