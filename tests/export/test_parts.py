@@ -68,3 +68,18 @@ def test_bad_input():
     planes = Mesh(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, mesh.face_pixel, mesh.face_plane * 0)
     with pytest.raises(InputError, match="no depth surface"):
         scene_parts(replace(scene, geometry=Geometry(planes, scene.geometry.plane_label)))
+
+
+def test_fewer_triangles_keep_the_ends_of_walls():
+    from dataclasses import asdict, replace
+
+    from materialist.geometry.completion import walls_of
+    from materialist.geometry.planes import find_planes
+
+    scene = room()
+    (wall,) = walls_of(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
+    ends = replace(wall.usual, up=wall.seen.up + 5.0)
+    told = replace(scene, provenance={**scene.provenance, "ends": [asdict(ends)]})
+    tops = [max(float(part.mesh.vertices[:, 1].max()) for part in scene_parts(s, 3000)[1:]) for s in (scene, told)]
+    # The coarse picture is a little less square, and its mesh is stretched back onto the frame.
+    assert tops[0] < tops[1] - 1 and tops[1] == pytest.approx(ends.up, rel=0.04)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from geometry_scenes import room, trace
 
+from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.geometry.completion import walls_of
 from materialist.geometry.ends import Ends, axes, ends_of, told
@@ -68,4 +69,13 @@ def test_ends_are_those_of_the_nearest_plane():
 def test_provenance_holds_ends():
     ends = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.5, -1.0, 2.0)
     assert told(json.loads(json.dumps({"ends": [asdict(ends)]}))) == (ends,)
-    assert told({}) == ()
+    assert told({}) == told({"ends": None}) == ()
+    for broken in (
+        3,
+        [3],
+        [{"normal": [0, 0, 1]}],
+        [{**asdict(ends), "normal": [1]}],
+        [{**asdict(ends), "up": "high"}],
+    ):
+        with pytest.raises(InputError, match="ends of its walls"):
+            told({"ends": broken})

@@ -67,8 +67,8 @@ def nonnegative(matrix: torch.Tensor, target: torch.Tensor, start: torch.Tensor)
     mean = gram.diagonal(dim1=1, dim2=2).mean(1)  # [3]
     gram = gram + RIDGE * mean[:, None, None] * torch.eye(gram.shape[-1])
     right = (matrix.transpose(1, 2) @ target[..., None])[..., 0]
-    # Rows by the square roots of their sums: an upper bound of the largest eigenvalue becomes 1 everywhere.
-    scale = gram.sum(-1).clamp_min(1e-12).reciprocal()  # [3, texels]; gram >= 0
+    # A symmetric matrix without negative entries is at most the diagonal of its row sums: safe steps for each texel.
+    scale = gram.sum(-1).clamp_min(1e-12).reciprocal()  # [3, texels]
     x, y, t = start, start, 1.0
     for _ in range(DESCENT):
         new = (y - scale * ((gram @ y[..., None])[..., 0] - right)).clamp_min(0)

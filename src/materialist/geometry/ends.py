@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.errors import InputError
 from materialist.geometry.planes import Plane
 from materialist.types import Array
 
@@ -15,6 +16,7 @@ SAME_NORMAL = np.cos(np.radians(15.0))
 """Planes found anew on changed maps are taken for the same one within this angle,"""
 SAME_OFFSET = 0.15
 """and within this relative difference of their distances from the camera."""
+_NUMBERS = ("offset", "left", "right", "down", "up")
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,22 @@ class Ends:
 
 
 def told(provenance: dict[str, Any]) -> tuple[Ends, ...]:
-    """What a scene's provenance says about the ends of its walls; nothing if it is of an older version."""
-    return tuple(Ends(**{**one, "normal": tuple(one["normal"])}) for one in provenance.get("ends", ()))
+    """What a scene's provenance says about the ends of its walls; nothing if it is of an older version.
+
+    Raises:
+        InputError: something else stands there.
+    """
+    try:
+        return tuple(
+            Ends((float(n[0]), float(n[1]), float(n[2])), *(float(one[name]) for name in _NUMBERS))
+            for one in provenance.get("ends") or ()
+            for n in (one["normal"],)
+        )
+    except (TypeError, KeyError, IndexError, ValueError) as error:
+        raise InputError(
+            f"The scene's provenance says {provenance['ends']!r} about the ends of its walls, which cannot be read; "
+            'take "ends" out of its scene.json.'
+        ) from error
 
 
 def axes(normal: Array) -> Array:
