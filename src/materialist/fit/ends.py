@@ -34,6 +34,7 @@ GAIN = 0.04
 """Relative gain for which a side is moved: a little is had from any wall, by light that then comes from elsewhere."""
 SIDES = ("left", "right", "up")
 PIXELS = 1024
+"""Surface pixels of the photo whose light is looked at."""
 
 
 def farthest(wall: Wall) -> Ends:
