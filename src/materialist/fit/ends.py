@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from materialist.fit.engine import TransportEngine
-from materialist.fit.leastsquares import explained, per_channel
+from materialist.fit.leastsquares import explained
 from materialist.fit.settings import FitSettings, LightSettings
 from materialist.geometry.build import build_geometry
 from materialist.geometry.completion import Wall, walls_of
@@ -110,7 +110,7 @@ class Search:
         if ends not in self.tried:
             matrix, indirect = self._matrix.ended(ends)
             self.tried[ends], self._light = explained(
-                per_channel(matrix), matrix.combine(indirect), self.photo[matrix.pixels], self.settings, self._light
+                matrix.per_channel(), matrix.combine(indirect), self.photo[matrix.pixels], self.settings, self._light
             )
         return self.tried[ends]
 

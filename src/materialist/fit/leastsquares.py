@@ -6,7 +6,6 @@ import torch
 
 from materialist.fit.losses import encode, residual
 from materialist.fit.settings import LightSettings
-from materialist.transport.light import DIELECTRIC_R0, LightMatrix
 
 ROUNDS = 2
 """Reweightings towards the absolute error of encoded radiance,"""
@@ -16,17 +15,6 @@ RIDGE = 1e-3
 """Price of bright texels that hardly reach anything, relative to that of a mean texel's error."""
 SMALL = 0.02
 """Encoded errors below this count by their square."""
-
-
-def per_channel(matrix: LightMatrix) -> torch.Tensor:
-    """[3, Q, texels] direct transport of red, green and blue."""
-    a, m = matrix.albedo, matrix.metallic
-    diffuse, tinted, white = matrix.lobes
-    every = [
-        a[:, c : c + 1] * (1 - m) * diffuse + (DIELECTRIC_R0 * (1 - m) + m * a[:, c : c + 1]) * tinted + white
-        for c in range(3)
-    ]
-    return torch.stack(every)
 
 
 def explained(

@@ -74,6 +74,10 @@ class LightMatrix:
         a, m = self.albedo if albedo is None else albedo, self.metallic
         return a * (1 - m) * light[0] + (DIELECTRIC_R0 * (1 - m) + m * a) * light[1] + light[2]
 
+    def per_channel(self) -> torch.Tensor:
+        """[3, Q, h * 2h] direct transport of red, green and blue, the lobes combined."""
+        return torch.stack([self.combine(self.lobes, self.albedo[:, c : c + 1]) for c in range(3)])
+
 
 def light_matrix(
     cache: TransportCache,
@@ -148,12 +152,16 @@ def rays(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: 
 def _scatter(direction, slot, weight, row, rows: int, shape: tuple[int, int]) -> torch.Tensor:
     """Bilinear footprints of the rays that leave the scene, added up: [rows, h * w]."""
     free = (slot == MISS) & (weight > 0)
-    index, share = bilinear(direction[free], shape)
-    flat = row[free][:, None] * (shape[0] * shape[1]) + index
-    values = (share * weight[free][:, None]).astype(np.float32)
-    out = torch.zeros(rows * shape[0] * shape[1])
-    out.index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
-    return out.view(rows, -1)
+    out = torch.zeros(rows, shape[0] * shape[1])
+    add_footprints(out, *bilinear(direction[free], shape), weight[free], row[free])
+    return out
+
+
+def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
+    """Add rays [N] to out [rows, texels], or [texels]: their weight [N] to the texels index [N, 4] by share [N, 4]."""
+    flat = row[:, None] * out.shape[-1] + index
+    values = (share * weight[:, None]).astype(np.float32)
+    out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
 
 
 def _hits(slot, weights, row, diffuse: bool):

@@ -18,7 +18,7 @@ import torch
 from materialist.geometry.ends import Ends, axes
 from materialist.render.buffers import integers
 from materialist.transport.cache import MISS, TransportCache
-from materialist.transport.light import LightMatrix, bilinear, rays
+from materialist.transport.light import LightMatrix, add_footprints, bilinear, rays
 from materialist.types import Array, Camera, Materials, Mesh
 
 LAYERS = 4
@@ -95,7 +95,7 @@ class WallMatrix:
             self._add(self._fixed, each.picked(~through), ())
             self._open.append(each.picked(through))
             if each.lobes == (0,):
-                _scatter(faced, each.index, each.share, each.weights[0], np.zeros_like(each.row))
+                add_footprints(faced, each.index, each.share, each.weights[0], np.zeros_like(each.row))
         self._faced = faced
 
     def ended(self, ends: Sequence[Ends]) -> tuple[LightMatrix, torch.Tensor]:
@@ -120,11 +120,11 @@ class WallMatrix:
         light = self._light[torch.from_numpy(slot[~missed].astype(np.int64))]
         row = torch.from_numpy(each.row[~missed])
         for lobe, weight in zip(each.lobes, each.weights, strict=True):
-            _scatter(lobes[lobe], each.index[missed], each.share[missed], weight[missed], each.row[missed])
+            add_footprints(lobes[lobe], each.index[missed], each.share[missed], weight[missed], each.row[missed])
             indirect[lobe].index_add_(0, row, light * torch.from_numpy(weight[~missed])[:, None])
         if each.lobes == (0,):
             zero = np.zeros_like(each.row[missed])
-            _scatter(free, each.index[missed], each.share[missed], each.weights[0][missed], zero)
+            add_footprints(free, each.index[missed], each.share[missed], each.weights[0][missed], zero)
 
 
 def _followed(
@@ -174,10 +174,3 @@ def _beyond(mesh: Mesh, camera: Camera, planes: list[int]) -> Array:
     for number, k in enumerate(planes):
         wall[(mesh.face_plane == k) & outside] = number
     return wall
-
-
-def _scatter(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
-    """Add the bilinear footprints of rays to out [rows, texels], or [texels]."""
-    flat = row[:, None] * out.shape[-1] + index
-    values = (share * weight[:, None]).astype(np.float32)
-    out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
