@@ -88,6 +88,29 @@ def test_the_hole_of_a_ring_stays_open(ground):
     assert volume(shell) == pytest.approx(2 * np.pi**2 * 0.4 * 0.15**2, rel=0.1)
 
 
+def test_a_hole_that_is_not_seen_to_its_ground_goes_on_turning(ground):
+    """A doughnut from low: of its hole the upper quarter is seen."""
+    solid = standing(arc((0.32, 0.2), 0.2, -180, 180, 120))
+    found, front, inside, rays = profile_from(solid, ground)
+    assert found is not None and found.seen[found.seen[:, 0] < 0.3, 1].min() > 0.2
+    places = np.array([[0.03, 0.05], [0.05, 0.2], [0.16, 0.2], [0.2, 0.1]])
+    assert (found.at(places) > 0).tolist() == [True, True, False, False]
+    assert volume(swept(found, AXIS, CAMERA)) == pytest.approx(2 * np.pi**2 * 0.32 * 0.2**2, rel=0.02)
+    thick = thickness_of(found, AXIS, front.depth.astype(float), inside, rays)
+    assert np.abs(thick - front.thickness)[inside].sum() < 0.03 * front.thickness[inside].sum()
+
+
+def test_a_cup_has_a_bottom(ground):
+    """Its rim turns inwards as a ring's does, and does not come down to the foot of the outside."""
+    wall = np.array([(0, 0), (0.3, 0), (0.3, 0.55)])
+    rim, inner = arc((0.26, 0.55), 0.04, 0, 180, 30), np.array([(0.22, 0.55), (0.22, 0.05), (0, 0.05)])
+    step = np.linspace(0.001, 0.999, 60)[:, None]
+    lines = [a + step * (b - a) for part in (wall, inner) for a, b in itertools.pairwise(part)]
+    found, *_ = profile_from(standing(np.concatenate([*lines[:2], rim, *lines[2:]])), ground)
+    assert found is not None
+    assert found.at(np.array([[0.26, 0.3], [0.15, 0.01]])).max() < 0  # wall and bottom are full
+
+
 def test_edges_keep_their_normals(ground):
     """A cylinder: its side looks aside, its top up, and there is little between."""
     step = np.linspace(0.001, 0.999, 60)[:, None]

@@ -6,6 +6,7 @@ implicit surface of Turk and O'Brien 2002, on a grid): what no point tells goes 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +27,12 @@ BELOW = 3.0
 """Cells below the surface at which no ray passes."""
 GAP = 7
 """Cells along a line without a point that are no gap in what is seen."""
-STRETCH = 0.2
-"""Part of the object's height over which its outside is looked at, to go on below."""
+STRETCH, STRETCH_INSIDE = 0.2, 0.5
+"""Parts of the object's height over which its outside is looked at, to go on below, and the inside of a ring."""
+MEETING, LEVEL = 0.2, 0.8
+"""What a ring's inside must end at: the foot of its outside (part of the height), nearly level (radians)."""
+CLEAR = 3.0
+"""Cells around points that are seen in which no ray pushes: there the points tell the border."""
 BESIDE = 2.5
 """Cells within which a line must have a point that is seen, to be of the object."""
 
@@ -109,10 +114,13 @@ def fitted(seen: Array, leaning: Array, passed: Array, cell: float, floor: float
         cell, floor: as of `Profile`.
     """
     first = _fitted(seen, leaning, len(seen), passed, cell, floor)
-    hidden, turning = _rounded(first, leaning)
+    below = _rounded(first, leaning)
+    foot = float(np.concatenate([seen, below[:, :2]])[:, 1].min())
+    hidden = np.concatenate([below, _ring(first, leaning, foot)])
     if not len(hidden):
         return first
-    both = np.concatenate([seen, hidden]), np.concatenate([leaning, turning])
+    turning = np.stack([np.cos(hidden[:, 2]), np.sin(hidden[:, 2])], -1)
+    both = np.concatenate([seen, hidden[:, :2]]), np.concatenate([leaning, turning])
     return _fitted(*both, len(seen), passed, cell, floor)
 
 
@@ -128,6 +136,7 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     )
     at = lambda places: (places - [0, low]) / cell  # noqa: E731  (column, row)
     free = _cells(at(passed), shape)
+    told = free & _far(at(seen), shape)
     rows, wanted = _points(at(points), leaning, shape)
     matrix = rows.T @ rows + BEND * _bending(shape)
     right = rows.T @ wanted
@@ -135,7 +144,7 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     for _ in range(ROUNDS):
         values = splu((matrix + _diagonal(PUSH * pushed)).tocsc()).solve(right + PUSH * PUSHED * pushed.ravel())
         values = values.reshape(shape)
-        before, pushed = pushed, pushed | (free & (values < PUSHED / 2))
+        before, pushed = pushed, pushed | (told & (values < PUSHED / 2))
         if (before == pushed).all():
             break
     off = float(np.sqrt(np.mean(_read(values, at(seen)) ** 2)))
@@ -143,38 +152,77 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
 
 
-def _rounded(profile: Profile, leaning: Array) -> tuple[Array, Array]:
-    """Places [K, 2] and normals [K, 2] where the outside goes on below what is seen of it, turning as it did.
+def _rounded(profile: Profile, leaning: Array) -> Array:
+    """Where the outside goes on below what is seen of it: places and the angles of normals [K, 3].
 
     From the lowest that is seen, with the curvature of the stretch above, until the ground, or level.
     """
-    from scipy.ndimage import maximum_filter1d
+    for line, away, nearest in _borders(profile):
+        known = _known(away, profile)
+        starts = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))
+        if not len(starts) or line[starts[0], 0] < GAP * profile.cell:
+            continue
+        k = starts[0] + int(np.argmax(away[starts[0] :] < profile.cell))  # there is a point right here
+        found = _onward(profile, line[k:], leaning[nearest[k:]], STRETCH, -1)
+        if len(found) > 1:
+            return found[1:]
+    return np.zeros((0, 3))
+
+
+def _ring(profile: Profile, leaning: Array, foot: float) -> Array:
+    """Where the inside of a ring goes on below what is seen of it: places and the angles of normals [K, 3].
+
+    A ring's goes on turning until it meets the foot of the outside, at that height and level; a cup's does not.
+    """
+    for line, away, nearest in _borders(profile):
+        known = _known(away, profile)
+        ends = np.flatnonzero(known & ~np.roll(known, -1) & (line[:, 1] > foot + MEETING * np.ptp(profile.seen[:, 1])))
+        if not len(ends) or line[ends[-1], 0] < GAP * profile.cell:
+            continue
+        k = ends[-1] - int(np.argmax(away[ends[-1] :: -1] < profile.cell))
+        found = _onward(profile, line[k::-1], leaning[nearest[k::-1]], STRETCH_INSIDE, 1)
+        met = len(found) > 1 and abs(found[-1, 1] - foot) < MEETING * np.ptp(profile.seen[:, 1])
+        if met and found[-1, 2] > 1.5 * np.pi - LEVEL:
+            return found[1:]
+    return np.zeros((0, 3))
+
+
+def _borders(profile: Profile) -> Iterator[tuple[Array, Array, Array]]:
+    """The border's lines [K, 2], how far their places are from the nearest point that is seen, and which that is."""
     from scipy.spatial import cKDTree
 
-    tree, cell = cKDTree(profile.seen), profile.cell
+    tree = cKDTree(profile.seen)
     for line, _ in profile.lines():
-        away, nearest = tree.query(line)
-        known = maximum_filter1d(away < BESIDE * cell, GAP, mode="nearest")
-        starts = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))
-        if not len(starts) or line[starts[0], 0] < GAP * cell:
-            continue
-        k = starts[0] + int(np.argmax(away[starts[0] :] < cell))  # there is a point right here
-        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line[k:], axis=0), axis=1))])
-        part = along < STRETCH * np.ptp(profile.seen[:, 1])
-        lean = leaning[nearest[k:][part]]
-        angle = np.unwrap(np.arctan2(lean[:, 1], lean[:, 0]))
-        if part.sum() < GAP or angle[0] < -np.pi / 2:
-            continue
-        rate, first = np.polyfit(along[part], angle, 1)
-        places, angles, at = [], [], line[k].copy()
-        while rate > 0 and at[0] > 0 and at[1] > profile.floor and -np.pi / 2 < first < np.pi / 2:
-            places.append(at.copy())
-            angles.append(first)
-            first -= rate * cell
-            at = at + cell * np.array([np.sin(first), -np.cos(first)])  # down: the normal is (cos, sin)
-        if len(places) > 1:
-            return np.array(places[1:]), np.stack([np.cos(angles[1:]), np.sin(angles[1:])], -1)
-    return np.zeros((0, 2)), np.zeros((0, 2))
+        yield line, *tree.query(line)
+
+
+def _known(away: Array, profile: Profile) -> Array:
+    """[K] bool: places of a line with points beside them, small gaps too."""
+    from scipy.ndimage import maximum_filter1d
+
+    return maximum_filter1d(away < BESIDE * profile.cell, GAP, mode="nearest")
+
+
+def _onward(profile: Profile, line: Array, leaning: Array, stretch: float, way: int) -> Array:
+    """What lies before a line [K, 2] with normals [K, 2], a cell apart: places and the angles of normals [M, 3].
+
+    It turns as the line's beginning does. way: 1 for a line that is to be followed with the body to the left, -1 for
+    one with the body to the right; normals point right for -1, left for 1.
+    """
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    part = along < stretch * np.ptp(profile.seen[:, 1])
+    angle = np.unwrap(np.arctan2(leaning[part, 1], leaning[part, 0]))
+    middle = 0.0 if way < 0 else np.pi
+    angle += 2 * np.pi * np.round((middle - angle[0]) / (2 * np.pi))
+    if part.sum() < GAP or abs(angle[0] - middle) > np.pi / 2:
+        return np.zeros((0, 3))
+    rate, first = np.polyfit(along[part], angle, 1)
+    rate, at, found = -way * rate, line[0].copy(), []
+    while rate > 0 and at[0] > 0 and at[1] > profile.floor and abs(first - middle) < np.pi / 2:
+        found.append([*at, first])
+        first += way * rate * profile.cell
+        at = at + way * profile.cell * np.array([-np.sin(first), np.cos(first)])
+    return np.array(found).reshape(-1, 3)
 
 
 def _read(values: Array, at: Array) -> Array:
@@ -190,6 +238,13 @@ def _cells(at: Array, shape: tuple[int, int]) -> Array:
     found = np.zeros(shape, bool)
     found[row[there], column[there]] = True
     return found
+
+
+def _far(at: Array, shape: tuple[int, int]) -> Array:
+    """[h, w] bool: cells farther than CLEAR from the places [M, 2] (column, row)."""
+    from scipy.ndimage import distance_transform_edt
+
+    return distance_transform_edt(~_cells(at, shape)) > CLEAR
 
 
 def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:

@@ -67,6 +67,19 @@ def test_a_rough_guess_becomes_the_back_of_the_ball(network, no_lathe):
     assert (found.thickness.hollow <= found.thickness.solid).all() and found.thickness.hollow.max() > 0
 
 
+def test_the_outline_is_asked_where_the_maps_are_not_exact(network, monkeypatch):
+    depth, normal, mask, true = ball()
+    network(true.astype(np.float32))
+    asked = []
+    monkeypatch.setattr(choice, "lathed", lambda *_, **__: None)
+    monkeypatch.setattr(choice, "outlined", lambda *_, **__: asked.append(True))
+    chosen(depth, normal, mask, up=LEVEL)
+    assert not asked
+    noise = np.random.default_rng(0).normal(0, 0.01, depth.shape)
+    chosen(depth * (1 + noise), normal, mask, up=LEVEL)
+    assert asked
+
+
 def test_where_they_disagree_and_the_turn_does_not_fit_the_network_is_believed(network):
     depth, normal, mask, true = ball()
     rows, columns = np.mgrid[:64, :64]

@@ -8,7 +8,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.symmetry import symmetric_thickness
 from materialist.predict.refraction import WEIGHTS, thickness, weights
-from materialist.predict.refraction.crop import BACK_X, CHANNELS, MASK, MIRROR, SIDE, Window, features
+from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
 from materialist.predict.refraction.network import LEAST, Architecture, RefractionNet
 from materialist.types import Camera
 
@@ -81,6 +81,21 @@ def test_features_do_not_depend_on_place_or_scale():
     for channel in range(3, CHANNELS):
         np.testing.assert_allclose(a[channel][inner].mean(), b[channel][inner].mean(), atol=0.09)
     assert np.abs(a[3] + a[3][:, ::-1])[both & both[:, ::-1]].mean() < 0.03  # straight ahead: x is odd
+
+
+def test_windows_frame_small_objects_as_they_frame_large_ones():
+    """A disc of any size takes the same part of the window, to a pixel of the picture, and stands in its middle."""
+    for radius in (6.3, 14.2, 31.7, 80.4):
+        y, x = np.mgrid[:200, :240] - np.array([97.3, 121.8])[:, None, None]
+        inside = np.hypot(x, y) < radius
+        maps = np.ones((*inside.shape, 3), np.float32)
+        window = Window.around(inside)
+        view = window.cut(maps, inside, maps, maps[..., 0], pixel_rays(Camera(240, 200, 40)))
+        wide, tall = view.inside.any(0).sum(), view.inside.any(1).sum()
+        assert max(wide, tall) == pytest.approx(SIDE / (1 + 2 * MARGIN), abs=1.01)
+        rows, columns = np.nonzero(view.inside)
+        pixel = SIDE / window.side  # of the picture, in those of the window
+        assert max(abs(rows.mean() - (SIDE - 1) / 2), abs(columns.mean() - (SIDE - 1) / 2)) < 0.5 + 0.5 * pixel
 
 
 def test_windows_reach_over_the_border_and_come_back():

@@ -1,6 +1,7 @@
 """Which estimate of an object's thickness to believe: its front swept or turned around, RefractionNet's, the mirror's.
 
-What was turned on a lathe is known by its normals, or by its outline, and its back with it.
+What was turned on a lathe is known by its normals, or by its outline, and its back with it. The outline knows nothing
+of dents, and is asked where the maps are not exact enough to show them.
 
 The turned front has the object's own edges, and is taken where it fits the front and the mask very well (boxes,
 pyramids, bottles), or where the network says the same. Elsewhere RefractionNet's backs lean less wrongly.
@@ -14,7 +15,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
-from materialist.geometry.front import smooth_front
+from materialist.geometry.front import of_one_surface, smooth_front
 from materialist.geometry.half_turn import half_turn
 from materialist.geometry.lathe import lathed
 from materialist.geometry.outline import outlined
@@ -65,7 +66,10 @@ def best_thickness(
     except WeightsError:
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
-    for name, known in (("lathe", lathed), ("outline", outlined)) if prefer == "auto" else ():
+    ways = [("lathe", lathed), ("outline", outlined)]
+    if of_one_surface(depth, normal, inside, pixel_rays(camera)):
+        ways.pop()
+    for name, known in ways if prefer == "auto" else ():
         if (found := known(front, normal, inside, camera, up=up, behind=behind)) is not None:
             return Choice(replace(_as_thick(guess, found.thickness), lathe=found), name)
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)

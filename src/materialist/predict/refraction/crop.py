@@ -41,26 +41,25 @@ class View:
 
 @dataclass(frozen=True)
 class Window:
-    """A square of a picture, in pixels; it may reach over the border."""
+    """A square of a picture, in pixels from its upper left corner; it may reach over the border."""
 
-    left: int
-    top: int
-    side: int
+    left: float
+    top: float
+    side: float
 
     @classmethod
     def around(cls, inside: Array) -> Window:
-        """The window around a mask [H, W] bool."""
+        """The window around a mask [H, W] bool, which it frames to the fraction of a pixel as the training views do."""
         rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
-        tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
-        side = int(np.ceil(max(tall, wide) * (1 + 2 * MARGIN))) + 2
-        left, top = (columns[0] + columns[-1] + 1 - side) // 2, (rows[0] + rows[-1] + 1 - side) // 2
-        return cls(int(left), int(top), side)
+        (top, bottom), (left, right) = ((float(k[0]), float(k[-1]) + 1) for k in (rows, columns))
+        side = max(bottom - top, right - left) * (1 + 2 * MARGIN)
+        return cls((left + right - side) / 2, (top + bottom - side) / 2, side)
 
     def cut(self, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array) -> View:
         """The window of maps [H, W, ...] at SIDE x SIDE pixels; means over the object alone."""
-        weight = self._cut(inside.astype(np.float32))
-        share = _resized(weight, SIDE)
-        mean = lambda x: _resized(self._cut(x * _like(inside, x)), SIDE) / _like(np.maximum(share, 1e-6), x)  # noqa: E731
+        weight = inside.astype(np.float32)
+        share = self._cut(weight)
+        mean = lambda x: self._cut(x * _like(weight, x)) / _like(np.maximum(share, 1e-6), x)  # noqa: E731
         seen = share > 0.5
         if not seen.any():
             seen = share >= share.max()
@@ -70,25 +69,30 @@ class Window:
 
     def put_back(self, values: Array, seen: Array, inside: Array) -> Array:
         """[H, W] float32: values [S, S] known where `seen`, brought back to the mask `inside` [H, W], 0 outside."""
-        known = _resized(seen.astype(np.float32), self.side)
-        spread = _resized(np.where(seen, values, 0).astype(np.float32), self.side) / np.maximum(known, 1e-6)
+        known = self._spread(seen.astype(np.float32), inside.shape)
+        spread = self._spread(np.where(seen, values, 0).astype(np.float32), inside.shape) / np.maximum(known, 1e-6)
         filled = np.where(known > 1e-3, spread, float(np.median(values[seen])))
-        whole = np.zeros(inside.shape, np.float32)
-        height, width = inside.shape
-        top, left = max(self.top, 0), max(self.left, 0)
-        part = filled[top - self.top : height - self.top, left - self.left : width - self.left]
-        whole[top : top + part.shape[0], left : left + part.shape[1]] = part
-        return np.where(inside, whole, 0).astype(np.float32)
+        return np.where(inside, filled, 0).astype(np.float32)
 
     def _cut(self, values: Array) -> Array:
-        """[side, side, ...] of values [H, W, ...], 0 beyond the border."""
-        result = np.zeros((self.side, self.side, *values.shape[2:]), np.float32)
-        top, left = max(self.top, 0), max(self.left, 0)
-        part = values[top : self.top + self.side, left : self.left + self.side]
-        result[top - self.top : top - self.top + part.shape[0], left - self.left : left - self.left + part.shape[1]] = (
-            part
-        )
-        return result
+        """[SIDE, SIDE, ...] of values [H, W, ...], 0 beyond the border: means down, bilinear up."""
+        import cv2
+
+        fine = SIDE * max(1, int(np.ceil(self.side / SIDE)))  # a whole number of places in every pixel
+        places = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
+        large = cv2.warpAffine(np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=places)
+        return cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+
+    def _spread(self, values: Array, shape: tuple[int, ...]) -> Array:
+        """[H, W] of values [S, S]; 0 beyond the window."""
+        import cv2
+
+        return cv2.warpAffine(values, self._map(SIDE), (shape[1], shape[0]), flags=cv2.INTER_LINEAR)
+
+    def _map(self, side: int) -> Array:
+        """[2, 3] from pixels of the window at side x side to those of the picture, their centres being whole."""
+        step = self.side / side
+        return np.array([[step, 0, self.left + step / 2 - 0.5], [0, step, self.top + step / 2 - 0.5]])
 
     def _rays(self, rays: Array) -> Array:
         """[SIDE, SIDE, 3] rays of the window, which go on evenly beyond the border."""
@@ -139,14 +143,6 @@ def to_window(rays: Array) -> Array:
     right = np.cross(forward, [0.0, 1, 0])
     right /= max(np.linalg.norm(right), 1e-9)
     return np.stack([right, np.cross(right, forward), -forward])
-
-
-def _resized(values: Array, side: int) -> Array:
-    """Values [s, s, ...] at side x side pixels: means down, bilinear up."""
-    import cv2
-
-    way = cv2.INTER_AREA if side < len(values) else cv2.INTER_LINEAR
-    return cv2.resize(np.ascontiguousarray(values, np.float32), (side, side), interpolation=way)
 
 
 def _like(weight: Array, values: Array) -> Array:

@@ -148,6 +148,35 @@ def _box(rng: np.random.Generator) -> tuple[Solid, bool]:
     return solids.slab(extent, float(rng.choice([0.0, 0.04, 0.15])) * extent.min()), False
 
 
+def _frustum(rng: np.random.Generator) -> tuple[Solid, bool]:
+    """Pyramids, cones, prisms and what is left of them when the top is cut off, upright or on their heads."""
+    corners = int(rng.choice([3, 4, 4, 5, 6, 48]))
+    angle = 2 * np.pi * (np.arange(corners) + 0.5) / corners
+    around = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], -1) * [
+        rng.uniform(0.25, 0.7),
+        0,
+        rng.uniform(0.25, 0.7),
+    ]
+    top = rng.choice([1e-3, rng.uniform(0.1, 1)])
+    low, high = around, top * around + [*rng.normal(0, 0.05, 1), 1, *rng.normal(0, 0.05, 1)]
+    if rng.random() < 0.2:
+        upwards = np.array([0.0, 1, 0])
+        low, high = high - upwards, around + upwards
+    sides = [np.stack([low[k - 1], low[k], high[k], high[k - 1]]) for k in range(corners)]
+    return solids.joined([_flat(side[::-1]) for side in sides] + [_flat(low), _flat(high[::-1])]), False
+
+
+def _flat(corners: Array) -> Solid:
+    """A convex polygon [N, 3] with corners of its own, to be seen from where they run anticlockwise."""
+    across = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    if len(corners) == 4:  # one side may be as good as none
+        across = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    normal = np.broadcast_to(across / max(float(np.linalg.norm(across)), 1e-12), corners.shape)
+    k = np.arange(1, len(corners) - 1)
+    faces = np.stack([0 * k, k, k + 1], -1).astype(np.int32)
+    return Solid(corners, faces, normal.copy(), np.zeros((len(corners), 2)))
+
+
 def _blob(rng: np.random.Generator) -> tuple[Solid, bool]:
     return solids.blob(rng, rng.uniform(0.5, 1, 3), rng.uniform(0.08, 0.45), 56), False
 
@@ -212,7 +241,7 @@ _KINDS: dict[str, Callable[[np.random.Generator], tuple[Solid, bool]]] = {
     "body": _body, "vase": _vase, "superquadric": _superquadric, "figure": _figure, "cup": _cup, "blob": _blob,
     "bottle": _bottle, "twisted": twisted, "box": _box, "mug": _mug, "goblet": _goblet, "figure 2": _figure,
     "body 2": _body, "ring": _ring, "stick": _stick, "blob 2": _blob, "creature": _creature, "creature 2": _creature,
-    "creature 3": _creature, "creature 4": _creature,
+    "creature 3": _creature, "frustum": _frustum,
 }  # fmt: skip
 _ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2", "creature 2")
 

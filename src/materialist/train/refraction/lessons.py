@@ -19,7 +19,7 @@ from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
 DESCRIPTION = "lessons.json"
-FORMAT = 2
+FORMAT = 3
 
 
 @dataclass(frozen=True)

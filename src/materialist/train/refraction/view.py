@@ -10,13 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.predict.refraction.crop import MARGIN, SIDE, View, features, to_window
+from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
 from materialist.train.refraction.glassware import Shape
 from materialist.train.refraction.paths import Paths, Tracer, towards
 from materialist.types import Array
 
 LEAST_PIXELS = 0.02
 """Part of the window that an object must cover; thinner views are drawn anew."""
+SIDES = (24, 160)
+"""Pixels on a side of the picture from which the window is cut."""
+OFF = (0.03, 0.015)
+"""Standard deviations of how much larger and how far aside the window is than it should be, as parts of its side."""
 
 
 @dataclass(frozen=True)
@@ -44,25 +48,45 @@ class Pose:
 
 
 def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: bool = False) -> Lesson:
-    """A random view of the shape. `exact` leaves its maps without noise and the shape as it is."""
+    """A random view of the shape, cut from a picture of any size as `Window` does at prediction.
+
+    `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise.
+    """
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
-        rays = window_rays(shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre)
-        paths, normal, back = look(tracer, pose, rays)
-        inside = np.isfinite(paths.first).reshape(SIDE, SIDE)
-        if inside.mean() >= LEAST_PIXELS:
+        vertices = shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre
+        view = _seen(rng, tracer, pose, window_rays(vertices)) if exact else _cut(rng, tracer, pose, vertices)
+        if view.inside.mean() >= LEAST_PIXELS:
             break
-    length = np.linalg.norm(rays, axis=-1)
-    picture = lambda x: np.where(inside, x.reshape(SIDE, SIDE), 0).astype(np.float32)  # noqa: E731
-    depth = picture(paths.first)
-    point = (rays * depth[..., None] - pose.centre) @ pose.to_camera
-    view = View(_photo(rng, normal, rays, point) * inside[..., None], inside, normal, depth, rays)
-    target = np.stack([picture(paths.solid), picture(paths.material)]) * length / view.size
-    back = np.moveaxis(np.where(inside[..., None], back @ to_window(rays).T, 0), -1, 0)
+    paths, _, back = look(tracer, pose, view.rays)
+    there = np.isfinite(paths.first).reshape(SIDE, SIDE)
+    picture = lambda x: np.where(there, x.reshape(SIDE, SIDE), 0).astype(np.float32)  # noqa: E731
+    target = np.stack([picture(paths.solid), picture(paths.material)]) * np.linalg.norm(view.rays, axis=-1) / view.size
+    back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
-    if not exact:
-        view = _imperfect(rng, view)
     return Lesson(features(view).astype(np.float16), target, shape.hollow)
+
+
+def _cut(rng: np.random.Generator, tracer: Tracer, pose: Pose, vertices: Array) -> View:
+    """A window of a larger or smaller picture, with maps as imperfect as predicted ones."""
+    side = round(float(np.exp(rng.uniform(*np.log(SIDES)))))
+    seen = _imperfect(rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15))))
+    if not seen.inside.any():
+        return seen
+    window = Window.around(seen.inside)
+    larger = window.side * float(np.exp(rng.normal(0, OFF[0])))
+    aside = window.side * rng.normal(0, OFF[1], 2) - (larger - window.side) / 2
+    window = Window(window.left + float(aside[0]), window.top + float(aside[1]), larger)
+    return window.cut(seen.photo, seen.inside, seen.normal, seen.depth, seen.rays)
+
+
+def _seen(rng: np.random.Generator, tracer: Tracer, pose: Pose, rays: Array) -> View:
+    """What rays [S, S, 3] see of the shape."""
+    paths, normal, _ = look(tracer, pose, rays)
+    inside = np.isfinite(paths.first).reshape(rays.shape[:2])
+    depth = np.where(inside, paths.first.reshape(inside.shape), 0).astype(np.float32)
+    point = (rays * depth[..., None] - pose.centre) @ pose.to_camera
+    return View(_photo(rng, normal, rays, point) * inside[..., None], inside, normal, depth, rays)
 
 
 def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> Pose:
@@ -79,14 +103,14 @@ def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -
     return Pose(stretch, to_camera, np.array([*aside, -distance]))
 
 
-def window_rays(vertices: Array) -> Array:
-    """[SIDE, SIDE, 3] float32 rays through a square window around the shape [V, 3] in the camera frame."""
+def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Array:
+    """[S, S, 3] float32 rays through a square window around the shape [V, 3] in the camera frame, S = `side`."""
     place = vertices[:, :2] / -vertices[:, 2:]
     low, high = place.min(0), place.max(0)
-    half = (high - low).max() / 2 * (1 + 2 * MARGIN) + 1e-6
-    x = (np.arange(SIDE) + 0.5) / SIDE * 2 - 1
+    half = (high - low).max() / 2 * (1 + 2 * margin) + 1e-6
+    x = (np.arange(side) + 0.5) / side * 2 - 1
     centre = (low + high) / 2
-    rays = np.empty((SIDE, SIDE, 3), np.float32)
+    rays = np.empty((side, side, 3), np.float32)
     rays[..., 0], rays[..., 1], rays[..., 2] = centre[0] + half * x[None, :], centre[1] - half * x[:, None], -1
     return rays
 
@@ -141,26 +165,29 @@ def _imperfect(rng: np.random.Generator, view: View) -> View:
     import cv2
 
     normal, depth, inside = view.normal, view.depth.copy(), view.inside
-    size, middle = view.size, float(np.median(view.depth[inside]))
+    if not inside.any():
+        return view
+    size, middle, side = view.size, float(np.median(view.depth[inside])), len(inside)
     if rng.random() < 0.6:
         depth = middle + (depth - middle) * rng.uniform(0.85, 1.15)
-        depth = depth + size * rng.uniform(0, 0.05) * _smooth_noise(rng, 1)[..., 0]
+        depth = depth + size * rng.uniform(0, 0.05) * _smooth_noise(rng, 1, side)[..., 0]
     if rng.random() < 0.6:
-        normal = normal + rng.uniform(0, 0.3) * _smooth_noise(rng, 3)
+        normal = normal + rng.uniform(0, 0.3) * _smooth_noise(rng, 3, side)
     if rng.random() < 0.4:
-        blurred = cv2.GaussianBlur(normal * inside[..., None], (0, 0), rng.uniform(0.5, 2.0))
+        sigma = rng.uniform(0.5, 2.0) * max(side / SIDE, 0.5)
+        blurred = cv2.GaussianBlur(normal * inside[..., None], (0, 0), sigma)
         normal = np.where(inside[..., None], blurred, normal)
     if rng.random() < 0.35:
-        kernel = np.ones((3, 3), np.uint8)
+        kernel = np.ones((2 * int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1)) + 1,) * 2, np.uint8)
         smaller = cv2.erode(inside.astype(np.uint8), kernel, borderValue=0) > 0
         inside = smaller if smaller.sum() > 0.5 * inside.sum() else inside
     normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     return View(view.photo, inside, normal.astype(np.float32), depth.astype(np.float32), view.rays)
 
 
-def _smooth_noise(rng: np.random.Generator, channels: int) -> Array:
-    """[SIDE, SIDE, channels] float32 with waves about a third of the window long, of amplitude about 1."""
+def _smooth_noise(rng: np.random.Generator, channels: int, side: int) -> Array:
+    """[S, S, channels] float32 with waves about a third of the window long, of amplitude about 1."""
     import cv2
 
     coarse = rng.normal(size=(5, 5, channels)).astype(np.float32)
-    return cv2.resize(coarse, (SIDE, SIDE), interpolation=cv2.INTER_CUBIC).reshape(SIDE, SIDE, channels)
+    return cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC).reshape(side, side, channels)
