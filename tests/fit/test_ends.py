@@ -59,11 +59,10 @@ def test_the_height_of_a_wall_is_read_off_its_shadow(maps, up, direction):
     assert (end.up - wall.seen.up) / wall.size == pytest.approx(up, abs=0.01)
 
 
-def test_without_a_sign_in_the_light_no_ends_explain_much_more(maps):
-    """The sun is behind the camera. The shadows above gain 0.004; here a side may move, but for next to nothing."""
+def test_without_a_sign_in_the_light_no_side_moves(maps):
+    """The sun is behind the camera. The shadows above gain 0.004; a side that gains a tenth of that stays."""
     search, wall = searched(maps, {"left": 0.5, "right": 0.5, "up": 0.5}, (0.2, 0.5, 0.9))
-    found = search.found()
-    assert found is None or found.usual - found.error < 0.001
+    assert search.found() is None
     usual = search.error((wall.usual,))
     even = [search.error((_at(wall, dict.fromkeys(SIDES, level)),)) for level in (0.25, 0.5, 1.0)]
     assert max(even) < 1.25 * usual

@@ -30,8 +30,9 @@ STARTS = (0.0, 0.5, 1.0)
 DESCENTS = 2
 """Of all beginnings, the search goes on from this many."""
 SWEEPS = 2
-GAIN = 0.04
-"""Relative gain for which a side is moved: a little is had from any wall, by light that then comes from elsewhere."""
+GAIN, LEAST = 0.04, 5e-4
+"""Relative and absolute gain for which a side is moved: a little is had from any wall, by light that then comes from
+elsewhere, and what is explained to the noise of its few rays already tells nothing."""
 SIDES = ("left", "right", "up")
 PIXELS = 1024
 """Surface pixels of the photo whose light is looked at."""
@@ -121,7 +122,7 @@ class Search:
         self.tried.clear()  # the first light began from nothing; from now on all begin alike
         best = self.best(usual)
         error, before = self.error(best), self.error(usual)
-        return Found(best, error, before) if error < (1 - GAIN) * before else None
+        return Found(best, error, before) if _clearly(error, before) else None
 
     def best(self, usual: tuple[Ends, ...]) -> tuple[Ends, ...]:
         """The ends of least error that a descent from the usual ones, or from even ones, comes to."""
@@ -138,7 +139,7 @@ class Search:
                 ends = self._better(ends, k, [_nowhere(wall)])
                 for side in SIDES:
                     ends = self._better(ends, k, [_moved(ends[k], wall, side, level) for level in LEVELS])
-            if self.error(ends) > (1 - GAIN) * before:
+            if not _clearly(self.error(ends), before):
                 break
         return ends
 
@@ -147,7 +148,12 @@ class Search:
         every = [(*ends[:k], other, *ends[k + 1 :]) for other in others]
         least = min(map(self.error, every))
         best = next(other for other in every if self.error(other) <= (1 + GAIN / 2) * least)  # the shortest as good
-        return best if self.error(best) < (1 - GAIN) * self.error(ends) else ends
+        return best if _clearly(self.error(best), self.error(ends)) else ends
+
+
+def _clearly(error: float, before: float) -> bool:
+    """Whether an error is less than another by more than chance."""
+    return error < before - max(GAIN * before, LEAST)
 
 
 def _nowhere(wall: Wall) -> Ends:
