@@ -122,20 +122,15 @@ def invert(
 
 
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
-    """Path-trace a scene from the photo's camera: [H, W, 3] float32 linear. Denoising is for pictures only."""
-    from materialist.render.scene import RenderScene
+    """Path-trace a scene, with its bodies and lamps, from the photo's camera: [H, W, 3] float32 linear.
+
+    `spp` counts camera rays a pixel. Denoising is for pictures only.
+    """
+    from materialist.edit.lights import rendered
 
     if spp < 1:
         raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")
-    renderer = RenderScene(scene.geometry, scene.camera, device=device)
-    renderer.set_materials(scene.materials)
-    renderer.set_envmap(scene.envmap)
-    image = renderer.render(spp=spp, seed=seed)
-    if denoise:
-        from materialist.render.denoise import denoise as clean
-
-        image = clean(image, albedo=scene.materials.albedo, normal=scene.normal)
-    return image
+    return rendered(scene, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
 def _report(

@@ -173,3 +173,12 @@ def test_bad_input_is_exit_2_and_nothing_is_written(run, folder, arguments, word
 def test_help(run, command):
     code, out, _ = run(command, "--help")
     assert code == 0 and "--json" in out
+
+
+@pytest.mark.parametrize("seed", ["-1", "99999999999999999999"])
+def test_seeds_that_no_generator_takes(run, folder, seed):
+    before = sorted(folder.rglob("*"))
+    code, _, err = run(
+        "edit", folder / "a.scene", "--click", "20,20", "--hue", 20, "--seed", seed, "-o", folder / "a.png"
+    )
+    assert code == 2 and "'--seed'" in err and sorted(folder.rglob("*")) == before

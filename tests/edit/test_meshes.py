@@ -1,5 +1,8 @@
 """Mesh files as bodies: what is read, what is refused, and that nothing outside of the folder is opened."""
 
+import struct
+import zlib
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,6 +12,7 @@ from PIL import Image
 from materialist.edit.mesh_shape import creased_normals, edge_faults
 from materialist.edit.meshes import read_model, repainted
 from materialist.errors import InputError
+from materialist.io.image import read_map
 
 RED, GREEN, BLUE, WHITE = np.eye(3)[0], np.eye(3)[1], np.eye(3)[2], np.ones(3)
 
@@ -128,6 +132,21 @@ def test_a_damaged_texture_is_told(tmp_path):
     model = read_model(path)
     assert any("cannot be read" in note for note in model.warnings)
     np.testing.assert_allclose(model.parts[0].surface.albedo, 0.5)
+
+
+def test_a_texture_that_is_far_too_large_is_told(tmp_path):
+    """Of a material file's own maps, which PIL refuses by its header alone."""
+    path = textured_obj(tmp_path)
+    header = struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
+    parts = ((b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b""))
+    chunks = [struct.pack(">I", len(x)) + n + x + struct.pack(">I", zlib.crc32(n + x)) for n, x in parts]
+    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))
+    material = next(tmp_path.glob("*.mtl"))
+    material.write_text(material.read_text() + "\nmap_Pr huge.png\n")
+    model = read_model(path)
+    assert any("cannot be read" in note for note in model.warnings)
+    with pytest.raises(InputError, match="too large an image"):
+        read_map(tmp_path / "huge.png")
 
 
 def write(path, content):

@@ -6,7 +6,7 @@ from edit_scenes import block_mask, flat_scene
 from PIL import Image
 
 from materialist.edit.material import edit
-from materialist.edit.recipe import apply, read_recipe
+from materialist.edit.recipe import apply, glass_arguments, read_recipe
 from materialist.edit.relight import lamp, relight
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
@@ -61,7 +61,10 @@ def test_click_box_and_sun(folder):
         ("", "no list of edits"),
         ("edits: []", "no list of edits"),
         ("- [", "not valid YAML"),
-        ("- paint: {}", "Step 1"),
+        ("- paint: {}", "says 'paint'; give one of edit,"),
+        ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, not 'maybe'"),
+        ("- glass: {mask: block.png, tint: '#88ccf'}", "The tint '#88ccf' must look like"),
+        ("- glass: {mask: block.png, thickness: gone.exr}", "There is no file"),
         ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
         ("- edit: {mask: block.png, shininess: 1}", "shininess"),
         ("- edit: {mask: block.png, hue: blue}", "hue"),
@@ -79,6 +82,19 @@ def test_what_is_wrong_is_named(folder, text, words):
     with pytest.raises(InputError) as error:
         replay(folder, text)
     assert words in str(error.value)
+
+
+def test_tints_are_spelled_as_on_the_command_line(folder):
+    one, other = (
+        glass_arguments(SCENE, read_step(folder, f"- glass: {{mask: block.png, hollow: yes, tint: {tint}}}"))[1]
+        for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
+    )
+    assert one["hollow"] is True and other == {"hollow": True, "tint": pytest.approx(one["tint"], abs=1e-6)}
+
+
+def read_step(folder, text):
+    (folder / "one.yaml").write_text(text)
+    return read_recipe(folder / "one.yaml")[0]
 
 
 def test_missing_list(folder):

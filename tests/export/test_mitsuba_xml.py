@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from export_scenes import load_xml, room
 
 from materialist.export.mitsuba_xml import write_mitsuba
 from materialist.export.parts import scene_parts
+from materialist.types import Lamp
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +51,19 @@ def test_the_portable_material_is_close(written):
         for options in ({}, {"bsdf": "materialist_disney"})
     ]
     assert np.mean(images[0]) == pytest.approx(np.mean(images[1]), rel=0.03)
+
+
+def test_lamps_light_it_as_they_light_ours(tmp_path):
+    from materialist.pipeline import render_scene
+    from materialist.render.variant import setup
+
+    scene = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (30.0, 20.0, 5.0), 0.05),))
+    write_mitsuba(tmp_path, scene, scene_parts(scene))
+    mi = setup("auto")
+    loaded = load_xml(mi, tmp_path / "scene.xml", spp=64, bsdf="materialist_disney")
+    theirs, ours = np.array(mi.render(loaded, seed=1)), render_scene(scene, spp=64)
+    np.testing.assert_allclose(theirs.mean((0, 1)), ours.mean((0, 1)), rtol=0.03)
+    assert ours.mean() > 1.3 * render_scene(replace(scene, lamps=()), spp=16).mean()
 
 
 def test_it_refers_only_to_files_beside_it(written):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from export_scenes import room
@@ -11,6 +12,7 @@ import materialist as mt
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.io.package import save_scene
+from materialist.types import Lamp
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +43,12 @@ def test_formats(tmp_path, name, to, message):
 def test_options_of_blender_go_with_blender(tmp_path):
     with pytest.raises(mt.InputError, match="format glb"):
         mt.export(room(), tmp_path / "a.glb", shadow_catcher=True)
+
+
+def test_lamps_that_a_format_lacks_are_told(tmp_path):
+    lit = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (3.0, 2.0, 1.0), 0.05),))
+    assert any("none of the scene's 1 lamps" in note for note in mt.export(lit, tmp_path / "a.glb").notes)
+    assert not any("none of the scene" in note for note in mt.export(lit, tmp_path / "b", to="mitsuba").notes)
 
 
 def test_a_folder_may_have_a_dot_in_its_name(tmp_path):

@@ -274,6 +274,26 @@ def test_missing_and_unknown_packages(scene, tmp_path):
         load_scene(root)
 
 
+@pytest.mark.parametrize("fov", [None, "x", -5, 200, float("nan")])
+def test_a_field_of_view_that_is_none(scene, tmp_path, fov):
+    save_scene(scene, tmp_path / "a.scene")
+    meta = json.loads((tmp_path / "a.scene/scene.json").read_text())
+    meta["camera"]["fov"] = fov
+    (tmp_path / "a.scene/scene.json").write_text(json.dumps(meta))
+    with pytest.raises(SceneError, match=r"scene\.json is incomplete or damaged"):
+        load_scene(tmp_path / "a.scene")
+
+
+def test_names_in_another_encoding(scene, tmp_path):
+    """A photo may have one; the EXR library cannot be told a folder with one."""
+    odd = replace(scene, photo=replace(scene.photo, path="caf\udce9.png"))
+    save_scene(odd, tmp_path / "a.scene")
+    assert load_scene(tmp_path / "a.scene").photo.path == "caf\udce9.png"
+    with pytest.raises(OutputError, match="not UTF-8"):
+        save_scene(scene, tmp_path / "caf\udce9.scene")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.scene"]
+
+
 def test_maps_of_another_size_are_noticed(scene, tmp_path):
     from materialist.io.exr import write_exr
 

@@ -90,11 +90,12 @@ def drop(
             progress=progress, last=last,
         )  # fmt: skip
         write_frames(output, pictures, fps=fps, force=force)
-    if save is not None and not full_render:
-        save_scene(developed(loaded, film[-1], last[0]), save, force=force)
+    if save is not None:
+        save_scene(developed(loaded, film[-1], last[0], seed=seed, device=device.value), save, force=force)
+    shown = [f"Look at {output}", *([f"The edited scene is {save}"] if save is not None else [])]
     warnings = [note for note in film[-1].report.warnings if note not in loaded.report.warnings]
     report_success(
-        "drop", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
+        "drop", as_json, [*(f"Note: {note}" for note in warnings), *shown], video=str(output),
         frames=frames, fps=fps, scene=str(save) if save else None, warnings=warnings,
         edits=film[-1].provenance.get("edits", []), seconds=time.monotonic() - start,
     )  # fmt: skip

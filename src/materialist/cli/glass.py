@@ -86,7 +86,7 @@ def glass(
     check_before(output, save, spp, force)
     if preview and (save is not None or full_render or not denoise):
         raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
-    r, g, b = (float(c) for c in parse_colour(tint))
+    r, g, b = (float(c) for c in parse_colour(tint, "tint"))
     look: dict[str, Any] = {"ior": ior, "transmission": transmission, "tint": (r, g, b), "roughness": roughness}
     check_glass(**look)
     loaded = load_scene(scene)

@@ -64,7 +64,10 @@ def output_option(metavar: str, help: str) -> Any:
 
 
 # Every command.
-Seed = Annotated[int, typer.Option(help="Random seed: the same seed on the same machine gives the same result.")]
+Seed = Annotated[
+    int,
+    typer.Option(min=0, max=2**31 - 1, help="Random seed: the same seed on the same machine gives the same result."),
+]
 DeviceOption = Annotated[Device, typer.Option(help="Where to compute; auto takes the GPU when there is one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace the output when it exists.")]

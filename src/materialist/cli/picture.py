@@ -89,7 +89,7 @@ def write_result(
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=force)
     if save is not None:
-        save_scene(developed(scene, edited, picture), save, force=force)
+        save_scene(developed(scene, edited, picture, seed=seed, device=device), save, force=force)
     warnings = [note for note in edited.report.warnings if note not in scene.report.warnings]
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]
     if save is not None:

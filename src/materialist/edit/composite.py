@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.edit.glows import KEY, explained
 from materialist.edit.layers import Layers, denoised, render_layers
-from materialist.edit.lights import Studio
+from materialist.edit.lights import Studio, rendered
 from materialist.edit.portrait import Portrait
 from materialist.edit.revealed import revealed
 from materialist.edit.upsample import GuidedUpsample, matte, strips
@@ -21,6 +21,8 @@ FLOOR = 0.02
 """Radiance added to both sides of edited / base: below it a ratio says nothing."""
 MOST = 1.0
 """Largest factor on what the photo has and the fit has not, under the same light."""
+RERENDERED = 36
+"""Camera rays a pixel of the re-rendering of an edited scene that is kept."""
 MOST_DETAIL = 2.0
 """Largest factor on the photo's detail beyond working size, under another light."""
 LIGHT_FADE = 12.0
@@ -91,8 +93,10 @@ def pictures(
 def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
     """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo."""
     picture = studio.twins(edited)[1](spp, seed)
-    guides = (studio.scene.materials.albedo, edited.materials.albedo, edited.normal)
-    return denoised(picture, picture, guides)[1] if denoise else picture
+    if not denoise:
+        return picture
+    albedo, normal = studio.guides(edited)
+    return denoised(picture, picture, (albedo, albedo, normal))[1]
 
 
 def _upscaled(picture: Array, shape: tuple[int, ...], upscale: Upscale) -> Array:
@@ -177,20 +181,29 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     return change, np.minimum(np.exp(ratio), MOST_DETAIL) - 1, photo.linear
 
 
-def developed(scene: Scene, edited: Scene, picture: Array) -> Scene:
-    """The edited scene as a scene of its own, whose photo is the composite [H0, W0, 3]: edits of it start there."""
+def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto") -> Scene:
+    """The edited scene as a scene of its own: its photo is the composite [H0, W0, 3], its re-rendering one of itself.
+
+    Edits of it start there.
+    """
     from dataclasses import replace
 
     import cv2
+
+    from materialist import metrics
 
     camera = scene.camera
     size = (camera.width, camera.height)
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
     photo = replace(scene.photo, linear=linear.astype(np.float32), original=picture, source=None)
+    again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
+    figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
+    figures["rerender_ssim_path"] = metrics.ssim(again, photo.linear)
     stage = {"name": "edit", "edits": edited.provenance.get("edits", [])}
-    report = replace(edited.report, stages=(*edited.report.stages, stage))
-    return replace(edited, photo=photo, report=report)
+    old = edited.report
+    report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
+    return replace(edited, photo=photo, rerender=again, report=report)
 
 
 def _unclipped(photo: Array, base: Array) -> Array:

@@ -98,6 +98,16 @@ class Studio:
             self._dressed(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
         )  # fmt: skip
 
+    def bodies_seen(self, scene: Scene) -> Array:
+        """[H, W] share of each pixel in which one of its bodies is seen."""
+        names = [f"body{k}" for k in range(len(scene.bodies))]
+        return self._seen(scene, names) if names else np.zeros(scene.depth.shape, np.float32)
+
+    def guides(self, edited: Scene) -> tuple[Array, Array]:
+        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with those of the bodies that are seen."""
+        covered = self.bodies_seen(edited) > 0
+        return self.body_guides(edited, covered) if covered.any() else (edited.materials.albedo, edited.normal)
+
     def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
         """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with its bodies' own where `covered`."""
         from materialist.render.portrait import look
@@ -135,6 +145,23 @@ class Studio:
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target
+
+
+def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:
+    """[H, W, 3] float32 linear: the scene as it stands, with its bodies and lamps; `spp` camera rays a pixel.
+
+    Raises SetupError with `denoise` where the denoiser is not installed.
+    """
+    studio = Studio(scene, device=device)
+    target = studio._dressed(scene)
+    depth = _path_depth(scene) if scene.bodies or scene.lamps else 0
+    picture = target.render_path(spp=spp, seed=seed, max_depth=depth) if depth else target.render(spp=spp, seed=seed)
+    if denoise:
+        from materialist.render.denoise import denoise as clean
+
+        albedo, normal = studio.guides(scene)
+        picture = clean(picture, albedo=albedo, normal=normal)
+    return picture
 
 
 def _path_depth(scene: Scene) -> int:

@@ -95,22 +95,25 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     return srgb_to_linear(np.clip(moved, 0, 1)).reshape(shape)
 
 
-def parse_colour(colour: tuple[float, float, float] | str) -> Array:
-    """[3] float32 linear albedo from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB. Raises InputError."""
+def parse_colour(colour: tuple[float, float, float] | str, name: str = "albedo") -> Array:
+    """[3] float32 linear colour from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB.
+
+    Raises InputError, which says what colour of what `name`.
+    """
     if isinstance(colour, str) and colour.startswith("#"):
         try:
             if len(colour) != 7:
                 raise ValueError
             return srgb_to_linear(np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32))
         except ValueError as error:
-            raise InputError(f"The colour {colour!r} must look like #ff8800.") from error
+            raise InputError(f"The {name} {colour!r} must look like #ff8800.") from error
     try:
         parts = colour.split(",") if isinstance(colour, str) else colour
         rgb = np.array([float(c) for c in parts], np.float32)
     except (TypeError, ValueError) as error:
-        raise InputError(f"The albedo {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
+        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
     if rgb.shape != (3,) or not (np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()):
-        raise InputError(f"The albedo {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
+        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
     return rgb
 
 

@@ -90,8 +90,12 @@ def _map(reference: Any, folder: Any, otherwise: Any) -> Array:
                 pixels = _pixels(image, folder)
             if pixels is not None:
                 return pixels[..., 0]
-        except (OSError, InputError):  # missing or refused: `folder` has noted it; or no picture
+        except InputError:  # refused: `folder` has noted it
             pass
+        except FileNotFoundError:  # noted as well
+            pass
+        except (OSError, Image.DecompressionBombError):  # no picture, or one too large
+            folder.damaged += 1
     return np.full((1, 1), otherwise, np.float32)
 
 

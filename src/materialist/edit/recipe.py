@@ -10,7 +10,7 @@ from materialist.edit.background import without
 from materialist.edit.drop_rest import settle
 from materialist.edit.glass import glass
 from materialist.edit.insert import insert
-from materialist.edit.material import edit
+from materialist.edit.material import edit, parse_colour
 from materialist.edit.relight import lamp, read_envmap, relight
 from materialist.edit.select import select
 from materialist.edit.thickness import METHODS
@@ -33,6 +33,10 @@ KINDS = {
 """Kind of step -> what it may say."""
 
 
+ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+"""How YAML spells a switch."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One edit."""
@@ -47,7 +51,7 @@ class Step:
     @property
     def skipped(self) -> bool:
         """Whether the step is kept in the list without being applied (`skip: true`)."""
-        return str(self.options.get("skip", "")).lower() in ("true", "yes", "on", "1")
+        return str(self.options.get("skip", "")).lower() in ON
 
 
 def read_recipe(path: str | Path) -> list[Step]:
@@ -70,7 +74,9 @@ def read_recipe(path: str | Path) -> list[Step]:
 
 def _step(entry: Any, number: int, path: Path) -> Step:
     if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
-        raise InputError(f"Step {number} of {path} must be one of {', '.join(KINDS)} with its options below it.")
+        said = f"'{next(iter(entry))}'" if isinstance(entry, dict) and len(entry) == 1 else "no one kind"
+        known = ", ".join(KINDS)
+        raise InputError(f"Step {number} of {path} says {said}; give one of {known} with its options below it.")
     kind, options = next(iter(entry.items()))
     if not isinstance(options, dict):
         raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
@@ -232,14 +238,19 @@ def glass_arguments(scene: Scene, step: Step):
     given = step.options
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("ior", "transmission", "roughness") if k in given}
     if "tint" in given:
-        options["tint"] = _numbers(given["tint"], 3, "tint")
+        tint = given["tint"]
+        options["tint"] = tuple(
+            float(c) for c in parse_colour(tint if isinstance(tint, str) else _numbers(tint, 3, "tint"), "tint")
+        )
     if "hollow" in given:
-        options["hollow"] = str(given["hollow"]).lower() in ("true", "yes", "on", "1")
+        options["hollow"] = _switch(given["hollow"], "hollow")
     if "model" in given:
         options["model"] = str(given["model"])
     if "thickness" in given:
         known = str(given["thickness"]) in METHODS
         options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
+        if not known and not options["thickness"].is_file():
+            raise InputError(f"There is no file {options['thickness']}; thickness is one, or {', '.join(METHODS)}.")
     return _region(scene, step), options | _removal(step)
 
 
@@ -256,6 +267,13 @@ def read_texture(path: str | Path):
     from materialist.io.photo import decode_photo
 
     return np.clip(decode_photo(Path(path)).linear, 0, 1)
+
+
+def _switch(value: Any, name: str) -> bool:
+    text = str(value).lower()
+    if text not in (*ON, *OFF):
+        raise InputError(f"The {name} must be true or false, not {value!r}.")
+    return text in ON
 
 
 def _file(step: Step, name: str) -> Path:

@@ -7,6 +7,13 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
+HIDDEN = 0.5
+"""Share of a mask that may be hidden by things that were put into the scene."""
+PLACED = (
+    "a thing that was put into the scene, or made glass, and edits reach only what the photo shows: put it there "
+    "again as you want it"
+)
+
 
 def checked_region(scene: Scene, mask: Array) -> Array:
     """[H, W] float32 weight in [0, 1] of an edit, from a bool mask or soft weights; 0 where there is no surface.
@@ -27,7 +34,23 @@ def checked_region(scene: Scene, mask: Array) -> Array:
     weight = weight * (scene.depth > 0)
     if not weight.any():
         raise InputError("The mask covers only sky, where the scene has no surface to edit; mark a surface.")
+    if scene.bodies and float((placed(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
+        raise InputError(f"What is marked is {PLACED}, or mark something else.")
     return weight
+
+
+def placed(scene: Scene) -> Array:
+    """[H, W] share of each pixel in which something is seen that was put into the scene, or made glass."""
+    from materialist.edit.lights import Studio
+
+    asked = (scene.geometry, *scene.bodies)
+    if not _answered or list(map(id, _answered[0][0])) != list(map(id, asked)):
+        _answered[:] = [(asked, Studio(scene).bodies_seen(scene))]
+    return _answered[0][1]
+
+
+_answered: list[tuple[tuple, Array]] = []
+"""What `placed` was last asked of, and its answer: the steps of an edit ask about one scene."""
 
 
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:

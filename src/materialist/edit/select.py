@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.edit.region import checked_pixel, checked_region
+from materialist.edit.region import HIDDEN, PLACED, checked_pixel, checked_region, placed
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -132,6 +132,8 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
     for x, y in points:
         if scene.depth[y, x] <= 0:
             raise InputError(f"The click {x},{y} is on the sky, where there is no surface; click on an object.")
+        if scene.bodies and placed(scene)[y, x] > HIDDEN:
+            raise InputError(f"The click {x},{y} is on {PLACED}, or click on something else.")
     return points
 
 

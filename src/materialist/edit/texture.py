@@ -30,7 +30,7 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     u, v = _unit(across, use), _unit(along, use)
     h, w = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
-    extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h) * scale
+    extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
     u, v = u * np.ptp(across[use]) / (extent * w), v * np.ptp(along[use]) / (extent * h)
     return _repeated(picture, u, v)
 

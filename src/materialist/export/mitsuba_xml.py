@@ -16,7 +16,7 @@ from materialist.io.exr import write_exr
 from materialist.render.bodies import SMOOTH
 from materialist.render.envmap import on_mitsuba_grid
 from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
-from materialist.types import Array, Camera, Materials, Mesh, Scene, Surface
+from materialist.types import Array, Camera, Lamp, Materials, Mesh, Scene, Surface
 
 DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH), "bsdf": "principled"}
 """Parameters of the file and their values: `mi.load_file(path, spp=256)` sets another."""
@@ -44,8 +44,21 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
         if part.surface is not None and max(part.surface.emission) > 0:
             glow = ", ".join(repr(float(c)) for c in part.surface.emission)
             _value(_node(shape, "emitter", "area"), "rgb", "radiance", glow)
+    for lamp in scene.lamps:
+        _lamp(root, lamp)
     ET.indent(root)
     ET.ElementTree(root).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
+
+
+def _lamp(root: ET.Element, lamp: Lamp) -> None:
+    """A black sphere that glows: radiance power / (4 pi^2 r^2)."""
+    shape = _node(root, "shape", "sphere")
+    x, y, z = (repr(float(v)) for v in lamp.position)
+    ET.SubElement(shape, "point", name="center", x=x, y=y, z=z)
+    _value(shape, "float", "radius", repr(float(lamp.radius)))
+    _value(_node(shape, "bsdf", "diffuse"), "rgb", "reflectance", "0")
+    radiance = np.asarray(lamp.power, np.float64) / (4 * np.pi**2 * lamp.radius**2)
+    _value(_node(shape, "emitter", "area"), "rgb", "radiance", ", ".join(repr(float(c)) for c in radiance))
 
 
 def _sensor(root: ET.Element, camera: Camera) -> None:

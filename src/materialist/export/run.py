@@ -68,6 +68,8 @@ def export(
     note: tuple[str, ...] = ()
     if to not in TEXTURED and simplified(bodies):
         note = (f"{to} shows inserted bodies without textures and glass; glb and mitsuba have both.",)
+    if scene.lamps and to != "mitsuba":
+        note = (*note, f"{to} has none of the scene's {len(scene.lamps)} lamps; mitsuba has.")
     parts = [*scene_parts(scene, max_triangles), *(bodies if to in TEXTURED else map(plain, bodies))]
     if to != "blend":
         made = _writer(to)(path, scene, parts, force)

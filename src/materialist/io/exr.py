@@ -24,11 +24,15 @@ def read_exr(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
+    if not _named(path):
+        raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
         with OpenEXR.File(str(path)) as file:
             channels = {name: channel.pixels for name, channel in file.channels().items()}
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
-        raise InputError(f"{path} is not a readable EXR file (truncated or damaged): {error}.") from error
+        raise InputError(
+            f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
+        ) from error
     array = _pick(channels, path)
     if array.dtype not in (np.float16, np.float32):
         raise InputError(f"{path} holds {array.dtype} pixels; save it as half or float.")
@@ -47,12 +51,23 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
     if names is None:
         raise InputError(f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}.")
     pixels = np.ascontiguousarray(array, np.float16 if half else np.float32)
+    if not _named(path):
+        raise OutputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another.")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with OpenEXR.File(header, {names: pixels}) as file:
             file.write(str(path))
     except Exception as error:  # see read_exr
         raise OutputError(f"{path} cannot be written: {error}") from error
+
+
+def _named(path: str | Path) -> bool:
+    """Whether the OpenEXR library can be told a path."""
+    try:
+        str(path).encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _pick(channels: dict[str, Array], path: Path) -> Array:

@@ -50,6 +50,8 @@ def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
     path = Path(path)
     if path.suffix.lower() not in (".png", ".exr"):
         raise InputError(f"The output {path} must end in .png (for looking) or .exr (linear, for further work).")
+    if path.is_dir():
+        raise OutputError(f"{path} is a folder; give a file's name.")
     if path.exists() and not force:
         raise OutputError(f"{path} exists; give --force to replace it, or another name.")
     probe_beside(path)
@@ -80,7 +82,10 @@ def read_map(path: str | Path) -> Array:
 
     if not path.is_file():
         raise InputError(f"There is no map at {path}.")
-    decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
+    try:
+        decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
+    except cv2.error as error:  # a header that promises more pixels than any map has
+        raise InputError(f"{path} is too large an image, or damaged; use one of the photo's size.") from error
     if decoded is None:
         raise InputError(f"{path} is not a readable image (use EXR, or 8- or 16-bit PNG).")
     array = np.asarray(decoded)

@@ -44,6 +44,8 @@ def load_scene(path: str | Path) -> Scene:
     meta = _read_meta(folder)
     try:
         camera = Camera(**meta["camera"])
+        if not 0 < float(camera.fov) < 180:
+            raise ValueError(f"the field of view is {camera.fov}")
         shape = (camera.height, camera.width)
         prior, materials = meta["prior"], _read_materials(folder / "maps", shape)
         label = _read_labels(folder / "plane_label.png", shape)
@@ -69,8 +71,8 @@ def load_scene(path: str | Path) -> Scene:
             lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
             bodies=read_bodies(folder, meta.get("bodies", [])),
         )
-    except (KeyError, TypeError) as error:
-        raise SceneError(f"{folder / MARKER} is incomplete ({error}); save the scene again.") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise SceneError(f"{folder / MARKER} is incomplete or damaged ({error}); save the scene again.") from error
 
 
 def _write(scene: Scene, folder: Path) -> None:
@@ -239,10 +241,21 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(plain(content), indent=1, ensure_ascii=False)
+    if not _is_utf8(text):  # a file name of another encoding
+        text = json.dumps(plain(content), indent=1)
     try:
-        path.write_text(json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n", "utf-8")
+        path.write_text(text + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _is_utf8(text: str) -> bool:
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _report_to_json(report: FitReport) -> dict[str, Any]:
