@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.train.data import solids
 from materialist.train.refraction import lessons, view
 from materialist.train.refraction.glassware import Shape, shape
@@ -57,6 +57,17 @@ def test_a_balls_view_is_consistent(ball):
     assert (front * target[BACK_X:]).sum(0)[inner].mean() > 0.97
     # Seen normals look towards the viewer: n.v is positive, largest in the middle.
     assert maps[7][inside].min() > -1e-3 and maps[7].max() > 0.98
+
+
+def test_frames_are_those_of_prediction_and_a_little_off(ball):
+    """The network must not learn one exact frame: a window a few percent larger doubled its error."""
+    sides = []
+    for seed in range(16):
+        maps = view.lesson(ball, Tracer(ball.solid), np.random.default_rng(seed)).maps
+        inside = maps[MASK] > 0.5
+        sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
+    framed = SIDE / (1 + 2 * MARGIN)
+    assert np.mean(sides) == pytest.approx(framed, abs=2) and 1 < np.std(sides) < 5
 
 
 def test_stretching_the_rays_is_stretching_the_shape(ball):
