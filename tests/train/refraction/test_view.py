@@ -67,7 +67,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
     framed = SIDE / (1 + 2 * MARGIN)
-    assert np.mean(sides) == pytest.approx(framed, abs=2) and 1 < np.std(sides) < 5
+    assert np.mean(sides) == pytest.approx(framed, abs=2) and 0.6 < np.std(sides) < 5
 
 
 def test_stretching_the_rays_is_stretching_the_shape(ball):
