@@ -55,6 +55,11 @@ class Window:
         side = max(bottom - top, right - left) * (1 + 2 * MARGIN)
         return cls((left + right - side) / 2, (top + bottom - side) / 2, side)
 
+    def moved(self, larger: float, right: float, down: float) -> Window:
+        """The window `larger` times as large about its middle, and that many of its sides aside."""
+        edge = (larger - 1) / 2
+        return Window(self.left + (right - edge) * self.side, self.top + (down - edge) * self.side, larger * self.side)
+
     def cut(self, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array) -> View:
         """The window of maps [H, W, ...] at SIDE x SIDE pixels; means over the object alone."""
         weight = inside.astype(np.float32)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
 """The weights that ship with the package; docs/training.md says how they were made."""
+FRAMES = ((1.0, 0.0, 0.0), (1.05, 0.015, 0.0), (1.1, 0.0, 0.015), (1.05, -0.015, -0.015))
+"""How much larger and how far aside (right, down), in sides, the windows are over which answers are averaged."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +65,25 @@ def thickness(
         if value.shape != (*inside.shape, 3):
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {(*inside.shape, 3)}.")
     network, _ = _loaded(Path(weights) if str(weights) else WEIGHTS)
-    window = Window.around(inside)
-    view = window.cut(photo_linear, inside, normal, depth, pixel_rays(camera))
-    found = run(network, features(view))  # [5, S, S], lengths in units of the object's size
+    maps = (photo_linear, inside, normal, depth, pixel_rays(camera))
+    answers = [_answer(network, Window.around(inside).moved(*frame), *maps) for frame in FRAMES]
+    found = np.mean(answers, axis=0)  # [H, W, 5]
     if not np.isfinite(found).all():
         raise WeightsError(f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS}).")
-    solid, hollow = (window.put_back(channel * view.size, view.inside, inside) for channel in found[:BACK_X])
-    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
-    back = np.stack([window.put_back(channel, view.inside, inside) for channel in np.moveaxis(turned, -1, 0)], -1)
-    back /= np.maximum(np.linalg.norm(back, axis=-1, keepdims=True), 1e-6)
+    solid, hollow, back = found[..., 0], found[..., 1], found[..., BACK_X:]
+    back = back / np.maximum(np.linalg.norm(back, axis=-1, keepdims=True), 1e-6)
     return Thickness(solid, np.minimum(hollow, solid), back)
+
+
+def _answer(
+    network: RefractionNet, window: Window, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array
+) -> Array:
+    """[H, W, 5] float32 of one window, 0 outside the mask: both thicknesses in scene units, and the back's normal."""
+    view = window.cut(photo, inside, normal, depth, rays)
+    found = run(network, features(view))  # [5, S, S], lengths in units of the object's size
+    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
+    channels = [*(found[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
+    return np.stack([window.put_back(channel, view.inside, inside) for channel in channels], -1)
 
 
 def run(network: RefractionNet, maps: Array) -> Array:

@@ -73,10 +73,8 @@ def _cut(rng: np.random.Generator, tracer: Tracer, pose: Pose, vertices: Array) 
     seen = _imperfect(rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15))))
     if not seen.inside.any():
         return seen
-    window = Window.around(seen.inside)
-    larger = window.side * float(np.exp(rng.normal(0, OFF[0])))
-    aside = window.side * rng.normal(0, OFF[1], 2) - (larger - window.side) / 2
-    window = Window(window.left + float(aside[0]), window.top + float(aside[1]), larger)
+    larger, aside = float(np.exp(rng.normal(0, OFF[0]))), rng.normal(0, OFF[1], 2)
+    window = Window.around(seen.inside).moved(larger, float(aside[0]), float(aside[1]))
     return window.cut(seen.photo, seen.inside, seen.normal, seen.depth, seen.rays)
 
 
