@@ -61,7 +61,7 @@ def test_click_box_and_sun(folder):
         ("", "no list of edits"),
         ("edits: []", "no list of edits"),
         ("- [", "not valid YAML"),
-        ("- paint: {}", "says 'paint'; give one of edit,"),
+        ("- paint: {}", "is 'paint'; it must be one of edit,"),
         ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, not 'maybe'"),
         ("- glass: {mask: block.png, tint: '#88ccf'}", "The tint '#88ccf' must look like"),
         ("- glass: {mask: block.png, thickness: gone.exr}", "There is no file"),

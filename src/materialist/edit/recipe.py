@@ -74,9 +74,9 @@ def read_recipe(path: str | Path) -> list[Step]:
 
 def _step(entry: Any, number: int, path: Path) -> Step:
     if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
-        said = f"'{next(iter(entry))}'" if isinstance(entry, dict) and len(entry) == 1 else "no one kind"
+        said = f"'{next(iter(entry))}'" if isinstance(entry, dict) and len(entry) == 1 else "not one kind of edit"
         known = ", ".join(KINDS)
-        raise InputError(f"Step {number} of {path} says {said}; give one of {known} with its options below it.")
+        raise InputError(f"Step {number} of {path} is {said}; it must be one of {known} with its options below it.")
     kind, options = next(iter(entry.items()))
     if not isinstance(options, dict):
         raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
