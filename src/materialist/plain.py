@@ -18,3 +18,12 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, str | int | bool):
         return value
     return [plain(item) for item in value] if isinstance(value, Iterable) else str(value)
+
+
+def is_utf8(text: str) -> bool:
+    """Whether a text, such as a file name from the system, can be written as UTF-8."""
+    try:
+        text.encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -113,6 +113,12 @@ class Lamp:
     radius: float
     """Scene units, > 0."""
 
+    @property
+    def radiance(self) -> tuple[float, float, float]:
+        """Of its surface, in R, G, B: power / (4 pi^2 radius^2)."""
+        r, g, b = (float(c) / (4 * np.pi**2 * self.radius**2) for c in self.power)
+        return r, g, b
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:

@@ -202,12 +202,11 @@ def _parts(scene) -> dict:
 
 
 def _sphere(lamp: Lamp) -> dict:
-    """A sphere whose radiant flux is the lamp's: its radiance L = power / (4 pi^2 r^2)."""
-    radiance = np.asarray(lamp.power, np.float64) / (4 * np.pi**2 * lamp.radius**2)
+    """A sphere whose radiant flux is the lamp's."""
     return {
         "type": "sphere", "center": [float(v) for v in lamp.position], "radius": float(lamp.radius),
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
-        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": [float(v) for v in radiance]}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(lamp.radiance)}},
     }  # fmt: skip
 
 

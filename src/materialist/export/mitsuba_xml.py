@@ -51,14 +51,13 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
 
 
 def _lamp(root: ET.Element, lamp: Lamp) -> None:
-    """A black sphere that glows: radiance power / (4 pi^2 r^2)."""
+    """A black sphere that glows."""
     shape = _node(root, "shape", "sphere")
     x, y, z = (repr(float(v)) for v in lamp.position)
     ET.SubElement(shape, "point", name="center", x=x, y=y, z=z)
     _value(shape, "float", "radius", repr(float(lamp.radius)))
     _value(_node(shape, "bsdf", "diffuse"), "rgb", "reflectance", "0")
-    radiance = np.asarray(lamp.power, np.float64) / (4 * np.pi**2 * lamp.radius**2)
-    _value(_node(shape, "emitter", "area"), "rgb", "radiance", ", ".join(repr(float(c)) for c in radiance))
+    _value(_node(shape, "emitter", "area"), "rgb", "radiance", ", ".join(map(repr, lamp.radiance)))
 
 
 def _sensor(root: ET.Element, camera: Camera) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError, OutputError
+from materialist.plain import is_utf8
 from materialist.types import Array
 
 _COLOUR = ("RGB", "RGBA", "rgb", "rgba")
@@ -24,7 +25,7 @@ def read_exr(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
-    if not _named(path):
+    if not is_utf8(str(path)):
         raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
         with OpenEXR.File(str(path)) as file:
@@ -51,7 +52,7 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
     if names is None:
         raise InputError(f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}.")
     pixels = np.ascontiguousarray(array, np.float16 if half else np.float32)
-    if not _named(path):
+    if not is_utf8(str(path)):
         raise OutputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another.")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
@@ -59,15 +60,6 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
             file.write(str(path))
     except Exception as error:  # see read_exr
         raise OutputError(f"{path} cannot be written: {error}") from error
-
-
-def _named(path: str | Path) -> bool:
-    """Whether the OpenEXR library can be told a path."""
-    try:
-        str(path).encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _pick(channels: dict[str, Array], path: Path) -> Array:

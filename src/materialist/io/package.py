@@ -18,7 +18,7 @@ from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.io.ply import read_ply, write_ply
 from materialist.io.target import MARKER, interrupted_replacement, whole_folder
-from materialist.plain import plain
+from materialist.plain import is_utf8, plain
 from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 
 FORMAT = "materialist-scene"
@@ -242,20 +242,12 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(plain(content), indent=1, ensure_ascii=False)
-    if not _is_utf8(text):  # a file name of another encoding
+    if not is_utf8(text):  # a file name of another encoding
         text = json.dumps(plain(content), indent=1)
     try:
         path.write_text(text + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
-
-
-def _is_utf8(text: str) -> bool:
-    try:
-        text.encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _report_to_json(report: FitReport) -> dict[str, Any]:
