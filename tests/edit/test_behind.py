@@ -54,3 +54,34 @@ def test_sky_and_things_that_are_no_planes():
     upper, lower = hole & (np.arange(60)[:, None] < 27), hole & (np.arange(60)[:, None] > 33)
     assert (found.depth[upper] == 0).mean() > 0.9 and (found.label[upper] == SKY).mean() > 0.9
     np.testing.assert_allclose(found.depth[lower], 3.0, rtol=0.01)
+
+
+def table():
+    """Depth, normal and plane of a table that ends at depth 2 before a wavy background farther away, of no plane."""
+    depth, normal, _ = room()
+    rows, columns = np.indices(depth.shape)
+    end = depth > 2.0
+    depth = np.where(end, 3.5 + 0.3 * np.sin(columns / 7) * np.cos(rows / 5), depth)
+    return depth, np.where(end[..., None], [0.0, 0, 1], normal), np.where(end, LOOSE, 0)
+
+
+def test_a_table_ends_where_it_is_seen_to_end():
+    """Nothing but the table is a plane: it does not go on to the horizon behind what stands on it."""
+    depth, normal, plane = table()
+    hole = disc(36, 40, 13)
+    found = behind(np.where(hole, 1.2, depth), normal, np.where(hole, 0, plane), hole, np.where(hole, 1.2, 0), CAMERA)
+    assert (plane[hole] == LOOSE).sum() > 100
+    assert (found.label != plane)[hole].mean() < 0.06
+    behind_it = hole & (plane == LOOSE) & (found.label == LOOSE)
+    assert np.abs(found.depth / depth - 1)[behind_it].max() < 0.15
+
+
+def test_a_table_goes_on_behind_things_that_stand_on_it():
+    depth, normal, plane = room()
+    plane = np.where(plane == 1, 0, plane)
+    hole = disc(46, 40, 8)
+    cup = disc(46, 55, 9) & ~hole
+    depth, plane = np.where(cup, 0.9, depth), np.where(cup, LOOSE, plane)
+    depth[:40] = np.minimum(depth[:40], 3.0)
+    found = behind(np.where(hole, 0.8, depth), normal, plane, hole, np.where(hole, 0.8, 0), CAMERA)
+    assert (found.label[hole] == 0).all()

@@ -57,3 +57,20 @@ def test_large_pictures_are_matched_small_and_keep_their_pieces():
     plan = exemplar_plan(np.where(hole[..., None], 0, picture), hole, np.ones_like(hole), np.zeros(hole.shape, int))
     found = plan.fill(np.where(hole[..., None], 0, picture))
     assert np.abs(found - picture)[hole].mean() < 0.1
+
+
+def test_a_slanting_border_of_surfaces_stays_where_it_is():
+    """A patch across the border is only right where both have it in the same place."""
+    rng = np.random.default_rng(0)
+    rows, columns = np.indices((72, 96))
+    label = (rows > 40 - columns / 12).astype(int)
+    dots = np.zeros((72, 96), bool)
+    dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
+    floor = np.where(dots[..., None], [0.9, 0.9, 0.3], [0.4, 0.05, 0.1])
+    wall = np.where(((rows + columns) % 10 < 4)[..., None], [0.3, 0.4, 0.6], [0.7, 0.7, 0.9])
+    picture = np.where(label[..., None] == 1, floor, wall).astype(np.float32)
+    hole = (np.abs(columns - 46) < 0.45 * (rows - 10)) & (rows < 62)
+    plan = exemplar_plan(np.where(hole[..., None], 0.5, picture), hole, ~hole, label)
+    blue = plan.fill(picture)[..., 2]
+    assert blue[hole & (label == 1)].max() < 0.55, "the wall's paler blue is on the floor"
+    assert blue[hole & (label == 0)].min() > 0.3, "the floor's red is on the wall"

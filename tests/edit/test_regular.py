@@ -118,3 +118,38 @@ def test_shadows_beside_the_hole_are_not_copied(hole):
     assert told[hole].mean() > 0.97
     assert shadow.ravel()[found[told]].mean() < 0.03
     assert np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean() < 0.035
+
+
+def test_a_pattern_that_blurs_with_distance_is_still_one():
+    from scipy.ndimage import gaussian_filter
+
+    depth, strong = slanted(chequers, tilt=1.0)
+    sharp = 0.5 + 0.3 * (strong - 0.5)
+    away = np.clip((depth - depth.min()) / (np.percentile(depth, 90) - depth.min()), 0, 1)[..., None]
+    picture = sharp + (gaussian_filter(sharp, (3.0, 3.0, 0)) - sharp) * np.sqrt(away)
+    rows, columns = np.indices(SHAPE)
+    hole = np.hypot(rows - 50, (columns - 62) / 1.6) < 24
+    noisy = picture + np.random.default_rng(0).normal(0, 0.01, picture.shape)
+    torn = np.where(hole[..., None], 0.9, noisy)
+    found = regular_sources(torn, hole, ~hole, np.zeros(SHAPE, int), depth, CAMERA)
+    told = found >= 0
+    assert told[hole].mean() > 0.95
+    assert np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean() < 0.02  # another place is off by 0.05
+
+
+def test_a_pattern_that_does_not_tell_what_is_known_is_none():
+    """Some dots are alike after one shift by chance; elsewhere it says nothing true."""
+    rng = np.random.default_rng(18)
+    spots = np.concatenate([rng.uniform(-1.2, 1.2, (26, 2)), rng.uniform(0.05, 0.1, (26, 1))], 1)
+
+    def dotted(u, v):
+        there = np.zeros(u.shape, bool)
+        for x, y, r in spots:
+            there |= np.hypot(u - x, v - y) < r
+        return np.where(there[..., None], [0.9, 0.85, 0.4], [0.4, 0.1, 0.15])
+
+    depth, picture = slanted(dotted)
+    rows, columns = np.indices(SHAPE)
+    hole = np.hypot(rows - 50, columns - 62) < 19
+    torn = np.where(hole[..., None], 0.5, picture)
+    assert (regular_sources(torn, hole, ~hole, np.zeros(SHAPE, int), depth, CAMERA) < 0).all()

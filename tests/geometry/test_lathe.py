@@ -63,3 +63,23 @@ def test_rough_normals_are_not_believed():
     noisy = normal + np.random.default_rng(0).normal(0, 0.1, normal.shape)
     noisy /= np.linalg.norm(noisy, axis=-1, keepdims=True)
     assert lathed(depth, noisy, mask, CAMERA) is None
+
+
+def test_a_cylinder_with_a_block_beside_it_is_mostly_of_the_lathe():
+    """Most normals meet the axis; those of the block do not, and must not move it."""
+    depth, normal, mask, true = solid(prism(180))
+    rows, columns = np.indices(mask.shape)
+    block = mask & (columns < np.flatnonzero(mask.any(0))[0] + 5) & (rows % 40 < 30)
+    normal = np.where(block[..., None], [-0.6, 0, 0.8], normal)
+    found = lathed(depth, normal, mask, CAMERA, up=UP)
+    assert found is not None and not found.whole and found.misfit > 0.035
+    offset = found.axis.foot - FOOT
+    assert np.linalg.norm(offset - (offset @ UP) * UP) < 0.05
+    assert np.abs(found.thickness - true)[mask].sum() < 0.15 * true[mask].sum()
+
+
+def test_half_a_cylinder_is_none():
+    """Its normals meet the axis; half a turn brings what is seen beside the mask."""
+    depth, normal, mask, _ = solid(prism(180))
+    half = mask & (np.arange(mask.shape[1]) < np.median(np.nonzero(mask)[1]))
+    assert lathed(depth, normal, half, CAMERA, up=UP) is None

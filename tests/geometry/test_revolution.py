@@ -10,7 +10,7 @@ from materialist.bench.glass_scenes import is_closed, seen
 from materialist.camera import pixel_rays
 from materialist.geometry.lathe import lathed
 from materialist.geometry.profile import fitted
-from materialist.geometry.revolution import Meridian, profile_of, swept, thickness_of
+from materialist.geometry.revolution import Meridian, fits, profile_of, swept, thickness_of
 from materialist.geometry.turning import Axis
 from materialist.types import Camera
 
@@ -147,7 +147,7 @@ def test_what_is_no_body_of_revolution_has_no_profile():
     front, inside, rays = view(standing(BALL))
     columns = np.indices(inside.shape)[1]
     half = inside & (columns < np.median(columns[inside]))
-    assert profile_of(front.depth.astype(float), front.normal.astype(float), half, rays, AXIS) is None
+    assert not fits(profile_of(front.depth.astype(float), front.normal.astype(float), half, rays, AXIS))
     assert lathed(front.depth, front.normal, half, CAMERA, up=UP) is None
 
 

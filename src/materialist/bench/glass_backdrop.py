@@ -59,14 +59,18 @@ def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
 
 
 def albedo_of(
-    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[Ends, ...] = ()
-) -> Array:
-    """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`."""
+    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[Ends, ...] = (),
+    things: dict[str, Any] | None = None,
+) -> Array:  # fmt: skip
+    """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`.
+
+    `things` are Mitsuba objects that stand before them, in the picture, too.
+    """
     from materialist.render.denoise import denoise
 
     albedo = np.full(picture.shape, 0.5, np.float32)
     for _ in range(ROUNDS if depth.any() else 0):
-        seen = lit(scene, depth, normal, albedo, envmap, ends=ends, length=DEPTH["diffuse"], spp=SPP)
+        seen = lit(scene, depth, normal, albedo, envmap, things, ends=ends, length=DEPTH["diffuse"], spp=SPP)
         with suppress_missing():
             seen = denoise(seen, albedo=albedo, normal=normal)
         albedo = np.clip(albedo * picture / np.maximum(seen, 1e-6), 0, BRIGHTEST).astype(np.float32)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.glass_backdrop import Background, albedo_of, lit, suppress_missing
-from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh
+from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh, _paint
 from materialist.geometry.ends import Ends
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
@@ -26,7 +26,7 @@ def inpainted_background(
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
 
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
-    albedo is found with the object there, so that its shadow is not part of it.
+    albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
     from materialist.color import linear_to_srgb
     from materialist.edit.behind import SKY, behind
@@ -35,19 +35,19 @@ def inpainted_background(
     from materialist.geometry.membrane import membrane
 
     hole = _grown(scene.mask)
-    there = scene.mask[..., None]
-    albedo = albedo_of(
-        scene, np.where(scene.mask, scene.front.depth, scene.behind.depth),
-        np.where(there, scene.front.normal, scene.behind.normal), photo, envmap, ends,
-    )  # fmt: skip
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
-    label = np.full(hole.shape, SKY)
+    label, things = np.full(hole.shape, SKY), None
     if depth.any():
         plane = planes_of(scene, depth, normal)
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
-    seen, anywhere = linear_to_srgb(photo * gain), np.ones_like(hole)
+        found = predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
+        grey = _paint(scene._mi, scene.item.albedo)
+        things = {"object": _mesh(scene._mi, body(scene, found, depth), grey)}
+    albedo = albedo_of(scene, depth, normal, photo, envmap, ends, things)
+    seen = np.concatenate([linear_to_srgb(albedo), linear_to_srgb(np.clip(photo * gain, 0, 1))], -1)
+    anywhere = np.ones_like(hole)
     told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
     plan = exemplar_plan(seen, hole, anywhere, label, told=told)
     picture, albedo = (membrane(x, ~hole) if plan is None else plan.fill(x) for x in (photo, albedo))
@@ -78,16 +78,17 @@ def closed_proxy(
     scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
 ) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
+    return before(scene, body(scene, found, behind.depth), behind, envmap, ior, spp=spp, seed=seed)
+
+
+def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
+    """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
     from materialist.geometry.closed import closed_proxy as close
 
-    front = scene.front
     if found.lathe is not None:
-        shell = found.lathe.body(scene.camera)
-    else:
-        shell = close(
-            front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=behind.depth, back=found.back
-        )  # fmt: skip
-    return before(scene, shell, behind, envmap, ior, spp=spp, seed=seed)
+        return found.lathe.body(scene.camera)
+    front = scene.front
+    return close(front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=depth, back=found.back)
 
 
 def before(
@@ -132,20 +133,28 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     add. The upright direction comes from the floor of the background, where there is one.
     """
     from materialist.errors import WeightsError
-    from materialist.geometry.half_turn import upright
     from materialist.geometry.symmetry import symmetric_thickness
     from materialist.predict.refraction import thickness
-    from materialist.predict.refraction.choice import best_thickness
 
     front: Front = scene.front
-    seen = (photo, scene.mask, front.normal, front.depth, scene.camera)
-    up = upright(behind.depth, behind.normal, planes_of(scene, behind.depth, behind.normal), scene.camera)
-    best = best_thickness(*seen, up=up, behind=behind.depth).thickness
+    best = predicted(scene, photo, behind.depth, behind.normal)
     found = {"true": Thickness(front.thickness, front.thickness), "predicted": best}
     with suppress(WeightsError):  # the others still tell something
-        found["network"] = thickness(*seen)
+        found["network"] = thickness(photo, scene.mask, front.normal, front.depth, scene.camera)
     mirrored = symmetric_thickness(front.depth, front.normal, scene.mask, scene.camera)
     return {**found, "symmetry": Thickness(mirrored, mirrored)}
+
+
+def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
+    """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
+    from materialist.geometry.half_turn import upright
+    from materialist.predict.refraction.choice import best_thickness
+
+    up = upright(depth, normal, planes_of(scene, depth, normal), scene.camera)
+    front = scene.front
+    return best_thickness(
+        photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth
+    ).thickness  # fmt: skip
 
 
 def planes_of(scene: GlassScene, depth: Array, normal: Array) -> Array:

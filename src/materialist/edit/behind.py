@@ -16,6 +16,11 @@ LEAST = 0.01
 """A surface hides behind the object only if it has this share of the pixels around it."""
 FIRM = 0.1
 """If planes hold this share of the pixels around, no hidden pixel belongs to what is none: things end, planes go on."""
+BEYOND = 0.5
+"""Unless this share of what lies on no plane, around, stands where no plane goes on: that is the background."""
+FARTHEST, NEARER = 1.1, 0.9
+"""A plane ends by this multiple of the depth up to which it is seen anywhere, and is not where it would come before
+this part of the depth that is seen."""
 AROUND = 0.15
 """Surroundings that are looked at, as a part of the hole's extent."""
 STRAIGHT = 0.9
@@ -53,7 +58,9 @@ def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array,
     """
     rays = pixel_rays(camera).astype(np.float64)
     box = _surroundings(hole)
-    part = _behind(depth[box], normal[box], plane[box], hole[box], front[box], rays[box])
+    seen = np.where(hole | (depth <= 0), LOOSE, plane)
+    ends = {int(k): FARTHEST * float(np.percentile(depth[seen == k], 99)) for k in np.unique(seen[seen >= 0])}
+    part = _behind(depth[box], normal[box], plane[box], hole[box], front[box], rays[box], ends)
     out = Behind(depth.astype(np.float32), normal.astype(np.float32), np.where(depth > 0, plane, SKY).astype(np.int64))
     for whole, piece in ((out.depth, part.depth), (out.normal, part.normal), (out.label, part.label)):
         whole[box] = piece
@@ -68,11 +75,13 @@ def _surroundings(hole: Array) -> tuple[slice, slice]:
     return np.s_[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
 
 
-def _behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array, rays: Array) -> Behind:
-    """`behind` of a window."""
+def _behind(
+    depth: Array, normal: Array, plane: Array, hole: Array, front: Array, rays: Array, ends: dict[int, float]
+) -> Behind:  # fmt: skip
+    """`behind` of a window; `ends`: the depth at which each plane ends."""
     known_label = np.where(depth > 0, plane, SKY).astype(np.int64)
-    label = _labels(known_label, hole)
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)
+    label = _labels(known_label, hole, inverse, rays, ends)
     new_depth, new_normal = depth.astype(np.float32).copy(), normal.astype(np.float32).copy()
     surface = ~hole & (depth > 0)
     general = membrane(inverse, surface) if surface.any() else inverse
@@ -91,13 +100,15 @@ def _behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array
     return Behind(new_depth, new_normal, label)
 
 
-def _labels(known: Array, hole: Array) -> Array:
+def _labels(known: Array, hole: Array, inverse: Array, rays: Array, ends: dict[int, float]) -> Array:
     """[H, W] int: the labels of the pixels around, carried into the hole."""
     kinds, count = np.unique(known[~hole], return_counts=True)
     ring = _ring(hole)
     shares = np.array([np.mean(known[ring] == k) if ring.any() else 0.0 for k in kinds])
     kept = kinds[shares >= LEAST] if (shares >= LEAST).any() else kinds[count.argmax()][None]
-    firm = kept[kept != LOOSE]
+    loose = ring & (known == LOOSE)
+    near = {int(k): ends[int(k)] for k in kept[kept >= 0]}
+    firm = kept if _is_background(known, loose, inverse, rays, near) else kept[kept != LOOSE]
     if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= FIRM:
         kept = firm
     indicator = np.stack([known == k for k in kept], -1).astype(np.float32)
@@ -105,8 +116,19 @@ def _labels(known: Array, hole: Array) -> Array:
     chosen = kept[spanned.argmax(-1)]
     if len(firm) > 1:
         straight = _straight(known, ring & np.isin(known, firm), firm)
-        chosen = chosen if straight is None or LOOSE in kept else straight
+        chosen = chosen if straight is None or (LOOSE in kept and LOOSE not in firm) else straight
     return np.where(hole, chosen, known)
+
+
+def _is_background(known: Array, loose: Array, inverse: Array, rays: Array, ends: dict[int, float]) -> bool:
+    """Whether what is `loose` [H, W] bool around a hole stands where planes have ended, and not on them."""
+    if not loose.any():
+        return False
+    beyond = np.ones(loose.sum(), bool)
+    for k, end in ends.items():
+        going_on = rays[loose] @ _flat(inverse, known == k, rays)  # inverse depth; above the horizon not positive
+        beyond &= (going_on < 1 / end) | (going_on > inverse[loose] / NEARER)
+    return bool(beyond.mean() > BEYOND)
 
 
 def _straight(known: Array, ring: Array, kinds: Array) -> Array | None:
@@ -160,9 +182,13 @@ def _ring(hole: Array) -> Array:
 
 def _on_plane(inverse: Array, own: Array, rays: Array) -> Array:
     """[H, W] inverse depth of the plane through the pixels `own` [H, W] bool, bent to meet them at the hole."""
-    scaled = rays[own] / np.maximum(inverse[own], 1e-12)[:, None]  # weighted by depth: the relative error counts
-    coefficients = np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
-    flat = rays @ coefficients
+    flat = rays @ _flat(inverse, own, rays)
     sound = flat > 0.2 * np.median(inverse[own])
     bend = membrane(np.where(sound, inverse / np.where(sound, flat, 1), 1), own & sound)
     return np.where(sound, flat * bend, 0)
+
+
+def _flat(inverse: Array, own: Array, rays: Array) -> Array:
+    """[3] whose product with a ray is the inverse depth of the plane through the pixels `own` [H, W] bool."""
+    scaled = rays[own] / np.maximum(inverse[own], 1e-12)[:, None]  # weighted by depth: the relative error counts
+    return np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]

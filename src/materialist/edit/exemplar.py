@@ -7,7 +7,7 @@ pixel takes its value from, so that several maps are filled alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,9 +21,11 @@ FINEST = 256
 ROUNDS = (6, 5, 4, 3, 2)
 """Rounds of matching and averaging, coarsest size first (the last entry goes on)."""
 OTHER = 0.1
-"""Price of a patch from another surface (label), squared sRGB difference a pixel."""
+"""Price of a patch from another surface (label), squared sRGB difference a pixel; as much again where all of it is."""
 FAR = 0.004
 """Price of a patch from as far away as the picture is long: nearby things look alike, in perspective too."""
+STRANGE = 1e-4
+"""Weight of what a patch shows of another surface."""
 DECAY = 0.9
 """A pixel of the hole counts by this power of its distance to what is known."""
 
@@ -46,6 +48,8 @@ class Plan:
     """Pixels around a patch's middle that it speaks for."""
     told: int = 0
     """The first so many entries speak for their middle alone, and nothing else does there."""
+    label: Array | None = None
+    """[H, W] int: surfaces; what a patch shows of another one counts only where nothing else is said."""
 
     def fill(self, maps: Array) -> Array:
         """`maps` [H, W, C] with the hole filled; float32, the rest as it was."""
@@ -61,6 +65,9 @@ class Plan:
                 # No two patches have one middle, so that this sum meets no place twice.
                 part = self.weight[use, None]
                 from_y, from_x = np.clip(row[use] + dy, 0, height - 1), np.clip(column[use] + dx, 0, width - 1)
+                if self.label is not None:
+                    own = self.label[y[use], x[use]] == self.label[from_y, from_x]
+                    part = part * np.where(own, 1, STRANGE)[:, None].astype(np.float32)
                 total[y[use], x[use]] += part * values[from_y, from_x]
                 norm[y[use], x[use]] += part
         total = np.where(self.hole[..., None] & (norm > 0), total / np.maximum(norm, 1e-12), values)
@@ -99,7 +106,7 @@ def exemplar_plan(
     own = ~use[rest.rows, rest.columns]
     with_rest = lambda name: np.concatenate([getattr(plan, name), getattr(rest, name)[own]])  # noqa: E731
     rows, columns, sources, weight = (with_rest(name) for name in ("rows", "columns", "source", "weight"))
-    return Plan(rows, columns, sources, weight, hole, told=plan.told)
+    return Plan(rows, columns, sources, weight, hole, told=plan.told, label=label)
 
 
 def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed: int) -> Plan | None:
@@ -120,7 +127,7 @@ def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed:
         found = level.match(found, ROUNDS[min(depth, len(ROUNDS) - 1)], rng)
     if found is None:
         return None
-    return _enlarged(found, hole, finest)
+    return replace(_enlarged(found, hole, finest), label=label)
 
 
 @dataclass(frozen=True)
@@ -167,6 +174,9 @@ class _Level:
         dy, dx = np.mgrid[-r : r + 1, -r : r + 1]
         self.around = (dy * width + dx).ravel()
         self.trust = self._trust()
+        self.surface = self.label.ravel()
+        self.surfaces = self.surface[self.targets[:, None] + self.around]  # [P, n]
+        self.several = bool((self.surface != self.surface[0]).any())
 
     def _trust(self) -> Array:
         from scipy.ndimage import distance_transform_edt
@@ -199,8 +209,11 @@ class _Level:
         square = ((self._patch - other) ** 2).mean(-1)
         width = self.shape[1]
         far = np.hypot(source // width - self.rows, source % width - self.columns) / max(self.shape)
-        strange = self.label.ravel()[source] != self.label.ravel()[self.targets]
-        return (square * trust).sum(-1) / trust.sum(-1) + OTHER * strange + FAR * far.astype(np.float32)
+        cost = (square * trust).sum(-1) / trust.sum(-1) + FAR * far.astype(np.float32)
+        if self.several:
+            strange = self.surface[source[:, None] + self.around] != self.surfaces
+            cost += OTHER * (strange.mean(-1, dtype=np.float32) + strange[:, strange.shape[1] // 2])
+        return cost
 
     def _searched(self, best: Array, cost: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """What neighbours found, moved along; then places near the best so far, ever nearer."""
@@ -232,7 +245,7 @@ class _Level:
         return np.where(wins, tried, best), np.where(wins, new, cost)
 
     def _averaged(self, features: Array, best: Array, weight: Array) -> Array:
-        plan = Plan(self.rows, self.columns, best, weight.astype(np.float32), self.hole, self.radius)
+        plan = Plan(self.rows, self.columns, best, weight.astype(np.float32), self.hole, self.radius, label=self.label)
         return plan.fill(features)
 
     def _from_coarser(self, before: _Match, rng: np.random.Generator) -> Array:

@@ -22,7 +22,7 @@ CELLS = 160
 AROUND = 2.5
 """Surroundings of the hole that are looked at, in units of its extent on the plane."""
 LEAST_OVERLAP = 0.12
-"""Part of the plane's known cells that must have a partner after a shift."""
+"""Part of the plane's known cells, by their weight, that must have a partner after a shift."""
 ALIKE = 0.22
 """Largest difference of a plane from its shifted self, relative to that of unlike pictures (1), that counts."""
 WORSE = 0.06
@@ -31,6 +31,11 @@ FEATURED = 0.012
 """Least standard deviation (sRGB) of a plane's detail: a plain one has nothing that could be said to repeat."""
 ENOUGH = 0.6
 """Part of what is hidden of a plane that its pattern must tell: a few alike places are no pattern."""
+SKILL, TESTED = 0.65, 600
+"""Largest error with which a pattern may tell what is known, relative to that of the plane's median colour, and how
+many pixels are asked."""
+HALF = 0.5
+"""Least share of those that it must tell."""
 REPEATS = 16
 """Repeats of a hidden place that are looked at, the best ones."""
 BORDER = 2
@@ -86,17 +91,45 @@ def _within(mask: Array) -> Array:
 def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
     """[H, W] sources of the hidden pixels of one plane, -1 for none."""
     frame = _Frame(plane)
-    window, seen = frame.straight(features, plane.known, camera)
+    window, seen, sharp = frame.straight(features, plane.known, camera)
     detail = _detail(window, seen)
     if seen.sum() < KNOWN or np.sqrt((detail**2)[seen].mean()) < FEATURED:
         return np.full(plane.known.shape, -1)
-    shifts = _shifts(detail, seen) * frame.cell
-    height, width = plane.known.shape
+    shifts = _shifts(detail, sharp) * frame.cell @ frame.axes
+    found = np.full(plane.known.shape, -1)
+    if _foretold(features, plane, shifts, camera) > SKILL:
+        return found
     rows, columns = np.nonzero(plane.hidden)
+    hidden = rows, columns
+    found[hidden] = _repeated(features, plane, hidden, shifts, camera)
+    return found if (found[hidden] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
+
+
+def _foretold(features: Array, plane: Surface, shifts: Array, camera: Camera) -> float:
+    """What the pattern says wrongly of places that are known, relative to what their neighbourhood's mean does."""
+    rows, columns = np.nonzero(plane.known)
+    part = np.random.default_rng(0).permutation(len(rows))[:TESTED]
+    at = rows[part], columns[part]
+    source = _repeated(features, plane, at, shifts, camera)
+    told = source >= 0
+    if told.mean() < HALF:
+        return np.inf
+    values = features.reshape(-1, features.shape[-1])
+    off = np.abs(values[source[told]] - features[at][told]).mean()
+    plain = np.abs(features[at][told] - np.median(features[plane.known], 0)).mean()
+    return float(off / max(plain, 1e-6))
+
+
+def _repeated(
+    features: Array, plane: Surface, at: tuple[Array, Array], shifts: Array, camera: Camera
+) -> Array:  # fmt: skip
+    """[P] row-major sources of pixels `at` (rows [P], columns [P]) after shifts [K, 3] (best first), -1 for none."""
+    height, width = plane.known.shape
+    rows, columns = at
     sources, count = np.full((REPEATS, len(rows)), -1), np.zeros(len(rows), int)
-    for shift in shifts:  # best first
+    for shift in shifts:
         unsure = np.flatnonzero(count < REPEATS)
-        place, ahead = project(plane.point[rows[unsure], columns[unsure]] + shift @ frame.axes, camera)
+        place, ahead = project(plane.point[rows[unsure], columns[unsure]] + shift, camera)
         column, row = np.floor(place).astype(int).T
         good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
         row, column = np.where(good, row, 0), np.where(good, column, 0)
@@ -104,9 +137,7 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
         told = unsure[good]
         sources[count[told], told] = (row * width + column)[good]
         count[told] += 1
-    found = np.full((height, width), -1)
-    found[rows, columns] = _usual(features.reshape(-1, features.shape[-1]), sources)
-    return found if (found[rows, columns] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
+    return _usual(features.reshape(-1, features.shape[-1]), sources)
 
 
 def _usual(values: Array, sources: Array) -> Array:
@@ -143,8 +174,8 @@ class _Frame:
         self.cell = float((self.high - self.low).max() / CELLS)
         self.middle = middle
 
-    def straight(self, features: Array, known: Array, camera: Camera) -> tuple[Array, Array]:
-        """The plane [h, w, F] looked at straight on, and where it is known [h, w]."""
+    def straight(self, features: Array, known: Array, camera: Camera) -> tuple[Array, Array, Array]:
+        """The plane [h, w, F] looked at straight on, where it is known [h, w], and there how sharp it is, in [0, 1]."""
         import cv2
 
         size = np.maximum(((self.high - self.low) / self.cell).astype(int), 8)
@@ -157,7 +188,10 @@ class _Frame:
         )
         seen = read(known.astype(np.float32)) > 0.99
         channels = [read(np.where(known, features[..., k], 0)) for k in range(features.shape[-1])]
-        return np.where(seen[..., None], np.stack(channels, -1), 0), seen
+        (y_v, y_u), (x_v, x_u) = np.gradient(y), np.gradient(x)
+        pixels = np.abs(y_v * x_u - y_u * x_v)  # [h, w] of a cell
+        sharp = np.where(seen, np.clip(pixels, 0, 1), 0)
+        return np.where(seen[..., None], np.stack(channels, -1), 0), seen, sharp
 
 
 def _detail(window: Array, seen: Array) -> Array:
@@ -170,19 +204,22 @@ def _detail(window: Array, seen: Array) -> Array:
     return np.where(seen[..., None], window - slow, 0)
 
 
-def _shifts(detail: Array, seen: Array) -> Array:
-    """[K, 2] shifts (u, v) in cells under which the picture looks like itself, best first; none if it never does."""
+def _shifts(detail: Array, weight: Array) -> Array:
+    """[K, 2] shifts (u, v) in cells under which the picture looks like itself, best first; none if it never does.
+
+    weight: [h, w] in [0, 1], 0 where nothing is seen; what is far away is blurred, and unlike itself nearby.
+    """
     from scipy.ndimage import minimum_filter
 
-    height, width = seen.shape
+    height, width = weight.shape
     shape = (2 * height, 2 * width)
     spectrum = lambda a: np.fft.rfft2(a, shape)  # noqa: E731
     correlate = lambda a, b: np.fft.irfft2(np.conj(a) * b, shape)  # noqa: E731  [s] = sum over p of a[p] b[p + s]
-    there, energy = spectrum(seen.astype(float)), spectrum((detail**2).sum(-1))
-    both = sum(correlate(s, s) for s in (spectrum(detail[..., k]) for k in range(detail.shape[-1])))
+    there, energy = spectrum(weight), spectrum(weight * (detail**2).sum(-1))
+    both = sum(correlate(s, s) for s in (spectrum(weight * detail[..., k]) for k in range(detail.shape[-1])))
     total = correlate(energy, there) + correlate(there, energy)
     overlap = correlate(there, there)
-    enough = overlap > LEAST_OVERLAP * seen.sum()
+    enough = overlap > LEAST_OVERLAP * (weight**2).sum()
     # 0 where the shifted picture is the same, 1 where they have nothing to do with each other.
     apart = np.where(enough, (total - 2 * both) / np.maximum(total, 1e-9), 2.0)
     apart = np.fft.fftshift(apart)
@@ -195,7 +232,7 @@ def _shifts(detail: Array, seen: Array) -> Array:
     price = apart[found[:, 0], found[:, 1]]
     found = found[price < price.min() + WORSE]
     fine = np.stack([_vertex(apart, *place) for place in found]) - centre
-    away = np.linalg.norm(fine, axis=-1) / max(seen.shape)
+    away = np.linalg.norm(fine, axis=-1) / max(weight.shape)
     order = np.argsort(apart[found[:, 0], found[:, 1]] + 0.5 * WORSE * away)
     return fine[order][:, ::-1]
 

@@ -30,7 +30,7 @@ class ObjectThickness:
     wall: float
     """Of the object, were it hollow."""
     method: str
-    """Which method it comes from: `lathe`, `outline`, `half-turn`, `network`, `symmetry` or `given`."""
+    """Which method it comes from: one of those of `choice.Choice`, or `given`."""
     back: Array | None = None
     """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
     lathe: Lathed | None = None

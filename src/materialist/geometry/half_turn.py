@@ -232,9 +232,13 @@ class Fit:
 
     def unturned(self, axis: Axis) -> float:
         """How far normals are from meeting the axis, as those of a lathed body do; it tells the tilt of such a one."""
+        return float(self.sines(axis).mean())
+
+    def sines(self, axis: Axis) -> Array:
+        """[N] sines between normals and the planes through the axis."""
         across = np.cross(axis.up, self.points - axis.foot)
         across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-        return float(np.abs((self.normals * across).sum(-1)).mean())
+        return np.abs((self.normals * across).sum(-1))
 
     def search(self, measure: Callable[[Axis], float]) -> tuple[float, Axis]:
         """The axis at which a measure is least, and its value there, by simplex searches from a few places."""

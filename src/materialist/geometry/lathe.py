@@ -2,6 +2,9 @@
 
 All its normals meet one axis, and say alone where that stands and how it leans. Around it every visible point tells a
 place of one profile (`geometry.revolution`): no guess of the thickness is needed, and exact maps give it exactly.
+
+Where most normals do so, and the others do not (the stalk of an apple, the plate of a door knob), the profile still
+tells the back: not the whole body, but a smooth one, which glass needs more than one in the right place.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.geometry.half_turn import LOOKING_DOWN, TILTS, Fit
 from materialist.geometry.profile import Profile
-from materialist.geometry.revolution import profile_of, swept, thickness_of
+from materialist.geometry.revolution import fits, profile_of, swept, thickness_of
 from materialist.geometry.shell import Shell
 from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
@@ -23,6 +26,11 @@ FEWEST = 64
 """Pixels below which an object is too small to tell."""
 ROUND = 0.035
 """Mean sine between normals and the planes through the axis up to which an object counts as turned on a lathe."""
+MEETS, MOST, USUAL = 0.15, 0.75, 0.06
+"""Sine at which a normal still meets the axis, and the least share that must, and their largest median sine, for an
+object that is mostly of the lathe."""
+ASTRAY = 0.03
+"""What of its front may lie beside the mask or before the front after half a turn, as a part of its size."""
 BEHIND = (0.1, 0.3, 0.5)
 """Where the axis is first looked for, behind the middle of the front, in units of the object's size."""
 REACH = 1.5
@@ -41,6 +49,8 @@ class Lathed:
     """Mean sine between visible normals and planes through the axis; of an outline, its part not in its image."""
     axis: Axis
     profile: Profile
+    whole: bool = True
+    """Whether the profile is the whole object; else it only tells how far back most of it reaches."""
 
     def body(self, camera: Camera, *, wall: float | None = None) -> Shell:
         """The closed object; with `wall`, its thickness in scene units, a hollow one."""
@@ -50,7 +60,7 @@ class Lathed:
 def lathed(
     depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
 ) -> Lathed | None:
-    """An object that was turned on a lathe, or None where its normals do not meet one axis, or no one profile fits.
+    """An object that was turned on a lathe, all or most of it, or None where normals do not meet one axis.
 
     Args:
         depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
@@ -68,13 +78,22 @@ def lathed(
     fit = Fit(depth, normal, inside, depth, rays, None if up is None else np.asarray(up, np.float64))
     axis = _axis(fit)
     misfit = fit.unturned(axis)
-    if misfit > ROUND:
+    mostly = _mostly(fit, axis)
+    if misfit > ROUND and not mostly:
         return None
     front = np.asarray(depth, np.float64)
     profile = profile_of(front, np.asarray(normal, np.float64), inside, rays, axis, behind)
-    if profile is None or not profile.lines():
+    whole = misfit <= ROUND and fits(profile) and bool(profile.lines())
+    if not (whole or mostly):
         return None
-    return Lathed(thickness_of(profile, axis, front, inside, rays), misfit, axis, profile)
+    return Lathed(thickness_of(profile, axis, front, inside, rays), misfit, axis, profile, whole)
+
+
+def _mostly(fit: Fit, axis: Axis) -> bool:
+    """Whether most normals meet the axis, and half a turn brings the front behind itself."""
+    sines = fit.sines(axis)
+    meets = (sines < MEETS).mean() > MOST and np.median(sines) < USUAL
+    return bool(meets and fit.astray(axis) < ASTRAY)
 
 
 def _axis(fit: Fit) -> Axis:

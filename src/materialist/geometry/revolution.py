@@ -66,8 +66,8 @@ class Meridian:
 
 def profile_of(
     depth: Array, normal: Array, inside: Array, rays: Array, axis: Axis, behind: Array | None = None
-) -> Profile | None:
-    """The profile of an object turned around an axis, or None where no one profile fits what is seen.
+) -> Profile:
+    """The profile of an object turned around an axis.
 
     Args:
         depth: [H, W] planar depth of the front, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both
@@ -81,8 +81,12 @@ def profile_of(
     ground = ground_height(axis, behind, inside, rays) + AIR * high
     floor = low if axis.base and not np.isfinite(ground) else max(low - SUNK * high, ground)
     passed = _passed(depth, inside, rays, plane, (wide, high), cell)
-    profile = fitted(seen, plane.leaning(points, normal[inside]), passed, cell, floor)
-    return None if profile.off > OFF or profile.through > THROUGH else profile
+    return fitted(seen, plane.leaning(points, normal[inside]), passed, cell, floor)
+
+
+def fits(profile: Profile) -> bool:
+    """Whether one profile is all that is seen."""
+    return profile.off <= OFF and profile.through <= THROUGH
 
 
 def thickness_of(profile: Profile, axis: Axis, depth: Array, inside: Array, rays: Array) -> Array:

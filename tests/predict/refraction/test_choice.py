@@ -1,5 +1,7 @@
 """Which thickness is believed: the turned front for what looks the same from behind, the network for the rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -115,3 +117,17 @@ def test_without_weights_the_mirror_is_the_guess(monkeypatch, no_lathe):
     assert found.method in ("half-turn", "symmetry")
     assert np.abs(found.thickness.solid - true)[mask].sum() < 0.12 * true[mask].sum()
     assert (found.thickness.hollow == 0).all()
+
+
+def test_a_profile_of_most_of_an_object_tells_its_thickness_alone(network, monkeypatch):
+    depth, normal, mask, true = ball()
+    network((0.4 * true).astype(np.float32))
+    whole = choice.lathed(depth, normal, mask, CAMERA, up=LEVEL)
+    assert whole.whole
+    monkeypatch.setattr(choice, "lathed", lambda *_, **__: replace(whole, whole=False))
+    found = chosen(depth, normal, mask, up=LEVEL)
+    assert found.method == "lathe, in part" and found.thickness.lathe is None and found.thickness.back is None
+    np.testing.assert_array_equal(found.thickness.solid, whole.thickness)
+    monkeypatch.setattr(choice, "of_one_surface", lambda *_: False)
+    monkeypatch.setattr(choice, "outlined", lambda *_, **__: whole)
+    assert chosen(depth, normal, mask, up=LEVEL).method == "outline"  # all of it is better than most of it

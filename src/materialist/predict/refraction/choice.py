@@ -37,7 +37,7 @@ class Choice:
 
     thickness: Thickness
     method: str
-    """`lathe`, `outline`, `half-turn`, `network` or `symmetry`."""
+    """`lathe`, `lathe, in part`, `outline`, `half-turn`, `network` or `symmetry`."""
 
 
 def best_thickness(
@@ -66,12 +66,19 @@ def best_thickness(
     except WeightsError:
         mirrored = symmetric_thickness(front, normal, inside, camera)
         guess, method = Thickness(mirrored, np.zeros_like(mirrored)), "symmetry"
-    ways = [("lathe", lathed), ("outline", outlined)]
+    ways = {"lathe": lathed, "outline": outlined}
     if of_one_surface(depth, normal, inside, pixel_rays(camera)):
-        ways.pop()
-    for name, known in ways if prefer == "auto" else ():
-        if (found := known(front, normal, inside, camera, up=up, behind=behind)) is not None:
-            return Choice(replace(_as_thick(guess, found.thickness), lathe=found), name)
+        del ways["outline"]
+    part = None
+    for name, known in ways.items() if prefer == "auto" else ():
+        if (found := known(front, normal, inside, camera, up=up, behind=behind)) is None:
+            continue
+        thick = _as_thick(guess, found.thickness)
+        if found.whole:
+            return Choice(replace(thick, lathe=found), name)
+        part = Choice(thick, f"{name}, in part")
+    if part is not None:
+        return part
     turn = half_turn(front, normal, inside, guess.solid, camera, up=up)
     away = float(np.abs(turn.thickness - guess.solid)[inside].sum() / max(float(guess.solid[inside].sum()), 1e-9))
     believed = (turn.misfit < CERTAIN and away < FAR) or away < AGREE[method]
