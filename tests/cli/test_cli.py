@@ -243,6 +243,27 @@ def test_an_interrupt_from_the_keyboard_is_130_and_leaves_nothing(photo, tmp_pat
     assert os.listdir(tmp_path) == ["photo.png"]
 
 
+def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
+    """A real process that is told to end while it writes frames."""
+    script = (
+        "import sys, time\nimport numpy as np\nimport typer\n"
+        "from materialist.cli.outcome import run_to_exit_code\nfrom materialist.edit.frames import write_frames\n"
+        "app = typer.Typer()\n"
+        "def pictures():\n    yield np.full((16, 16, 3), 0.5, np.float32)\n"
+        "    sys.stderr.write('writing\\n'); sys.stderr.flush(); time.sleep(30)\n"
+        f"@app.command()\ndef go():\n    write_frames({str(tmp_path / 'frames')!r}, pictures())\n"
+        "sys.exit(run_to_exit_code(app, []))"
+    )
+    child = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
+    while "writing" not in child.stderr.readline():
+        assert child.poll() is None
+    assert os.listdir(tmp_path)
+    child.terminate()
+    _, err = child.communicate(timeout=20)
+    assert child.returncode == 143 and "Traceback" not in err
+    assert os.listdir(tmp_path) == []
+
+
 def test_a_photo_is_read_once_saved_scenes_keep_their_bytes(run, photo, tmp_path, monkeypatch):
     install(monkeypatch)
     run("invert", photo, "-o", tmp_path / "a.scene")

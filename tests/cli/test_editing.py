@@ -149,6 +149,8 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         ([*RELIGHT, "--lamp", "1,2,3,99999,1"], "99999"),
         ([*RELIGHT, "--rotate", "9", "--frames", "4"], ".mp4"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "1", "-o", "OUT"], "frames is 1"),
+        ([*RELIGHT, "--rotate", "9", "--gain", "2"], "--gain says nothing without --envmap"),
+        ([*RELIGHT, "--rotate", "9", "--sun-power", "2"], "--sun-power says nothing without --sun"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--full-render", "--spp", "0", "-o", "OUT"], "--spp"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--fps", "0", "-o", "OUT"], "--fps"),
         (["apply", "SCENE", "bad.yaml", "-o", "OUT.png"], "shininess"),

@@ -250,7 +250,7 @@ def _bad_files(folder):
     rng = np.random.default_rng(0)
     noise = rng.integers(0, 256, (64, 64, 3)).astype(np.uint8)
     made = {
-        "missing": (folder / "nothing.jpg", "no photo at"),
+        "missing": (folder / "nothing.jpg", "no picture at"),
         "folder": (folder, "is a folder"),
     }
 

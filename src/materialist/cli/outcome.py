@@ -1,14 +1,19 @@
 """How a command ends: the one place where exceptions become exit codes and the last line of --json is written.
 
-0 done; 2 bad input or setup (one sentence on stderr); 130 interrupted; 1 a bug of ours (with the traceback).
+0 done; 2 bad input or setup (one sentence on stderr); 130 interrupted; 143 terminated; 1 a bug of ours (with the
+traceback).
 """
 
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import typer
@@ -16,14 +21,17 @@ import typer
 from materialist.errors import MaterialistError
 from materialist.plain import plain
 
-OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK, BUG, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+GRACE = 5.0
+"""Seconds in which a command that is told to end may take its unfinished files away."""
 
 
 def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code; no exception leaves except SystemExit of a signal."""
     wants_json = "--json" in arguments
     try:
-        result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
+        with _tidy_when_terminated():
+            result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
         if result == INTERRUPTED:  # how some versions of typer report Ctrl-C
             raise KeyboardInterrupt
         return result if isinstance(result, int) else OK
@@ -44,6 +52,29 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         traceback.print_exc()
         message = f"This is a bug in Materialist, not your mistake: please report it with the lines above ({error})."
         return _fail(type(error).__name__, message, BUG, wants_json)
+
+
+@contextmanager
+def _tidy_when_terminated() -> Iterator[None]:
+    """Within it SIGTERM ends the command as an exception does, so that nothing half-written stays; soon in any case."""
+
+    def stop(number: int, frame: Any) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        last = threading.Timer(GRACE, os._exit, (TERMINATED,))  # a renderer deep in its work hears nothing
+        last.daemon = True
+        last.start()
+        raise SystemExit(TERMINATED)
+
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGTERM) is stop:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:

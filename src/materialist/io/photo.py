@@ -54,7 +54,7 @@ def decode_photo(file: Path) -> Decoded:
     if file.is_dir():
         raise InputError(f"{file} is a folder; give one photo in it.")
     if not file.exists():
-        raise InputError(f"There is no photo at {file}.")
+        raise InputError(f"There is no picture at {file}.")
     if file.is_file() and file.stat().st_size == 0:
         raise InputError(f"{file} is empty (0 bytes); copy it again.")
     decoded = decode(file)
