@@ -9,7 +9,19 @@ from typing import Any
 
 from materialist.errors import InputError
 
-BENCHMARKS = ("invert", "batch", "light", "materials", "whdr", "predictor", "thickness", "glass", "edit", "studio")
+BENCHMARKS = (
+    "invert",
+    "batch",
+    "light",
+    "materials",
+    "whdr",
+    "predictor",
+    "thickness",
+    "select",
+    "glass",
+    "edit",
+    "studio",
+)
 
 
 def run(name: str, *, output: str | Path, data: str | Path | None = None, force: bool = False, **options: Any) -> Path:

@@ -40,6 +40,8 @@ class SyntheticSample:
     render: Callable[..., Array]
     """render(envmap, spp=256, seed=0) -> [H, W, 3] float32 linear, unclipped: the true scene under another light."""
     name: str = ""
+    things: tuple[Array, ...] = ()
+    """[H, W] bool masks of the objects that are seen, ground and walls left out."""
 
 
 def make_sample(
@@ -69,8 +71,9 @@ def make_sample(
     name = f"scene {scene_index} view {view_index} light {light_index}"
     photo = Photo(linear=linear, camera=truth_scene.camera, original=linear, fov_source="option", path=name)
     return SyntheticSample(
-        photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene.render, name=name
-    )
+        photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene.render, name=name,
+        things=truth_scene.things,
+    )  # fmt: skip
 
 
 def _photo_seed(*index: int) -> int:
@@ -130,6 +133,8 @@ class TrueScene:
         """Depth and normal at pixel centres; albedo averaged over sub x sub places on the object at the centre."""
         centre = self._probe((0.5, 0.5))
         item = centre["item"]
+        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
+        self.things = tuple(item == k for k in np.unique(item[item >= 0]) if k not in flat)
         total, count = np.zeros((*item.shape, 3)), np.zeros((*item.shape, 1))
         for place in np.ndindex(sub, sub):
             part = self._probe(tuple((np.array(place) + 0.5) / sub))

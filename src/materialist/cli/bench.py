@@ -23,7 +23,8 @@ def bench(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="NAME", help="invert, batch, light, materials, whdr, predictor, thickness, glass, edit, studio."
+            metavar="NAME",
+            help="invert, batch, light, materials, whdr, predictor, thickness, select, glass, edit, studio.",
         ),
     ],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],

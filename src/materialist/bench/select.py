@@ -1,0 +1,91 @@
+"""`bench select`: how well one click finds the object that it is on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.bench.report import Column, Report, write
+from materialist.bench.synthetic import SyntheticSample, make_sample
+from materialist.errors import InputError
+from materialist.types import Array, Prediction, Scene
+
+NOTE = """Synthetic pictures whose objects are known (those of `bench light`); two clicks on every object of at least
+400 pixels, one in its middle and one anywhere. `bundled` maps are the bundled network's, `true` ones the truth. IoU is
+intersection over union with the object's mask; `good` and `lost` are the shares of clicks above 0.8 and below 0.3."""
+COLUMNS = (
+    Column("iou", "IoU", "higher"),
+    Column("good", "good", "higher", 2),
+    Column("lost", "lost", "lower", 2),
+)
+LEAST = 400
+"""Pixels of an object that is clicked on."""
+INSIDE = 2.5
+"""Pixels from an object's border at which it is clicked on anywhere."""
+SPP = 100
+"""Samples a pixel of the pictures."""
+
+
+def run(
+    *, data: Path | None, output: Path, scenes: int = 12, size: int = 256, seed: int = 3, device: str = "auto"
+) -> None:
+    """Score one click on the objects of `scenes` pictures, and of as many with captured meshes where DATA is given.
+
+    Raises InputError for counts below 1.
+    """
+    if scenes < 1 or not 64 <= size <= 2048:
+        raise InputError(f"scenes is {scenes} and the size {size}; give at least 1, and 64 to 2048.")
+    from materialist.predict.bundled.predictor import BundledPredictor
+    from materialist.render.variant import setup
+
+    setup(device)
+    rows: list[dict[str, Any]] = []
+    settings = {"scenes": scenes, "size": size, "seed": seed, "data": data is not None}
+    report = Report("Objects by one click", NOTE, settings, COLUMNS, rows, plotted=("iou",))
+    predictor = BundledPredictor()
+    for folder in (None,) if data is None else (None, data):
+        for k in range(scenes):
+            sample = make_sample(k, 1, k, size=size, data=folder, seed=seed, spp=SPP)
+            kind = "captured" if folder else "procedural"
+            for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
+                rows += _rows(sample, _scene(sample, found), f"{maps} maps", f"{kind} {sample.name}", k)
+    write(report, output)
+
+
+def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[int, int]]:
+    """Two (column, row) in a mask [H, W] bool: its middle, and any place a little inside; both `usable` [H, W] bool."""
+    from scipy.ndimage import distance_transform_edt
+
+    away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
+    places = [np.argwhere(away == away.max()), np.argwhere((away > INSIDE) & usable)]
+    chosen = [places[0][0], *([places[1][rng.integers(len(places[1]))]] if len(places[1]) else [])]
+    return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
+
+
+def _rows(sample: SyntheticSample, scene: Scene, maps: str, name: str, number: int) -> list[dict[str, Any]]:
+    """A row a click."""
+    from materialist.edit.select import select
+
+    rows = []
+    for j, mask in enumerate(sample.things):
+        if mask.sum() < LEAST:
+            continue
+        for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
+            found = select(scene, click=click)
+            iou = float((found & mask).sum() / (found | mask).sum())
+            row = {"method": maps, "sample": f"{name} object {j} click {k}", "iou": iou}
+            rows.append(row | {"good": float(iou > 0.8), "lost": float(iou < 0.3)})
+    return rows
+
+
+def _scene(sample: SyntheticSample, found: Prediction) -> Scene:
+    """A scene before it is fitted: a selection looks at the photo and its maps."""
+    from materialist.geometry.build import build_geometry
+
+    return Scene(
+        camera=sample.photo.camera, photo=sample.photo, prior=found, materials=found.materials, normal=found.normal,
+        depth=found.depth, geometry=build_geometry(found.depth, found.normal, sample.photo.camera, completion="none"),
+        envmap=sample.envmap, rerender=sample.photo.linear,
+    )  # fmt: skip
