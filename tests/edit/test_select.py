@@ -8,8 +8,8 @@ from edit_scenes import flat_scene
 from PIL import Image
 
 from materialist.camera import unproject
-from materialist.edit.objects import borne_out, contrast
-from materialist.edit.select import select
+from materialist.edit.objects import borne_out, contrast, convexity, edge_map
+from materialist.edit.select import Features, select
 from materialist.errors import InputError, MaterialistError
 from materialist.types import Camera
 
@@ -130,3 +130,20 @@ def test_contrast_sees_colour_through_texture():
     right = contrast(x < 30, lab)
     wrong = contrast(x < 15, lab)
     assert right[20, 28:32].min() > 0.8 and wrong[20, 13:17].max() < 0.2
+
+
+def test_the_edge_of_a_box_is_inside_it_and_its_foot_is_not():
+    """One turn of the surface, seen as an edge of a thing and as the corner between a thing and the ground."""
+    rows = np.arange(48)[:, None] + 0 * np.arange(40)
+    up, ahead = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+    strength = {}
+    for name, above, below in (("convex", up, ahead), ("concave", ahead, up)):
+        normal = np.where((rows < 24)[..., None], above, below).astype(np.float32)
+        turns = convexity(normal)
+        # A right angle turns as much towards the viewer as upwards.
+        assert turns[22:26].max() == pytest.approx(0.5**0.5 * (name == "convex"), abs=1e-5) and turns[:20].max() == 0
+        # The photo has an edge there, too, so that the shape's is believed.
+        linear = np.where((rows < 24)[..., None], 0.5, 0.2).repeat(3, -1).astype(np.float32)
+        features = Features(linear, np.full(rows.shape, 2.0, np.float32), normal)
+        strength[name] = edge_map(features)[22:26].max()
+    assert strength["concave"] > 1.5 * strength["convex"]

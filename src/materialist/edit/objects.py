@@ -10,6 +10,8 @@ from materialist.types import Array
 
 _COLOUR, _STEP, _CREASE = 12.0, 0.03, 0.35
 """A full edge: Lab distance between neighbours, share of a jump of depth beyond the slope, 1 - cos of a turn."""
+_SHADED = 0.3
+"""What a change of lightness still counts, squared, where a surface turns away from itself: most of it is shading."""
 _MOST = 3.0
 """Strength at which an edge counts no more."""
 _FLOOR = 0.01
@@ -50,13 +52,30 @@ def edge_map(features, kind: str = "plain") -> Array:
     lab = np.asarray(cv2.GaussianBlur(lab, (0, 0), 2.5) * 2 if kind == "coarse" else cv2.bilateralFilter(lab, 5, 12, 2))
     if kind == "chroma":
         lab = lab * np.array([0.25, 1.5, 1.5], np.float32)
-    colour = np.sqrt(sum(_gradient(lab[..., c]) ** 2 for c in range(3))) / _COLOUR
+    crease = sum(_gradient(features.normal[..., c]) ** 2 for c in range(3)) / 2 / _CREASE
+    convex = convexity(features.normal)
+    shaded = cv2.dilate((convex * np.minimum(crease, 1)).astype(np.float32), np.ones((3, 3), np.uint8))
+    light, chroma = _gradient(lab[..., 0]) ** 2, sum(_gradient(lab[..., c]) ** 2 for c in (1, 2))
+    colour = np.sqrt(light * (1 - (1 - _SHADED) * shaded) + chroma) / _COLOUR
     safe = np.where(features.surface, features.depth, 1.3 * features.depth.max())
     inverse = 1 / np.maximum(safe, 1e-9)  # planar in the picture for a plane, so that its second difference is a step
     step = _second(inverse) / np.maximum(inverse, 1e-12) / _STEP
-    crease = sum(_gradient(features.normal[..., c]) ** 2 for c in range(3)) / 2 / _CREASE
-    shape = np.sqrt(np.minimum(step, _MOST) ** 2 + 0.5 * crease)
+    shape = np.sqrt(np.minimum(step, _MOST) ** 2 + 0.5 * crease * (1 - convex))
     return (np.minimum(colour, _MOST) + borne_out(shape, colour) * shape).astype(np.float32)
+
+
+def convexity(normal: Array) -> Array:
+    """[H, W] in [0, 1]: what part of the turn of normals [H, W, 3] is away from each other, in the picture's plane.
+
+    It is large at the edges of a box, 0 between a thing and what it stands on, and where nothing turns. Things
+    end in concave creases and in steps of the depth; their convex edges are inside them.
+    """
+    import cv2
+
+    change = lambda v, x, y: cv2.Sobel(np.ascontiguousarray(v, np.float32), cv2.CV_32F, x, y, ksize=3, scale=1 / 4)  # noqa: E731
+    apart = change(normal[..., 0], 1, 0) - change(normal[..., 1], 0, 1)  # rows go down, Y goes up
+    turn = np.sqrt(sum(_gradient(normal[..., c]) ** 2 for c in range(3)))
+    return np.clip(apart / np.maximum(turn, 1e-6), 0, 1)
 
 
 def borne_out(shape: Array, colour: Array) -> float:
