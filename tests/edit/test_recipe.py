@@ -76,10 +76,6 @@ def test_click_box_and_sun(folder):
         ("- relight: {sun: [1, 2, 3]}", "sun"),
         ("- relight: {lamps: [[1, 2, 3]]}", "lamp"),
         ("- relight: now", "no options"),
-        ("- relight: {}", "changes nothing; give some of envmap"),
-        ("- relight: {rotate: 10, gain: 2}", "gain without envmap"),
-        ("- relight: {rotate: 10, sun_power: 2}", "sun_power without sun"),
-        ("- edit: {mask: block.png}", "changes nothing; give some of hue"),
     ],
 )
 def test_what_is_wrong_is_named(folder, text, words):

@@ -1,7 +1,7 @@
 """How a command ends: the one place where exceptions become exit codes and the last line of --json is written.
 
-0 done; 2 bad input or setup (one sentence on stderr); 130 interrupted; 143 terminated; 1 a bug of ours (with the
-traceback).
+0 done; 2 bad input or setup (one sentence on stderr); 130 interrupted; 1 a bug of ours (with the traceback). A command
+that is terminated tidies up and dies by that signal.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import typer
 from materialist.errors import MaterialistError
 from materialist.plain import plain
 
-OK, BUG, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 GRACE = 5.0
 """Seconds in which a command that is told to end may take its unfinished files away."""
 
@@ -39,6 +39,9 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         return _fail(type(error).__name__, str(error), error.exit_code, wants_json)
     except (KeyboardInterrupt, typer.Abort):
         return _fail("Interrupted", "Interrupted; nothing was written.", INTERRUPTED, wants_json)
+    except _Terminated:
+        os.kill(os.getpid(), signal.SIGTERM)
+        return BUG  # not reached
     except typer.Exit as stop:
         return stop.exit_code
     except BrokenPipeError:  # the reader of a pipe left, as `head` does
@@ -54,16 +57,20 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         return _fail(type(error).__name__, message, BUG, wants_json)
 
 
+class _Terminated(BaseException):
+    """SIGTERM, as an exception."""
+
+
 @contextmanager
 def _tidy_when_terminated() -> Iterator[None]:
     """Within it SIGTERM ends the command as an exception does, so that nothing half-written stays; soon in any case."""
 
     def stop(number: int, frame: Any) -> None:
         signal.signal(number, signal.SIG_DFL)
-        last = threading.Timer(GRACE, os._exit, (TERMINATED,))  # a renderer deep in its work hears nothing
+        last = threading.Timer(GRACE, os.kill, (os.getpid(), number))  # a renderer deep in its work hears nothing
         last.daemon = True
         last.start()
-        raise SystemExit(TERMINATED)
+        raise _Terminated
 
     here = threading.current_thread() is threading.main_thread()
     if not here or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:

@@ -144,8 +144,6 @@ def _region(scene: Scene, step: Step):
 
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    if not any(name in given for name in MATERIAL):
-        raise InputError(f"It changes nothing; give some of {', '.join(MATERIAL)}.")
     region = _region(scene, step)
     options: dict[str, Any] = {
         k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
@@ -162,11 +160,6 @@ def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    if not any(name in given for name in LIGHT):
-        raise InputError(f"It changes nothing; give some of {', '.join(LIGHT)}.")
-    for name, needed in (("gain", "envmap"), ("sun_power", "sun")):
-        if name in given and needed not in given:
-            raise InputError(f"It has {name} without {needed}, which it belongs to.")
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
     if "envmap" in given:
         options["envmap"] = read_envmap(_file(step, "envmap"))
