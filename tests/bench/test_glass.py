@@ -47,7 +47,7 @@ def test_without_refraction_both_models_show_the_background(scene, mitsuba):
     behind = models.true_background(scene, room, envmap)
     mask = scene.mask
     true = Thickness(scene.front.thickness, scene.front.thickness)
-    bent = models.two_interface(scene, scene.front.thickness, behind, envmap, 1.0 + 1e-6)
+    bent = models.two_interface(scene, true, behind, envmap, 1.0 + 1e-6)
     traced = models.closed_proxy(scene, true, behind, envmap, 1.0 + 1e-4, spp=16)
     assert np.abs(bent - room)[mask].mean() < 0.02 * room[mask].mean()
     # Sampled at random places of a pixel, a fine pattern is another one, but no brighter or darker.

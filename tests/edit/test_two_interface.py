@@ -129,8 +129,42 @@ def test_transmission_and_tint_scale_what_is_behind():
     depth, normal, mask, cosine = ball(CAMERA)
     arguments = (CAMERA, normal, depth, mask, 1.2 * cosine, np.full(SHAPE, 6.0), gradient(CAMERA), np.zeros((8, 16, 3)))
     clear = ti.two_interface(*arguments, ior=1.3)
+    mirror = ti.two_interface(*arguments, ior=1.3, transmission=0)
     dim = ti.two_interface(*arguments, ior=1.3, transmission=0.5, tint=(1, 0.5, 0))
-    np.testing.assert_allclose(dim, clear * [0.5, 0.25, 0], atol=1e-6)
+    np.testing.assert_allclose(dim - mirror, (clear - mirror) * [0.5, 0.25, 0], atol=1e-6)
+    assert np.median(mirror[mask]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
+
+
+def test_the_front_reflects_what_is_behind_where_its_reflection_meets_that():
+    """A pane that leans away: its mirror image is the right border of the background, not the environment."""
+    depth, normal, mask, thick = pane(CAMERA, 0.1, tilt=1.2)
+    middle = SHAPE[0] // 2, SHAPE[1] // 2
+    mask = mask & (depth > 0) & (depth < 5)
+    arguments = (CAMERA, normal, depth, mask, thick, np.full(SHAPE, 6.0), gradient(CAMERA), np.zeros((8, 16, 3)))
+    seen = ti.two_interface(*arguments, ior=1.5, transmission=0)[middle]
+    cosine = -normal[middle] @ ti._unit(pixel_rays(CAMERA).astype(float)[middle])
+    share = float(ti.fresnel_dielectric(np.array([cosine]), 1.5)[0])
+    assert mask[middle] and seen[0] == pytest.approx(share * (1 - 0.5 / SHAPE[1]), rel=0.02)
+
+
+def test_a_known_back_is_left_where_rays_meet_it():
+    """A ball with the normals of its back: every refracted ray leaves on the ball, wherever it went in."""
+    camera = Camera(96, 80, 40)
+    depth, normal, mask, cosine = ball(camera)
+    centre, rays = np.array([0, 0, -3.0]), pixel_rays(camera).astype(float)
+    thick = np.where(mask, 1.2 * cosine, 0)
+    far = rays * (depth + thick / np.linalg.norm(rays, axis=-1))[..., None]
+    back = np.where(mask[..., None], ti._unit(far - centre), [0, 0, -1.0])
+    inside = mask & (cosine > 0.4)  # at the border the depth map of the back ends
+    front = ti.Front(camera, normal, depth, inside, back, thick)
+    crossing = ti.cross(front, thick[inside], ior=1.5)
+    off = np.abs(np.linalg.norm(crossing.exit - centre, axis=-1) - 0.6)
+    assert np.median(off) < 0.003 and np.percentile(off, 95) < 0.03
+    guessed = ti.cross(ti.Front(camera, normal, depth, inside, back), thick[inside], ior=1.5)
+    assert np.median(np.abs(np.linalg.norm(guessed.exit - centre, axis=-1) - 0.6)) > 4 * np.median(off)
+    same = ti.back_of(depth, mask, thick, None, camera)
+    assert np.degrees(np.arccos(np.clip((same * back).sum(-1), -1, 1)))[inside].mean() < 3
+    assert ti.back_of(depth, mask, thick, back, camera) is back
 
 
 def test_rough_glass_blurs():

@@ -183,7 +183,7 @@ def compared(
         if source in d:
             leaning = replace(d[source], back=scene.front.back)
             add(f"closed, {source} d, true back", _closed(case, leaning, behind["true"], spp), leaning)
-    same = models.two_interface(scene, d[best].solid, behind["true"], case.envmap, case.ior, back="same")
+    same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
     add(f"two_interface, {best} d, back normal = front normal", same, d[best])
     rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
     order = ("two_interface, true d", f"two_interface, {best} d", f"closed, {best} d", f"closed, {best} d, inpainted")
@@ -191,7 +191,7 @@ def compared(
 
 
 def _two_interface(case: Case, found: Thickness, behind: Background, spp: int) -> Array:
-    return models.two_interface(case.scene, found.solid, behind, case.envmap, case.ior)
+    return models.two_interface(case.scene, found, behind, case.envmap, case.ior)
 
 
 def _closed(case: Case, found: Thickness, behind: Background, spp: int) -> Array:
@@ -202,12 +202,15 @@ Model = Callable[[Case, Thickness, Background, int], Array]
 
 
 def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, seed: int) -> list[dict[str, Any]]:
-    """Rows of the two-interface model with thickness d (1 + e) (paper, Sensitivity Analysis of d)."""
+    """Rows of the two-interface model with thickness d (1 + e) (paper, Sensitivity Analysis of d).
+
+    As there, the back's normal is the front's: the row to compare with is that of the same assumption.
+    """
     rng = np.random.default_rng([seed, 10, *case.name.encode()])
     rows = []
     for k in range(draws):
         noisy = replace(d, solid=d.solid * (1 + rng.uniform(-NOISE, NOISE)))
-        picture = _two_interface(case, noisy, behind, 1)
+        picture = models.two_interface(case.scene, noisy, behind, case.envmap, case.ior, back="same")
         row = {"method": "two_interface, noise on d", "sample": f"{case.name} draw {k}"}
         rows.append({**row, **figures(case, picture, noisy)})
     return rows

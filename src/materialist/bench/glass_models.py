@@ -62,15 +62,20 @@ def _grown(mask: Array) -> Array:
 
 
 def two_interface(
-    scene: GlassScene, thickness: Array, behind: Background, envmap: Array, ior: float, back: str | Array = "mirrored"
+    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, back: str = ""
 ) -> Array:
-    """[H, W, 3] linear, inside the object's mask: the paper's model."""
+    """[H, W, 3] linear, inside the object's mask: the paper's model, with the back as it is known, or an assumed one.
+
+    back: one of `edit.two_interface.BACKS`, or "" for what is known.
+    """
+    from materialist.edit.two_interface import back_of
     from materialist.edit.two_interface import two_interface as model
 
     front = scene.front
+    known = back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
     return model(
-        scene.camera, front.normal, front.depth, scene.mask, thickness, behind.depth, behind.picture, envmap, ior=ior,
-        back=back,
+        scene.camera, front.normal, front.depth, scene.mask, found.solid, behind.depth, behind.picture, envmap, ior=ior,
+        back=back or known,
     )  # fmt: skip
 
 

@@ -97,11 +97,12 @@ def _two_interface(
 ) -> Scene:  # fmt: skip
     """The removed scene with the paper's picture of the glass in its photo."""
     from materialist.edit.background import resized
-    from materialist.edit.two_interface import two_interface
+    from materialist.edit.two_interface import back_of, two_interface
 
     picture = two_interface(
         scene.camera, scene.normal, scene.depth, own, found.solid, removed.depth, removed.photo.linear, scene.envmap,
         ior=ior, transmission=transmission, tint=tint, roughness=roughness,
+        back=back_of(scene.depth, own, found.solid, found.back, scene.camera),
     )  # fmt: skip
     photo = removed.photo
     if transmission < 1:

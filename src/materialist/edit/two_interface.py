@@ -6,6 +6,9 @@ d1, leaves through a back whose normal is the front's at the exit's place in the
     x2 = x + d1 omega_t1 + d2 omega_t2,
 
 whose screen position S(x2) says what of the background is seen. Light inside the object is followed no further.
+
+Where more is known of the back than that, its own normals take the front's place, and a ray leaves where it meets it.
+What is reflected at the front is followed to the background, too, and to the environment map from there.
 """
 
 from __future__ import annotations
@@ -19,10 +22,13 @@ from materialist.camera import pixel_rays, project
 from materialist.edit.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
 from materialist.errors import InputError
 from materialist.geometry.symmetry import surface_in
+from materialist.geometry.tangents import back_normals
 from materialist.types import Array, Camera
 
 BACKS = ("mirrored", "same")
 """What the back's normal is: the front's mirrored at the picture plane (lenses, vases), or its opposite (panes)."""
+LONGEST = 3.0
+"""Longest way through the object, in units of its largest thickness."""
 STEPS = 96
 """Places along a ray where it is compared with the background's depth."""
 SAMPLES = 24
@@ -69,13 +75,14 @@ def two_interface(
         camera: its size is that of all maps.
         normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
         mask: [H, W] bool or weights.
-        thickness: [H, W] scene units, d1: how far rays go inside; >= 0.
+        thickness: [H, W] scene units, >= 0: along the camera ray; of a back without normals of its own also d1.
         background_depth: [H, W] planar depth without the object, 0 for sky.
         background: [H, W, 3] linear radiance without the object.
         envmap: [h, 2h, 3] linear radiance: reflections, and what rays meet that leave the picture.
         ior: index of refraction, 1 to 3. transmission: T in [0, 1]. tint: linear RGB in [0, 1].
         roughness: perceptual r in [0, 1]; alpha = r^2.
-        back: see BACKS; or the back's own outward normals [H, W, 3], unit, read at the exit's place in the picture.
+        back: see BACKS; or the back's own outward normals [H, W, 3], unit, read at the exit's place in the picture:
+            then d1 is the way to the surface that `thickness` tells.
 
     Returns:
         [H, W, 3] float32 linear radiance inside the mask, 0 outside.
@@ -91,33 +98,55 @@ def two_interface(
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
     behind = Behind(background, background_depth, envmap)
-    front = Front(camera, normal, depth, inside, own)
+    front = Front(camera, normal, depth, inside, own, None if own is None else thickness)
     count = SAMPLES if roughness > 0 else 1
     total = np.zeros((int(inside.sum()), 3))
     for k in range(count):
         crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
         seen = crossing.share[:, None] * look(crossing.exit, crossing.direction, behind, camera)
-        mirror = crossing.reflectance[:, None] * environment(crossing.reflected, envmap)
+        mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
         total += seen * transmission * np.asarray(tint, float) + mirror
     result = np.zeros((*inside.shape, 3), np.float32)
     result[inside] = total / count
     return result
 
 
-class Front:
-    """The visible surface of the object: its points, and its normals also just outside the mask; its back, if known."""
+def back_of(depth: Array, own: Array, thickness: Array, back: Array | None, camera: Camera) -> Array:
+    """[H, W, 3] unit outward normals of an object's back: those that are known, or those of its depth.
 
-    def __init__(self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None):
+    depth: [H, W] planar, of the front. own: [H, W] bool. thickness: [H, W] along the camera rays.
+    """
+    if back is not None:
+        return back
+    rays = pixel_rays(camera).astype(np.float64)
+    return back_normals(depth + thickness / np.linalg.norm(rays, axis=-1), own, rays).astype(np.float32)
+
+
+class Front:
+    """The visible surface of the object: its points, and its normals also just outside the mask; its back, if known.
+
+    back: [H, W, 3] its own outward normals. thickness: [H, W] along the camera rays, for `way`.
+    """
+
+    def __init__(
+        self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None,
+        thickness: Array | None = None,
+    ):  # fmt: skip
         from scipy.ndimage import distance_transform_edt
 
         self.camera = camera
-        rays = pixel_rays(camera).astype(np.float64)[inside]
+        all_rays = pixel_rays(camera).astype(np.float64)
+        rays = all_rays[inside]
         self.point = rays * depth[inside][:, None]  # [N, 3] x
-        self.direction = rays / np.linalg.norm(rays, axis=-1, keepdims=True)  # [N, 3]
+        self.direction = _unit(rays)  # [N, 3]
         self.normal = _facing(normal[inside].astype(np.float64), self.direction)  # [N, 3]
         rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
         self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
         self._backs = None if back is None else back[rows, columns].astype(np.float64)
+        self._ends: Array | None = None
+        if thickness is not None:
+            ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
+            self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
 
     def normal_at(self, point: Array) -> Array:
         """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
@@ -129,6 +158,13 @@ class Front:
             return self._read(self._backs, point)
         front = self.normal_at(point)
         return -front if kind == "same" else reflect(front, _unit(point))
+
+    def way(self, inner: Array, d1: Array) -> Array:
+        """[N] d1 of rays of unit directions [N, 3] inside: to the back where it is known, else d1 [N] as it is."""
+        if self._ends is None:
+            return d1
+        found = background_distance(self.point, inner, self._ends, self.camera)
+        return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
 
     def _read(self, normals: Array, point: Array) -> Array:
         place, _ = project(point, self.camera)
@@ -150,7 +186,7 @@ def cross(
     inner, _ = refract(front.direction, facet, 1 / ior)
     reflectance = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
     share = (1 - reflectance) * _unmasked(inner, front.normal, alpha, below=True)
-    exit_point = front.point + d1[:, None] * inner
+    exit_point = front.point + front.way(inner, d1)[:, None] * inner
     outward = front.back_at(exit_point, back)
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
     against = -_facing(outward, -inner)
