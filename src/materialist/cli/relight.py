@@ -72,10 +72,10 @@ def relight(
 
     if envmap is None and rotate is None and not sun and not lamp and (ambient, dim, frames) == (1.0, None, None):
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
-    for given, name, needed in ((gain != "auto" and envmap is None, "--gain", "--envmap"), (
-        sun_power != 1.0 and not sun, "--sun-power", "--sun")):  # fmt: skip
-        if given:
-            raise InputError(f"{name} says nothing without {needed}; give that, too, or leave {name} out.")
+    alone = "--gain" if gain != "auto" and envmap is None else "--sun-power" if sun_power != 1.0 and not sun else ""
+    if alone:
+        needed = {"--gain": "--envmap", "--sun-power": "--sun"}[alone]
+        raise InputError(f"{alone} says nothing without {needed}; give that, too, or leave {alone} out.")
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
     if frames is None:

@@ -108,7 +108,7 @@ def _labels(known: Array, hole: Array, inverse: Array, rays: Array, ends: dict[i
     kept = kinds[shares >= LEAST] if (shares >= LEAST).any() else kinds[count.argmax()][None]
     loose = ring & (known == LOOSE)
     near = {int(k): ends[int(k)] for k in kept[kept >= 0]}
-    firm = kept if _is_background(known, loose, inverse, rays, near) else kept[kept != LOOSE]
+    firm = kept if _is_background(np.where(hole, SKY, known), loose, inverse, rays, near) else kept[kept != LOOSE]
     if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= FIRM:
         kept = firm
     indicator = np.stack([known == k for k in kept], -1).astype(np.float32)
