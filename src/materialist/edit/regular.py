@@ -106,7 +106,7 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
 
 
 def _foretold(features: Array, plane: Surface, shifts: Array, camera: Camera) -> float:
-    """What the pattern says wrongly of places that are known, relative to what their neighbourhood's mean does."""
+    """What the pattern says wrongly of places that are known, relative to the plane's median colour."""
     rows, columns = np.nonzero(plane.known)
     part = np.random.default_rng(0).permutation(len(rows))[:TESTED]
     at = rows[part], columns[part]
