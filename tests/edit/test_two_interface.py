@@ -112,7 +112,7 @@ def test_a_ball_lens_turns_the_background_round():
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
-def test_no_light_is_made(roughness):
+def test_no_light_is_made_or_lost(roughness):
     depth, normal, mask, cosine = ball(CAMERA)
     white = np.ones((*SHAPE, 3))
     out = ti.two_interface(
@@ -120,9 +120,8 @@ def test_no_light_is_made(roughness):
         roughness=roughness,
     )  # fmt: skip
     assert (out[mask] <= 1 + 1e-6).all()
-    # Straight through the middle a smooth ball loses what is reflected twice: (1 - 0.04)^2 + 0.04.
-    if roughness == 0:
-        assert out[20, 24].tolist() == pytest.approx([0.9616] * 3, abs=2e-3)
+    # In a white room clear glass is white, whatever it does: what stays inside at the back leaves elsewhere.
+    np.testing.assert_allclose(out[mask], 1, atol=1e-6)
 
 
 def test_transmission_and_tint_scale_what_is_behind():

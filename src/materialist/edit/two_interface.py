@@ -5,7 +5,8 @@ d1, leaves through a back whose normal is the front's at the exit's place in the
 
     x2 = x + d1 omega_t1 + d2 omega_t2,
 
-whose screen position S(x2) says what of the background is seen. Light inside the object is followed no further.
+whose screen position S(x2) says what of the background is seen. Light that stays inside there is followed no further:
+it leaves elsewhere, and is taken to be the mean of what is seen through the object, so that no light is lost.
 
 Where more is known of the back than that, its own normals take the front's place, and a ray leaves where it meets it.
 What is reflected at the front is followed to the background, too, and to the environment map from there.
@@ -103,7 +104,9 @@ def two_interface(
     total = np.zeros((int(inside.sum()), 3))
     for k in range(count):
         crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
-        seen = crossing.share[:, None] * look(crossing.exit, crossing.direction, behind, camera)
+        through = look(crossing.exit, crossing.direction, behind, camera)
+        inside_still = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
+        seen = crossing.share[:, None] * through + inside_still * through.mean(0)
         mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
         total += seen * transmission * np.asarray(tint, float) + mirror
     result = np.zeros((*inside.shape, 3), np.float32)
