@@ -69,7 +69,6 @@ def test_a_table_ends_where_it_is_seen_to_end():
     """Nothing but the table is a plane: it does not go on to the horizon behind what stands on it."""
     depth, normal, plane = table()
     hole = disc(36, 40, 13)
-    # What stands there is flat, too, and was taken for a part of the table: it tells nothing of where that ends.
     found = behind(np.where(hole, 1.2, depth), normal, np.where(hole, 0, plane), hole, np.where(hole, 1.2, 0), CAMERA)
     assert (plane[hole] == LOOSE).sum() > 100
     assert (found.label != plane)[hole].mean() < 0.06

@@ -92,17 +92,18 @@ def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
     """[H, W] sources of the hidden pixels of one plane, -1 for none."""
     frame = _Frame(plane)
     window, seen, sharp = frame.straight(features, plane.known, camera)
-    detail = _detail(window, seen)
+    detail, found = _detail(window, seen), np.full(plane.known.shape, -1)
     if seen.sum() < KNOWN or np.sqrt((detail**2)[seen].mean()) < FEATURED:
-        return np.full(plane.known.shape, -1)
+        return found
     shifts = _shifts(detail, sharp) * frame.cell @ frame.axes
-    found = np.full(plane.known.shape, -1)
-    if _foretold(features, plane, shifts, camera) > SKILL:
+    if not len(shifts) or _foretold(features, plane, shifts, camera) > SKILL:
         return found
     rows, columns = np.nonzero(plane.hidden)
-    hidden = rows, columns
-    found[hidden] = _repeated(features, plane, hidden, shifts, camera)
-    return found if (found[hidden] >= 0).mean() > ENOUGH else np.full(plane.known.shape, -1)
+    told = _repeated(features, plane, (rows, columns), shifts, camera)
+    if (told >= 0).mean() <= ENOUGH:
+        return found
+    found[rows, columns] = told
+    return found
 
 
 def _foretold(features: Array, plane: Surface, shifts: Array, camera: Camera) -> float:
