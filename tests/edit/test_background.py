@@ -9,6 +9,7 @@ from edit_scenes import block_mask, flat_scene, rendered_scene
 from materialist.edit.background import without
 from materialist.edit.composite import composite
 from materialist.edit.hole import make_hole
+from materialist.edit.revealed import _continued
 from materialist.errors import InputError
 from materialist.types import Photo
 
@@ -147,3 +148,31 @@ def test_a_wall_ends_without_the_object_where_it_ended_with_it():
     assert float(empty.geometry.mesh.vertices[:, 1].max()) == pytest.approx(ends.up, abs=0.2)
     usual = without(replace(scene, geometry=completed, provenance={**provenance, "ends": []}), MASK)
     assert float(usual.geometry.mesh.vertices[:, 1].max()) < ends.up - 1
+
+
+def test_what_the_object_cast_goes_with_it_unless_it_is_to_stay():
+    scene = flat_scene()
+    floor = np.where(np.arange(36)[:, None] >= 20, 0, -1).astype(np.int8) * np.ones((1, 48), np.int8)
+    normal = np.where(floor[..., None] == 0, [0.0, 1, 0], scene.normal).astype(np.float32)
+    linear = np.full((36, 48, 3), 0.5, np.float32)
+    linear[MASK] = 0.2
+    rows, columns = np.nonzero(MASK)
+    beside = np.zeros((36, 48), bool)
+    beside[rows.max() - 4 : rows.max() + 1, columns.max() + 1 : columns.max() + 7] = True
+    linear[beside] = 0.42
+    photo = replace(scene.photo, linear=linear)
+    scene = replace(scene, normal=normal, photo=photo, geometry=replace(scene.geometry, plane_label=floor))
+    found, kept = make_hole(scene, MASK), make_hole(scene, MASK, shadow=0.0)
+    assert found.painted[beside & ~found.gone].mean() > 0.7 and not kept.painted[beside & ~kept.gone].any()
+
+
+def test_the_light_of_the_surroundings_goes_on_in_the_filled_place():
+    filled = np.zeros((20, 30), bool)
+    filled[5:15, 8:22] = True
+    plane = np.where(np.arange(30)[None] < 15, 0, 1) * np.ones((20, 1), int)
+    change = np.where((plane == 0)[..., None], 0.2, -0.1) * np.ones(3)
+    change[filled] = 7.0  # what it says there itself is not read
+    found = _continued(change, filled, plane)
+    np.testing.assert_allclose(found[filled & (plane == 0)], 0.2, atol=1e-6)
+    np.testing.assert_allclose(found[filled & (plane == 1)], -0.1, atol=1e-6)
+    assert not found[~filled].any()

@@ -32,6 +32,7 @@ def inpainted_background(
     from materialist.edit.behind import SKY, behind
     from materialist.edit.exemplar import exemplar_plan
     from materialist.edit.regular import regular_sources
+    from materialist.edit.seamless import seamless
     from materialist.geometry.membrane import membrane
 
     hole = _grown(scene.mask)
@@ -50,8 +51,8 @@ def inpainted_background(
     anywhere = np.ones_like(hole)
     told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
     plan = exemplar_plan(seen, hole, anywhere, label, told=told)
-    picture, albedo = (membrane(x, ~hole) if plan is None else plan.fill(x) for x in (photo, albedo))
-    return Background(np.where(hole[..., None], picture, photo).astype(np.float32), depth, normal, albedo, ends)
+    exposed, albedo = (membrane(x, ~hole) if plan is None else seamless(plan, x) for x in (photo * gain, albedo))
+    return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 
 
 def _grown(mask: Array) -> Array:

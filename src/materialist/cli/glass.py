@@ -63,7 +63,7 @@ def glass(
     ] = "auto",
     background: Background = None,
     inpaint: Inpainter = None,
-    shadow: Shadow = 0.0,
+    shadow: Shadow = "auto",
     preview: Annotated[
         bool, typer.Option("--preview", help="Sooner: working size, without its shadow and caustics.")
     ] = False,
@@ -79,6 +79,7 @@ def glass(
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edit.glass import check_glass
     from materialist.edit.glass import glass as change
+    from materialist.edit.hole import told_shadow
     from materialist.edit.material import parse_colour
     from materialist.errors import InputError
     from materialist.io.package import load_scene
@@ -93,7 +94,7 @@ def glass(
     region = chosen_region(loaded, click, box, mask, method)
     options: dict[str, Any] = {
         "hollow": hollow, "model": model.value, "thickness": thickness, "background": background,
-        "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": shadow, "seed": seed,
+        "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": told_shadow(shadow), "seed": seed,
     }  # fmt: skip
     if preview:
         _preview(loaded, region, look, options, output, spp, device.value, as_json, force)

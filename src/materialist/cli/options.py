@@ -94,7 +94,11 @@ Inpainter = Annotated[
     str | None, typer.Option("--inpaint", metavar="sd:MODEL", help="A diffusion model: a folder, or owner/name.")
 ]
 Shadow = Annotated[
-    float, typer.Option(help="Repaint the ground around it by this share of its size: shadows that stayed there.")
+    str,
+    typer.Option(
+        metavar="auto|S",
+        help="Fill its shadow and reflection on the ground, too: where they are found, or by this share of its size.",
+    ),
 ]
 
 # A mesh that joins the scene.

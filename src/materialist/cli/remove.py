@@ -42,7 +42,7 @@ def remove(
     method: With = Method.grabcut,
     background: Background = None,
     inpaint: Inpainter = None,
-    shadow: Shadow = 0.0,
+    shadow: Shadow = "auto",
     spp: Spp = 256,
     denoise: Denoise = True,
     full_render: FullRender = False,
@@ -54,13 +54,14 @@ def remove(
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
     from materialist.edit.background import without
+    from materialist.edit.hole import told_shadow
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force)
     loaded = load_scene(scene)
     region = chosen_region(loaded, click, box, mask, method)
     inpainter = chosen_inpainter(inpaint, seed, device.value)
-    edited = without(loaded, region, background=background, inpaint=inpainter, shadow=shadow, seed=seed)
+    edited = without(loaded, region, background=background, inpaint=inpainter, shadow=told_shadow(shadow), seed=seed)
     write_result(
         "remove", loaded, edited, output, save=save, spp=spp, seed=seed, denoise=denoise, full_render=full_render,
         device=device.value, as_json=as_json, force=force, lines=[f"{int(region.sum())} pixels taken away."],

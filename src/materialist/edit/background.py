@@ -14,6 +14,7 @@ from materialist.edit.exemplar import Plan, exemplar_plan
 from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted
 from materialist.edit.regular import regular_sources
+from materialist.edit.seamless import seamless
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
@@ -25,7 +26,7 @@ Inpaint = Callable[[Array, Array], Array]
 
 def without(
     scene: Scene, mask: Array, *, background: Array | str | Path | None = None, inpaint: Inpaint | None = None,
-    grow: float = GROW, shadow: float = 0.0, seed: int = 0,
+    grow: float = GROW, shadow: float | None = None, seed: int = 0,
 ) -> Scene:  # fmt: skip
     """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
 
@@ -38,8 +39,8 @@ def without(
             takes the place of inpainting, and its albedo is what makes the re-rendering equal to it.
         inpaint: another inpainter of the photo, used like a background (see `inpaint.diffusion`).
         grow: rim around the mask that is filled as well, as a part of the picture's longer side, in [0, 0.2].
-        shadow: the same for the surface it stands on, as a part of the object's size, in [0, 2]: a contact shadow or a
-            reflection that the albedo has kept goes with the object.
+        shadow: how far the surface it stands on is filled as well, as a part of the object's size, in [0, 2]; None:
+            where its shadow and reflection are found (`cast.cast`). What the albedo kept of them goes with the object.
         seed: of the patch search.
 
     Raises:
@@ -62,7 +63,8 @@ def without(
         scene, materials=materials, depth=found.depth, normal=found.normal, geometry=_geometry(scene, found),
         photo=photo, rerender=rerender,
     )  # fmt: skip
-    what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": shadow}
+    cast = "auto" if shadow is None else shadow
+    what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast}
     if picture is not None:
         removed = _matched(removed, hole, picture)
     return noted(removed, "remove", what)
@@ -77,34 +79,22 @@ def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
 
 
 def _filled(plan: Plan | None, maps: Array, hole: Array) -> Array:
-    """[H, W, C] with the hole filled, by patches, or as a membrane where there are none."""
-    return plan.fill(maps) if plan is not None else membrane(maps, ~hole)
+    """[H, W, C] radiance or albedo with the hole filled: patches without seams, or a membrane where there are none."""
+    return seamless(plan, maps) if plan is not None else membrane(maps, ~hole)
 
 
 def _materials(scene: Scene, plan: Plan | None, hole: Array) -> Materials:
     old = scene.materials
-    stack = np.concatenate([old.albedo, old.roughness[..., None], old.metallic[..., None]], -1)
-    new = np.clip(_filled(plan, stack, hole), 0, 1)
-    return Materials(*(np.ascontiguousarray(part) for part in (new[..., :3], new[..., 3], new[..., 4])))
+    rest = np.stack([old.roughness, old.metallic], -1)
+    rest = plan.fill(rest) if plan is not None else membrane(rest, ~hole)
+    albedo = np.clip(_filled(plan, old.albedo, hole), 0, 1)
+    return Materials(albedo, *(np.ascontiguousarray(np.clip(part, 0, 1)) for part in (rest[..., 0], rest[..., 1])))
 
 
 def _continued(scene: Scene, plan: Plan | None, hole: Hole, shown: Array) -> tuple[Materials, Photo, Array]:
-    """Materials, photo and re-rendering filled with patches.
-
-    What the fit misses has two parts: detail, which comes with the patches, and a slow one, which must be that of the
-    hole's surroundings, or its outline would be seen.
-    """
-    import cv2
-
-    rest = scene.photo.linear - shown  # [H, W, 3]
-    known = ~hole.painted
-    sigma = max(2.0, 0.01 * max(rest.shape[:2]))
-    blur = lambda v: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), sigma)  # noqa: E731
-    slow = blur(np.where(known[..., None], rest, 0)) / np.maximum(blur(known)[..., None], 1e-3)
-    detail = _filled(plan, np.where(known[..., None], rest - slow, 0), hole.painted)
-    rerender = _filled(plan, shown, hole.painted)
-    linear = np.maximum(rerender + membrane(slow, known) + detail, 0)
-    photo = _with_hole(scene.photo, np.where(known[..., None], scene.photo.linear, linear), hole.painted, plan)
+    """Materials, photo and re-rendering filled with patches."""
+    linear, rerender = (_filled(plan, picture, hole.painted) for picture in (scene.photo.linear, shown))
+    photo = _with_hole(scene.photo, linear, hole.painted, plan)
     return _materials(scene, plan, hole.painted), photo, rerender.astype(np.float32)
 
 

@@ -25,7 +25,8 @@ def glass(
     scene: Scene, mask: Array, *, ior: float = 1.5, transmission: float = 1.0,
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, hollow: bool = False,
     model: str = "closed", thickness: str | Array | Path = "auto", background: Array | str | Path | None = None,
-    inpaint: Inpaint | None = None, grow: float = GROW, shadow: float = 0.0, smooth: float = 0.01, seed: int = 0,
+    inpaint: Inpaint | None = None, grow: float = GROW, shadow: float | None = None, smooth: float = 0.01,
+    seed: int = 0,
 ) -> Scene:  # fmt: skip
     """The scene with the object under a mask of glass, before what it hid.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.edit.cast import cast
 from materialist.edit.region import checked_region
 from materialist.errors import InputError
 from materialist.types import Array, Scene
@@ -27,12 +28,12 @@ class Hole:
     gone: Array
     """[H, W] bool: the object and a rim of mixed pixels; depth and normals end here."""
     painted: Array
-    """[H, W] bool: where materials and photo are filled: `gone`, and its contact shadow if that is wanted."""
+    """[H, W] bool: where materials and photo are filled: `gone`, and what it casts on the ground."""
 
 
-def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float = 0.0) -> Hole:
+def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | None = None) -> Hole:
     """The pixels that a removal concerns; arguments and errors as for `without`."""
-    for name, value, most in (("rim", grow, 0.2), ("shadow", shadow, 2.0)):
+    for name, value, most in (("rim", grow, 0.2), ("shadow", 0.0 if shadow is None else shadow, 2.0)):
         if not (np.isfinite(value) and 0 <= value <= most):
             raise InputError(f"The {name} is {value:g}; it must lie in [0, {most:g}].")
     own = checked_region(scene, mask) > 0.5
@@ -46,11 +47,22 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float = 
             f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
             "what stands behind; mark one object only."
         )
-    painted = gone
-    if shadow > 0:
-        supports = (scene.geometry.plane_label >= 0) & (scene.normal[..., 1] > UPWARD)
-        painted = gone | (supports & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
+    plane, upward = scene.geometry.plane_label, scene.normal[..., 1] > UPWARD
+    if shadow is None:
+        painted = gone | cast(scene.photo.linear, plane, upward, own, gone)
+    else:
+        painted = gone | ((plane >= 0) & upward & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
     return Hole(own, gone, painted)
+
+
+def told_shadow(value: object) -> float | None:
+    """The `shadow` of an option or a recipe: `auto`, or a number. Raises InputError for anything else."""
+    if value == "auto":
+        return None
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError(f"The shadow is '{value}'; give auto, or a share of the object's size in [0, 2].") from None
 
 
 def _grown(mask: Array, pixels: int) -> Array:

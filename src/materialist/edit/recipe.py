@@ -9,6 +9,7 @@ from typing import Any
 from materialist.edit.background import without
 from materialist.edit.drop_rest import settle
 from materialist.edit.glass import glass
+from materialist.edit.hole import told_shadow
 from materialist.edit.insert import insert
 from materialist.edit.material import edit, parse_colour
 from materialist.edit.relight import lamp, read_envmap, relight
@@ -218,7 +219,9 @@ def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
 def _removal(step: Step) -> dict[str, Any]:
     """What a removal and glass share."""
     given = step.options
-    options: dict[str, Any] = {k: _number(given[k], k) for k in ("shadow", "grow") if k in given}
+    options: dict[str, Any] = {"grow": _number(given["grow"], "grow")} if "grow" in given else {}
+    if "shadow" in given:
+        options["shadow"] = told_shadow(given["shadow"])
     if "background" in given:
         options["background"] = _file(step, "background")
     if "inpaint" in given:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from materialist.edit.layers import Layers, denoised
+from materialist.geometry.membrane import membrane
 from materialist.types import Array, Photo, Scene
 
 
@@ -20,6 +21,7 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     The photo is that of the studio's scene where the edit left it, else that of `edited`; the base there is a
     rendering of what that photo shows: the scene without the object, under its own light, and without what the edit
     put in its place. So a place that is merely uncovered shows the filled photo, and the shadow of glass falls on it.
+    What the object did to the light around goes on in it: it was filled from surroundings that had that light.
     Under a body in place of the photo's surface (`layers.covered`) the rendering alone counts: what the photo has
     beyond the fit is not what is seen through the body or on it.
     """
@@ -27,7 +29,10 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if edited.photo is scene.photo:
         return scene.photo, layers
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
-    base = np.where(filled[..., None], _bare(studio, edited, layers, spp, seed, clean), layers.base)
+    bare = _bare(studio, edited, layers, spp, seed, clean)
+    if not _given(edited):
+        bare = bare - _continued(bare - layers.base, filled, edited.geometry.plane_label)
+    base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
         base = np.where(covered[..., None], photo.linear, base)
@@ -46,6 +51,23 @@ def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: boo
     picture = studio.beside(edited, bare)(-(-spp // 2), 2 * seed)
     guides = (edited.materials.albedo, edited.materials.albedo, edited.normal)
     return denoised(picture, picture, guides)[0] if clean else picture
+
+
+def _given(edited: Scene) -> bool:
+    """Whether the filled photo is a picture of what is there, and not made from its surroundings."""
+    return any(step.get("filled_by") == "background" for step in edited.provenance.get("edits", ()))
+
+
+def _continued(change: Array, filled: Array, plane: Array) -> Array:
+    """[H, W, 3] in the filled places, a change beside them carried on, on each plane by itself."""
+    out = np.zeros_like(change)
+    for number in np.unique(plane[filled]):
+        here = plane == number
+        beside = here & ~filled
+        if beside.any():
+            own = filled & here
+            out[own] = membrane(change, beside)[own]
+    return out
 
 
 def _without_detail(photo: Photo, covered: Array) -> Photo:

@@ -39,7 +39,7 @@ def layout(context: Context) -> None:
         with gr.Accordion("Turn the selection to glass", open=False) as parts["glass_part"]:
             tab_glass.layout(context)
         with gr.Accordion("Take the selection away", open=False):
-            parts["shadow"] = gr.Slider(0, 2, 0.5, step=0.05, label="How much of its shadow goes along", buttons=[])
+            parts["shadow"] = gr.Checkbox(True, label="Its shadow and reflection on the ground go along")
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
         with gr.Accordion("Let it fall", open=False):
             gr.Markdown("The object falls where it stands. Needs the physics extra.")
@@ -122,9 +122,9 @@ def _wire_regions(context: Context, live: dict[str, Any]) -> None:
     parts = context.parts
 
     @guarded
-    def remove(shadow: float, request: gr.Request) -> Any:
+    def remove(shadow: bool, request: gr.Request) -> Any:
         session = context.session(request)
-        session.region_step("remove", shadow=f"{float(shadow):.4g}" if shadow else None)
+        session.region_step("remove", shadow=None if shadow else "0")
         return context.picture(session)
 
     slow = {k: v for k, v in live.items() if k not in ("queue", "trigger_mode")} | {"show_progress": "minimal"}
