@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
-from materialist.edit.background import without
+from materialist.edit.background import joined, without
 from materialist.edit.composite import composite
 from materialist.edit.hole import make_hole
 from materialist.edit.revealed import _continued
@@ -176,3 +176,16 @@ def test_the_light_of_the_surroundings_goes_on_in_the_filled_place():
     np.testing.assert_allclose(found[filled & (plane == 0)], 0.2, atol=1e-6)
     np.testing.assert_allclose(found[filled & (plane == 1)], -0.1, atol=1e-6)
     assert not found[~filled].any()
+
+
+def test_parts_of_a_plane_that_do_not_reach_the_hole_are_other_surfaces():
+    label = np.zeros((12, 20), int)
+    label[:, 12:15] = 1
+    label[4:6, :3] = -1
+    hole = np.zeros((12, 20), bool)
+    hole[5:8, 5:8] = True
+    found = joined(label, hole)
+    assert (found[:, :12] == label[:, :12]).all() and (found[:, 12:15] == 1).all(), "what is joined, and other planes"
+    assert len(np.unique(found[:, 15:])) == 1 and found[0, 19] not in label
+    hole[:, 17] = True
+    np.testing.assert_array_equal(joined(label, hole), label)

@@ -29,6 +29,7 @@ def inpainted_background(
     albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
     from materialist.color import linear_to_srgb
+    from materialist.edit.background import joined
     from materialist.edit.behind import SKY, behind
     from materialist.edit.exemplar import exemplar_plan
     from materialist.edit.regular import regular_sources
@@ -50,7 +51,7 @@ def inpainted_background(
     seen = np.concatenate([linear_to_srgb(albedo), linear_to_srgb(np.clip(photo * gain, 0, 1))], -1)
     anywhere = np.ones_like(hole)
     told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
-    plan = exemplar_plan(seen, hole, anywhere, label, told=told)
+    plan = exemplar_plan(seen, hole, anywhere, joined(label, hole), told=told)
     exposed, albedo = (membrane(x, ~hole) if plan is None else seamless(plan, x) for x in (photo * gain, albedo))
     return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 

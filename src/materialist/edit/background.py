@@ -75,7 +75,24 @@ def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
     features = np.concatenate([linear_to_srgb(scene.materials.albedo), linear_to_srgb(scene.photo.linear)], -1)
     anywhere = np.ones(hole.painted.shape, bool)
     told = regular_sources(features, hole.painted, anywhere, found.label, found.depth, scene.camera)
-    return exemplar_plan(features, hole.painted, anywhere, found.label, told=told, seed=seed)
+    return exemplar_plan(features, hole.painted, anywhere, joined(found.label, hole.painted), told=told, seed=seed)
+
+
+def joined(label: Array, hole: Array) -> Array:
+    """Labels [H, W] int where parts of a plane that do not reach the hole [H, W] bool are surfaces of their own.
+
+    One plane may hold two things: the face of a die, and by accident a strip of the board behind it.
+    """
+    from skimage.measure import label as parts_of
+
+    out, free = label.copy(), int(label.max()) + 1
+    for number in np.unique(label[hole]):
+        if number >= 0:
+            parts = parts_of(label == number, connectivity=2)
+            for part in np.setdiff1d(parts[parts > 0], parts[hole]):
+                out[parts == part] = free
+                free += 1
+    return out
 
 
 def _filled(plan: Plan | None, maps: Array, hole: Array) -> Array:
