@@ -8,7 +8,7 @@ from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.edit.background import joined, without
 from materialist.edit.composite import composite
-from materialist.edit.hole import make_hole
+from materialist.edit.hole import make_hole, told_shadow
 from materialist.edit.revealed import _continued
 from materialist.errors import InputError
 from materialist.types import Photo
@@ -189,3 +189,10 @@ def test_parts_of_a_plane_that_do_not_reach_the_hole_are_other_surfaces():
     assert len(np.unique(found[:, 15:])) == 1 and found[0, 19] not in label
     hole[:, 17] = True
     np.testing.assert_array_equal(joined(label, hole), label)
+
+
+def test_how_much_of_a_shadow_goes_is_told_by_word_or_number():
+    assert told_shadow("auto") is None and told_shadow("0.5") == 0.5 and told_shadow(0) == 0
+    for value in ("much", None, True, [1]):
+        with pytest.raises(InputError, match="give auto, or a share"):
+            told_shadow(value)

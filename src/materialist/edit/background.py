@@ -85,13 +85,11 @@ def joined(label: Array, hole: Array) -> Array:
     """
     from skimage.measure import label as parts_of
 
-    out, free = label.copy(), int(label.max()) + 1
-    for number in np.unique(label[hole]):
-        if number >= 0:
-            parts = parts_of(label == number, connectivity=2)
-            for part in np.setdiff1d(parts[parts > 0], parts[hole]):
-                out[parts == part] = free
-                free += 1
+    out = label.copy()
+    for number in np.unique(label[hole & (label >= 0)]):
+        parts = parts_of(label == number, connectivity=2)
+        others = (parts > 0) & ~np.isin(parts, parts[hole])
+        out[others] = out.max() + parts[others]
     return out
 
 

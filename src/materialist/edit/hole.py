@@ -60,9 +60,11 @@ def told_shadow(value: object) -> float | None:
     if value == "auto":
         return None
     try:
-        return float(value)  # type: ignore[arg-type]
+        if not isinstance(value, bool):
+            return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise InputError(f"The shadow is '{value}'; give auto, or a share of the object's size in [0, 2].") from None
+        pass
+    raise InputError(f"The shadow is '{value}'; give auto, or a share of the object's size in [0, 2].")
 
 
 def _grown(mask: Array, pixels: int) -> Array:
