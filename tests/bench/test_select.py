@@ -25,9 +25,11 @@ def test_both_maps_are_scored(tmp_path, mitsuba):
     bench.run("select", output=tmp_path / "report", scenes=1, size=96)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     rows = report["rows"]
-    assert {row["method"] for row in rows} == {"bundled maps", "true maps"} and len(rows) >= 4
+    assert {row["method"] for row in rows} == {
+        f"{how}, {maps} maps" for how in ("network", "grabcut") for maps in ("bundled", "true")
+    } and len(rows) >= 4
     assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)
-    true = [row["iou"] for row in rows if row["method"] == "true maps"]
+    true = [row["iou"] for row in rows if row["method"] == "grabcut, true maps"]
     assert np.mean(true) > 0.5
 
 

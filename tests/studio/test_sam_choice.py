@@ -28,7 +28,7 @@ def test_what_is_missing_is_said(monkeypatch, tmp_path):
 def test_it_is_asked_for_clicks_and_boxes_and_not_for_the_brush(monkeypatch):
     asked = []
 
-    def select(scene, *, method="grabcut", **where):
+    def select(scene, *, method="network", **where):
         asked.append(method)
         return np.ones(scene.depth.shape, bool)
 
@@ -36,7 +36,7 @@ def test_it_is_asked_for_clicks_and_boxes_and_not_for_the_brush(monkeypatch):
     Selection().click(room(), 5, 5, "new", "sam2")
     Selection().box(room(), [1, 1, 9, 9], "new", "sam2")
     Selection().brush(room(), [[1, 1]], 3, "new")
-    assert asked == ["sam2", "sam2", "grabcut"]
+    assert asked == ["sam2", "sam2", "network"]
 
 
 @pytest.mark.parametrize("missing", [None, "Its weights are not here."])

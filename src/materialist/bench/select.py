@@ -13,13 +13,16 @@ from materialist.errors import InputError
 from materialist.types import Array, Prediction, Scene
 
 NOTE = """Synthetic pictures whose objects are known (those of `bench light`); two clicks on every object of at least
-400 pixels, one in its middle and one anywhere. `bundled` maps are the bundled network's, `true` ones the truth. IoU is
-intersection over union with the object's mask; `good` and `lost` are the shares of clicks above 0.8 and below 0.3."""
+400 pixels, one in its middle and one anywhere. `bundled` maps are the bundled network's, `true` ones the truth;
+`network` is what `select` does by itself, `grabcut` the same without ClickNet. IoU is intersection over union with the
+object's mask; `good` and `lost` are the shares of clicks above 0.8 and below 0.3."""
 COLUMNS = (
     Column("iou", "IoU", "higher"),
     Column("good", "good", "higher", 2),
     Column("lost", "lost", "lower", 2),
 )
+METHODS = ("network", "grabcut")
+"""Ways to select that need nothing but the package."""
 LEAST = 400
 """Pixels of an object that is clicked on."""
 INSIDE = 2.5
@@ -50,7 +53,8 @@ def run(
             sample = make_sample(k, 1, k, size=size, data=folder, seed=seed, spp=SPP)
             kind = "captured" if folder else "procedural"
             for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
-                rows += _rows(sample, _scene(sample, found), f"{maps} maps", f"{kind} {sample.name}", k)
+                for method in METHODS:
+                    rows += _rows(sample, _scene(sample, found), maps, method, f"{kind} {sample.name}", k)
     write(report, output)
 
 
@@ -64,7 +68,9 @@ def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[i
     return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
 
 
-def _rows(sample: SyntheticSample, scene: Scene, maps: str, name: str, number: int) -> list[dict[str, Any]]:
+def _rows(
+    sample: SyntheticSample, scene: Scene, maps: str, method: str, name: str, number: int
+) -> list[dict[str, Any]]:
     """A row a click."""
     from materialist.edit.select import select
 
@@ -73,9 +79,9 @@ def _rows(sample: SyntheticSample, scene: Scene, maps: str, name: str, number: i
         if mask.sum() < LEAST:
             continue
         for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
-            found = select(scene, click=click)
+            found = select(scene, click=click, method=method)
             iou = float((found & mask).sum() / (found | mask).sum())
-            row = {"method": maps, "sample": f"{name} object {j} click {k}", "iou": iou}
+            row = {"method": f"{method}, {maps} maps", "sample": f"{name} object {j} click {k}", "iou": iou}
             rows.append(row | {"good": float(iou > 0.8), "lost": float(iou < 0.3)})
     return rows
 

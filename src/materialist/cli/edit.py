@@ -40,7 +40,7 @@ def edit(
     mask: MaskFile = None,
     click: Clicks = None,
     box: Box = None,
-    method: With = Method.grabcut,
+    method: With = Method.network,
     hue: Annotated[float, typer.Option(help="Turn the albedo's hue, degrees.")] = 0.0,
     saturation: Annotated[float, typer.Option(help="-1 (grey) to 1.")] = 0.0,
     value: Annotated[float, typer.Option(help="-1 (black) to 1 (white).")] = 0.0,

@@ -50,7 +50,7 @@ def glass(
     mask: MaskFile = None,
     click: Clicks = None,
     box: Box = None,
-    method: With = Method.grabcut,
+    method: With = Method.network,
     ior: Annotated[float, typer.Option(help="Index of refraction, 1 to 3: water 1.33, glass 1.5.")] = 1.5,
     transmission: Annotated[float, typer.Option(help="Share of light that enters; the rest is the old surface.")] = 1.0,
     tint: Annotated[str, typer.Option(metavar="R,G,B", help="Its colour, linear, or #rrggbb.")] = "1,1,1",

@@ -54,6 +54,7 @@ class Strategy(StrEnum):
 class Method(StrEnum):
     """How a region is found."""
 
+    network = "network"
     grabcut = "grabcut"
     sam2 = "sam2"
 
@@ -84,7 +85,9 @@ Clicks = Annotated[
 ]
 Box = Annotated[str | None, typer.Option("--box", metavar="X0,Y0,X1,Y1", help="A box around the object.")]
 MaskFile = Annotated[Path | None, typer.Option("--mask", metavar="PNG", help="The region: white inside.")]
-With = Annotated[Method, typer.Option("--with", help="grabcut needs nothing; sam2 needs its weights.")]
+With = Annotated[
+    Method, typer.Option("--with", help="network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights.")
+]
 
 # What was behind it.
 Background = Annotated[

@@ -39,7 +39,7 @@ def remove(
     mask: MaskFile = None,
     click: Clicks = None,
     box: Box = None,
-    method: With = Method.grabcut,
+    method: With = Method.network,
     background: Background = None,
     inpaint: Inpainter = None,
     shadow: Shadow = "auto",

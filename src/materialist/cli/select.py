@@ -24,7 +24,7 @@ def select(
     click: Clicks = None,
     box: Box = None,
     mask: MaskFile = None,
-    method: With = Method.grabcut,
+    method: With = Method.network,
     native: Annotated[bool, typer.Option("--native", help="At the photo's native size, with soft edges.")] = False,
     as_json: Json = False,
     force: Force = False,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from materialist.cli import train_data, train_matnet, train_refraction
+from materialist.cli import train_clicks, train_data, train_matnet, train_refraction
 
 train = typer.Typer(
     name="train",
@@ -13,7 +13,7 @@ train = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (train_data, train_matnet, train_refraction):
+for module in (train_data, train_matnet, train_refraction, train_clicks):
     module.register(train)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -20,10 +20,16 @@ _APART = 20.0
 """Lab distance of the mean colours of two sides that are clearly different."""
 _KINDS = ("plain", "coarse", "chroma")
 _CANDIDATES = 48
+_LIKELY = 0.1
+"""Worth of a region that agrees with what is likely, beside that of its outline."""
+_SHARES = (0.3, 0.5, 0.7)
+"""Shares from which what is likely makes regions of its own."""
 
 
-def object_around(features, seeds: Sequence[tuple[int, int]]) -> Array:
+def object_around(features, seeds: Sequence[tuple[int, int]], likely: Array | None = None) -> Array:
     """[H, W] bool of the object under the seeds (column, row).
+
+    `likely` [H, W] in [0, 1], if given, is how likely a pixel belongs to it (see `predict.clicks`).
 
     A region grows from the seeds over the least crossed edges (a geodesic distance, over an edge map of colour, depth
     and normals). Each distance gives one candidate; the outline's mean edge strength, how suddenly the growth stops
@@ -31,14 +37,29 @@ def object_around(features, seeds: Sequence[tuple[int, int]]) -> Array:
     """
     edges = edge_map(features)
     best, best_score = np.zeros(features.shape, bool), -np.inf
+    for region in _regions(features, edges, seeds, likely):
+        score = outline_score(region, edges, features.lab)
+        if likely is not None:
+            score += _LIKELY * float(np.minimum(region, likely).sum() / np.maximum(region, likely).sum())
+        if score > best_score:
+            best, best_score = region, score
+    return best
+
+
+def _regions(features, edges: Array, seeds: Sequence[tuple[int, int]], likely: Array | None) -> Iterator[Array]:
+    """[H, W] bool: what may be the object."""
+    from skimage.measure import label
+
     for kind in _KINDS:
         distance = geodesic(edges if kind == "plain" else edge_map(features, kind), seeds)
         for level in _levels(distance):
-            region = _filled(distance <= level)
-            score = outline_score(region, edges, features.lab)
-            if score > best_score:
-                best, best_score = region, score
-    return best
+            yield _filled(distance <= level)
+    for share in _SHARES if likely is not None else ():
+        region = _filled(np.asarray(likely) > share)
+        parts = label(region, connectivity=1)
+        under = np.unique([parts[y, x] for x, y in seeds])
+        if under.any():
+            yield np.isin(parts, under[under > 0])
 
 
 def edge_map(features, kind: str = "plain") -> Array:

@@ -140,7 +140,7 @@ def _region(scene: Scene, step: Step):
         "box": _numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": _file(step, "mask") if "mask" in given else None,
     }
-    return select(scene, method=given.get("with", "grabcut"), **where)
+    return select(scene, method=given.get("with", "network"), **where)
 
 
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:

@@ -64,7 +64,7 @@ def load(where: str) -> Any:
         from transformers import Sam2Model
     except ImportError as error:
         raise SetupError(
-            f"SAM 2 needs transformers ({error}); install it with: {INSTALL}, or select with --with grabcut."
+            f"SAM 2 needs transformers ({error}); install it with: {INSTALL}, or leave --with sam2 out."
         ) from error
     return whole(Sam2Model, folder_of(where))
 
@@ -78,8 +78,8 @@ def folder_of(where: str) -> Any:
         return locate(where, REPO)[0]
     except WeightsError as error:
         raise WeightsError(
-            f"The weights of SAM 2 are not here; fetch them with: materialist models download {where}, or select with "
-            "--with grabcut."
+            f"The weights of SAM 2 are not here; fetch them with: materialist models download {where}, or leave "
+            "--with sam2 out."
         ) from error
 
 

@@ -11,7 +11,7 @@ from materialist.edit.region import HIDDEN, PLACED, checked_pixel, checked_regio
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
-METHODS = ("grabcut", "sam2")
+METHODS = ("network", "grabcut", "sam2")
 _SIZE = 256
 """Longer side at which an object is looked for; the border is then refined at working size."""
 
@@ -22,7 +22,7 @@ def select(
     click: Sequence[float] | Sequence[Sequence[float]] | None = None,
     box: Sequence[float] | None = None,
     mask: Array | str | Path | None = None,
-    method: str = "grabcut",
+    method: str = "network",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or in a rough mask.
 
@@ -30,11 +30,12 @@ def select(
         click: (x, y) at working size, or several, all of them on the object.
         box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
-        method: `grabcut` (colour, depth and normals; needs nothing) or `sam2` (needs its weights).
+        method: `network` (colour, depth, normals, and ClickNet; in a box as `grabcut`), `grabcut` (without ClickNet) or
+            `sam2` (needs its weights).
 
     Raises:
         InputError: none or several of click, box and mask; a click or box outside the photo or on the sky; an empty
-            mask or one of another shape. SetupError, WeightsError: `sam2` without its library or weights.
+            mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
     """
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
@@ -50,6 +51,8 @@ def select(
         found = segment(scene.photo.linear, points, frame)
     elif frame is not None:
         found = from_box(scene, frame)
+    elif method == "network":
+        found = from_clicks(scene, points, likely(scene, points))
     else:
         found = from_clicks(scene, points)
     found = found & (scene.depth > 0)
@@ -58,14 +61,26 @@ def select(
     return found
 
 
-def from_clicks(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool of the object that all (column, row) points lie on."""
+def likely(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] in [0, 1]: how likely each pixel is of the object that all (column, row) points lie on, says ClickNet."""
+    from materialist.color import linear_to_srgb
+    from materialist.predict.clicks.segment import Photo, object_at
+
+    return object_at(Photo(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth), points)
+
+
+def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | None = None) -> Array:
+    """[H, W] bool of the object that all (column, row) points lie on; `share` [H, W]: what is `likely`."""
+    import cv2
+
     from materialist.edit.objects import object_around
     from materialist.edit.refine import refined
 
     small, scale = _smaller(scene)
     seeds = [(int(x * scale), int(y * scale)) for x, y in points]
-    rough = object_around(small, seeds)
+    if share is not None:
+        share = np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
+    rough = object_around(small, seeds, share)
     return refined(scene, _larger(rough, scene), points)
 
 

@@ -112,7 +112,7 @@ def _wire(context: Context) -> None:
         elif wanted["tool"] == "place":
             session.place(*wanted["at"])
         else:
-            session.pick(wanted, "sam2" if sam else "grabcut")
+            session.pick(wanted, "sam2" if sam else "network")
         return context.everything(session)
 
     @guarded

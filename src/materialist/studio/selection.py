@@ -29,7 +29,7 @@ class Selection:
         mask = np.logical_or.reduce(self.parts)
         return mask if mask.any() else None
 
-    def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "grabcut") -> Selection:
+    def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
         """With the object at a pixel: alone, added, or (where it is selected already) taken away."""
         row, column = int(y), int(x)
         mask = self.mask
@@ -39,7 +39,7 @@ class Selection:
         found = select(scene, click=(x, y), method=method)
         return self._with(found, mode)
 
-    def box(self, scene: Scene, box: list[float], mode: str, method: str = "grabcut") -> Selection:
+    def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
         """With what is in a box."""
         if mode == REMOVE:
             x0, y0, x1, y1 = (round(v) for v in box)

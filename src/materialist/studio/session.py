@@ -90,7 +90,7 @@ class Session:
 
     # Selecting
 
-    def pick(self, pick: dict[str, Any], method: str = "grabcut") -> None:
+    def pick(self, pick: dict[str, Any], method: str = "network") -> None:
         """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError."""
         with self.lock:
             scene, mode, before = self.scene, pick["mode"], self.selection

@@ -23,6 +23,7 @@ SIZE = 32
 CONTRACT = {
     "image": (np.float16, 3), "shading": (np.float16, 3), "albedo": (np.uint8, 3), "roughness": (np.uint8, 0),
     "metallic": (np.uint8, 0), "normal": (np.int8, 3), "depth": (np.float16, 0), "mask": (np.uint8, 0),
+    "thing": (np.int16, 0),
 }  # fmt: skip
 
 

@@ -156,3 +156,22 @@ def test_sizes_that_do_not_fill_vectors_are_refused():
     packed = packing.pack(still(), np.random.default_rng(0))
     with pytest.raises(InputError, match="33 x 33"):
         tracer.Tracer(packed, Camera(33, 33, 40.0), device="cpu")
+
+
+def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
+    from types import SimpleNamespace
+
+    from materialist.train.data.sample import things_of
+    from materialist.train.data.things import one_thing, placed
+    from materialist.train.data.world import Part
+
+    solid, _ = SimpleNamespace(), None
+    floor = Part(solid, None)
+    cup = one_thing([Part(solid, None), Part(solid, None)])
+    ball = one_thing([Part(solid, None)])
+    assert cup[0].thing is cup[1].thing is not ball[0].thing
+    world = SimpleNamespace(parts=[floor, *cup, *ball])
+    owner = np.array([[[-1] * 4, [0] * 4, [1] * 4, [2] * 4, [3] * 4]])
+    found = things_of(world, {"owner": owner})[0]
+    assert found[0] == 0 and found[1] < 0 and found[2] == found[3] > 0 and found[4] > 0 and found[4] != found[2]
+    assert placed([], [0, 0, 0]) == []

@@ -104,16 +104,25 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: O
         "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
         "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
         "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),
-        "kind": np.array(world.kind),
+        "thing": things_of(world, probe), "kind": np.array(world.kind),
     }  # fmt: skip
+
+
+def things_of(world: World, probe: dict[str, Array]) -> Array:
+    """[H, W] int16: the number of the thing at a pixel's centre, negative for walls and the like, 0 for nothing."""
+    number: dict[object, int] = {}
+    of_part = [0]
+    for k, part in enumerate(world.parts):
+        own = number.setdefault(("part", k) if part.thing is None else part.thing, len(number) + 1)
+        of_part.append(-own if part.thing is None else own)
+    owner = probe["owner"][..., _centre(probe)].astype(int)
+    return np.array(of_part, np.int16)[owner + 1]
 
 
 def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
     """Maps [H, W, ...] of a probe [H, W, N, ...]: of the surface at the pixel's centre, its texture averaged over the
     rays of the pixel that see the same part; all 0 where there is no surface."""
-    n = probe["owner"].shape[2]
-    side = round(np.sqrt(n))
-    centre = side * (side // 2) + side // 2
+    centre = _centre(probe)
     owner = probe["owner"][..., centre]
     mask = (owner >= 0) & (probe["surface"][..., centre] > 0.5)
     same = ((probe["owner"] == owner[..., None]) & mask[..., None]).astype(np.float32)
@@ -124,6 +133,12 @@ def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
     out["depth"] = probe["depth"][..., centre] * mask
     out["mask"] = mask
     return out
+
+
+def _centre(probe: dict[str, Array]) -> int:
+    """The number of the ray through the middle of a pixel."""
+    side = round(np.sqrt(probe["owner"].shape[2]))
+    return side * (side // 2) + side // 2
 
 
 def exposure(image: Array, rng: np.random.Generator) -> float:

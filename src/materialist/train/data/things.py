@@ -21,8 +21,14 @@ Parts = list[Part]
 def thing(rng: np.random.Generator, size: float, meshes: tuple[Path, ...] = (), share: float = 0.3) -> Parts:
     """Some object about `size` metres high; with `share` probability a mesh from a file, if there are any."""
     if meshes and rng.random() < share:
-        return captured(rng, size, meshes)
-    return _KINDS[rng.choice(len(_KINDS), p=_SHARES)](rng, size)
+        return one_thing(captured(rng, size, meshes))
+    return one_thing(_KINDS[rng.choice(len(_KINDS), p=_SHARES)](rng, size))
+
+
+def one_thing(parts: Parts) -> Parts:
+    """The parts, those that belong to nothing yet as one thing."""
+    thing = object()
+    return [part if part.thing is not None else replace(part, thing=thing) for part in parts]
 
 
 def captured(rng: np.random.Generator, size: float, meshes: tuple[Path, ...]) -> Parts:
@@ -260,8 +266,8 @@ device, box = _device, _box
 
 
 def placed(parts: Parts, at: ArrayLike, turn: float = 0.0) -> Parts:
-    """The parts turned about Y and moved by `at` [3]."""
-    return [Part(s.moved(p.solid, at, turn), p.material) for p in parts]
+    """The parts turned about Y and moved by `at` [3], as one thing but for those that are things already."""
+    return [replace(p, solid=s.moved(p.solid, at, turn)) for p in one_thing(parts)]
 
 
 def footprint(parts: Parts) -> float:

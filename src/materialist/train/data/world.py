@@ -17,6 +17,8 @@ class Part:
 
     solid: Solid
     material: Material
+    thing: object | None = None
+    """What the part belongs to: parts of one thing have the same; None for walls, floors and the like."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,48 @@
+"""`materialist train clicks`: train the network that finds the object at a click."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from materialist.cli.options import CheckpointSeconds, Json, Minutes, ResumeRun, Seed, Steps, output_option
+from materialist.cli.outcome import report_success
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("clicks")(clicks)
+
+
+def clicks(
+    output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
+    data: Annotated[Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")],
+    steps: Steps = None,
+    minutes: Minutes = None,
+    batch: Annotated[int, typer.Option(help="Lessons a step.")] = 16,
+    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 1.5e-3,
+    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False,
+    resume: ResumeRun = False,
+    every: CheckpointSeconds = 180,
+    seed: Seed = 0,
+    as_json: Json = False,
+) -> None:
+    """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
+    from materialist.cli.progress import StageProgress
+    from materialist.train.budget import Budget
+    from materialist.train.clicks.trainer import Recipe, Trainer
+    from materialist.train.clicks.views import produce
+
+    budget = Budget(steps=steps, minutes=40 if steps is None and minutes is None else minutes)
+    with StageProgress(quiet=as_json) as progress:
+        produce(data, output / "views", progress)
+        trainer = Trainer(
+            output, output / "views", budget=budget,
+            recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16), seed=seed, every=every, resume=resume,
+            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
+        )  # fmt: skip
+        figures = trainer.run(progress)
+    lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
+    report_success("train clicks", as_json, lines, run=str(output), step=trainer.clock.step, **figures)

@@ -1,0 +1,1 @@
+"""ClickNet: the object at a click, from the photo and its maps."""

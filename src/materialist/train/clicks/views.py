@@ -1,0 +1,157 @@
+"""What ClickNet learns from: pictures of `train data` as photographs, their predicted maps, and what is one thing."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.errors import InputError, OutputError
+from materialist.predict.clicks.features import features
+from materialist.train.samples import SampleFolder, read_sample
+from materialist.types import Array
+
+Progress = Callable[[str, int, int], None]
+FEWEST = 60
+"""Pixels of a view below which a thing is not clicked on."""
+DEEP = 2.5
+"""Pixels inside a thing at which it is clicked on, where it is as large."""
+THINGS = 0.85
+"""Share of clicks on things; the others are on walls, floors and the like."""
+MORE = 0.25
+"""Share of lessons with several clicks."""
+LEAST_CROP = 0.4
+"""Smallest part of a view's side that a lesson shows."""
+
+
+@dataclass(frozen=True)
+class View:
+    """One photograph as the package would see it, and its things."""
+
+    rgb: Array
+    """[H, W, 3] uint8 sRGB."""
+    normal: Array
+    """[H, W, 3] int8, 127 for 1: predicted."""
+    depth: Array
+    """[H, W] float16: predicted."""
+    thing: Array
+    """[H, W] int16: number of what is seen, negative for walls and the like, 0 for nothing."""
+
+
+def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> int:
+    """Make the views that FOLDER lacks, by the bundled network; returns how many are there.
+
+    Raises InputError for a data set without things (made before they were kept), OutputError for a bad FOLDER.
+    """
+    from materialist.predict.bundled.predictor import BundledPredictor
+    from materialist.train.data.photographic import photographic
+    from materialist.types import Camera, Photo
+
+    source, predictor = SampleFolder(data), BundledPredictor()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+    for number, path in enumerate(source.paths):
+        target = folder / path.name
+        if not target.exists():
+            with np.load(path) as arrays:
+                if "thing" not in arrays:
+                    raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
+                thing, angle = arrays["thing"], float(arrays["fov"])
+            rng = np.random.default_rng([int(path.stem), 4])
+            linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
+            camera = Camera(linear.shape[1], linear.shape[0], angle)
+            found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
+            _write(
+                target, rgb=(linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), thing=thing,
+                normal=np.rint(found.normal * 127).astype(np.int8), depth=found.depth.astype(np.float16),
+            )  # fmt: skip
+        progress("views", number + 1, len(source.paths))
+    return len(source.paths)
+
+
+def load(folder: Path) -> list[View]:
+    """All views of a folder, in the order of their names."""
+    views = []
+    for path in sorted(folder.glob("[0-9]*.npz")):
+        with np.load(path) as arrays:
+            views.append(View(*(arrays[name] for name in ("rgb", "normal", "depth", "thing"))))
+    return views
+
+
+def lesson(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
+    """([C, side, side] features, [side, side] bool) of a random part of a view and a click in it; None without things.
+
+    The part is mirrored or not, recoloured, and some clicks are several.
+    """
+    import cv2
+
+    height, width = view.thing.shape
+    size = round(min(height, width) * rng.uniform(LEAST_CROP, 1.0))
+    top, left = rng.integers(height - size + 1), rng.integers(width - size + 1)
+    part = np.s_[top : top + size, left : left + size]
+    nearest = lambda v: cv2.resize(np.ascontiguousarray(v), (side, side), interpolation=cv2.INTER_NEAREST)  # noqa: E731
+    way = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
+    smooth = lambda v: cv2.resize(np.ascontiguousarray(v, np.float32), (side, side), interpolation=way)  # noqa: E731
+    thing, depth = (np.asarray(nearest(v)) for v in (view.thing[part], view.depth[part].astype(np.float32)))
+    rgb, normal = smooth(view.rgb[part]) / 255, _unit(smooth(view.normal[part]))
+    if rng.random() < 0.5:
+        thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
+        normal = normal[:, ::-1] * [-1, 1, 1]
+    chosen = _chosen(thing, rng)
+    if chosen is None:
+        return None
+    mask = thing == chosen
+    count = int(rng.integers(2, 4)) if rng.random() < MORE else 1
+    clicks = [place for _ in range(count) if (place := click_in(mask & (depth > 0), rng)) is not None]
+    if not clicks:
+        return None
+    rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
+    return features(rgb, normal, depth, clicks), mask
+
+
+def _unit(normal: Array) -> Array:
+    """[H, W, 3] of length 1."""
+    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+
+
+def click_in(mask: Array, rng: np.random.Generator) -> tuple[int, int] | None:
+    """(column, row) of a random pixel of a mask [H, W] bool, away from its border where it is large enough."""
+    import cv2
+
+    away = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    places = np.argwhere(away > min(DEEP, 0.5 * float(away.max())))
+    if not len(places):
+        return None
+    row, column = places[rng.integers(len(places))]
+    return int(column), int(row)
+
+
+def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
+    """The number of something to click on: things rather than walls, large ones somewhat rather than small ones."""
+    numbers, count = np.unique(thing[thing != 0], return_counts=True)
+    large = count >= FEWEST
+    numbers, count = numbers[large], count[large]
+    if not len(numbers):
+        return None
+    things = numbers > 0
+    weight = np.sqrt(count)
+    for kind, share in ((things, THINGS), (~things, 1 - THINGS)):
+        if kind.any():
+            weight[kind] *= share / weight[kind].sum()
+    return int(rng.choice(numbers, p=weight / weight.sum()))
+
+
+def _write(path: Path, **arrays: Array) -> None:
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        with open(temporary, "wb") as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

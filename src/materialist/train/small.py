@@ -1,0 +1,149 @@
+"""The training of the small networks: one process, resumable, its learning curve kept."""
+
+from __future__ import annotations
+
+import copy
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from materialist.errors import InputError, OutputError
+from materialist.train import checkpoint
+from materialist.train.budget import Budget, Clock
+
+CURVE = "curve.jsonl"
+"""Mean losses every REPORT_STEPS steps."""
+SCORES = "scores.jsonl"
+"""Figures on what is kept aside, at every checkpoint."""
+WEIGHTS = "weights.safetensors"
+REPORT_STEPS = 50
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What decides how a small network is trained; stored with its weights."""
+
+    batch: int = 32
+    rate: float = 2e-3
+    weight_decay: float = 0.02
+    warm_up: int = 100
+    last_rate: float = 0.01
+    ema: float = 0.998
+    clip: float = 1.0
+    bfloat16: bool = False
+
+    def __post_init__(self) -> None:
+        if self.batch < 1 or not 0 < self.rate < 1:
+            raise InputError(f"batch is {self.batch}, the rate {self.rate:g}; give at least 1, and between 0 and 1.")
+
+
+class Run(ABC):
+    """One run in one folder; `run` trains, keeps a checkpoint, and leaves the averaged weights as float16."""
+
+    def __init__(
+        self, folder: Path, network: Callable[[], nn.Module], recipe: Recipe, *, budget: Budget, seed: int = 0,
+        every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
+    ):  # fmt: skip
+        """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off."""
+        self.folder, self.recipe, self.note, self.seed, self.every = folder, recipe, note, seed, every
+        torch.manual_seed(seed)
+        self.network: Any = network()
+        self.averaged: Any = copy.deepcopy(self.network).requires_grad_(False).eval()
+        self.optimizer = torch.optim.AdamW(
+            self.network.parameters(), recipe.rate, (0.9, 0.98), weight_decay=recipe.weight_decay, fused=True
+        )
+        self.clock, self.epoch = Clock(budget), 0
+        exists = (folder / checkpoint.NAME).is_file()
+        if exists and not resume:
+            raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")
+        folder.mkdir(parents=True, exist_ok=True)
+        if exists:
+            state = checkpoint.load(folder)
+            self.network.load_state_dict(state["network"])
+            self.averaged.load_state_dict(state["averaged"])
+            self.optimizer.load_state_dict(state["optimizer"])
+            for group in self.optimizer.param_groups:
+                group["fused"] = True
+            self.epoch, self.clock = state["epoch"], Clock(budget, step=state["step"], seconds=state["seconds"])
+
+    @abstractmethod
+    def batches(self) -> Iterator[dict[str, Tensor]]:
+        """Batches without end; the network sees `maps`."""
+
+    @abstractmethod
+    def terms(self, found: Tensor, batch: dict[str, Tensor]) -> dict[str, Tensor]:
+        """Weighted terms of the loss of an answer, by name."""
+
+    @abstractmethod
+    def figures(self) -> dict[str, float]:
+        """Scores of the averaged weights on what is kept aside; none where nothing is."""
+
+    @abstractmethod
+    def write(self, path: Path, facts: dict[str, Any]) -> None:
+        """The averaged weights as the package reads them."""
+
+    def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
+        """Train until the budget is spent; returns the last figures."""
+        total: dict[str, float] = {}
+        since = saved = time.monotonic()
+        scoring = 0.0  # seconds that do not count for the speed of training
+        for batch in self.batches():
+            for name, value in self._step(batch).items():
+                total[name] = total.get(name, 0.0) + value
+            if self.clock.step % REPORT_STEPS == 0:
+                speed = REPORT_STEPS * self.recipe.batch / max(time.monotonic() - since - scoring, 1e-6)
+                line = {"step": self.clock.step, "seconds": self.clock.seconds, "per_second": speed}
+                line |= {k: v / REPORT_STEPS for k, v in total.items()}
+                checkpoint.append_line(self.folder / CURVE, {k: float(f"{v:.5g}") for k, v in line.items()})
+                progress("train", round(1000 * self.clock.progress), 1000)
+                total, since, scoring = {}, time.monotonic(), 0.0
+            if self.clock.done:
+                break
+            if time.monotonic() - saved > self.every:
+                start = time.monotonic()
+                self.save()
+                saved = time.monotonic()
+                scoring += saved - start
+        return self.save()
+
+    def save(self) -> dict[str, float]:
+        """Write the checkpoint, the scores of the averaged weights, and these as float16."""
+        figures = self.figures()
+        state = {
+            "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
+            "optimizer": self.optimizer.state_dict(), "step": self.clock.step, "epoch": self.epoch,
+            "seconds": self.clock.seconds,
+        }  # fmt: skip
+        checkpoint.save(self.folder, state)
+        line = {"step": self.clock.step, "seconds": round(self.clock.seconds, 1)}
+        checkpoint.append_line(self.folder / SCORES, line | {k: round(v, 4) for k, v in figures.items()})
+        facts = {
+            **line, "views": self.clock.step * self.recipe.batch, "recipe": asdict(self.recipe), "scores": figures
+        }  # fmt: skip
+        self.write(self.folder / WEIGHTS, facts)
+        self.note(f"step {self.clock.step}  " + "  ".join(f"{k} {v:.3f}" for k, v in figures.items()))
+        return figures
+
+    def _step(self, batch: dict[str, Tensor]) -> dict[str, float]:
+        recipe = self.recipe
+        for group in self.optimizer.param_groups:
+            group["lr"] = recipe.rate * self.clock.rate(recipe.warm_up, recipe.last_rate)
+        with torch.autocast("cpu", torch.bfloat16, enabled=recipe.bfloat16):
+            found = self.network(batch["maps"])
+        terms = self.terms(found, batch)
+        loss = sum(terms.values(), torch.zeros(()))
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), recipe.clip)
+        self.optimizer.step()
+        self.clock.step += 1
+        decay = min(recipe.ema, (1 + self.clock.step) / (10 + self.clock.step))
+        with torch.no_grad():
+            torch._foreach_lerp_(list(self.averaged.parameters()), list(self.network.parameters()), 1 - decay)
+        return {"loss": loss.item(), **{k: v.item() for k, v in terms.items()}}

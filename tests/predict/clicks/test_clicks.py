@@ -1,0 +1,137 @@
+"""ClickNet: what it sees, where it looks, and that the weights that ship find things."""
+
+import numpy as np
+import pytest
+import torch
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError, WeightsError
+from materialist.predict.clicks import weights
+from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
+from materialist.predict.clicks.network import ClickNet
+from materialist.predict.clicks.segment import LEAST, SIDE, Photo, _around, object_at
+from materialist.predict.unet import Architecture
+from materialist.types import Camera
+
+SMALL = Architecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
+DISTANCE, SPOT, COSINE = -1, -2, -3
+COLOUR = slice(8, 11)
+
+
+def scene(size=(120, 160), at=(80, 66), radius=30):
+    """A red ball on a grey floor, seen from above: photo, and the ball's mask."""
+    camera = Camera(size[1], size[0], 45.0)
+    rays = pixel_rays(camera).astype(float)
+    floor = np.array([0.0, 0.6, 0.8])
+    depth = -2.0 / np.minimum(rays @ floor, -1e-3)
+    y, x = np.mgrid[: size[0], : size[1]]
+    u, v = (x - at[0]) / radius, (y - at[1]) / radius
+    ball = u**2 + v**2 < 1
+    bulge = np.sqrt(np.clip(1 - u**2 - v**2, 0, 1))
+    normal = np.where(ball[..., None], np.stack([u, -v, bulge], -1), floor)
+    middle = depth[at[1], at[0]]
+    depth = np.where(ball, middle * (0.92 - 0.12 * bulge), depth)
+    shade = (normal @ np.array([0.3, 0.8, 0.5])).clip(0.15)
+    rgb = np.where(ball[..., None], [0.75, 0.2, 0.15], [0.55, 0.55, 0.52]) * shade[..., None] ** 0.5
+    rgb = rgb + np.random.default_rng(0).normal(0, 0.01, rgb.shape)
+    return Photo(rgb.clip(0, 1).astype(np.float32), normal.astype(np.float32), depth.astype(np.float32)), ball
+
+
+@pytest.fixture(scope="module")
+def untrained(tmp_path_factory):
+    torch.manual_seed(0)
+    network = ClickNet(SMALL)
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, 0, 0.1)
+    path = tmp_path_factory.mktemp("weights") / "w.safetensors"
+    weights.save(path, network, {"step": 7})
+    return path
+
+
+def test_features_have_closed_forms():
+    photo, _ = scene()
+    maps = features(*photo, [(80, 66)])
+    assert maps.shape == (CHANNELS, 120, 160) and maps.dtype == np.float32
+    y, x = np.indices((120, 160))
+    np.testing.assert_allclose(maps[DISTANCE], np.hypot(x - 80, y - 66) / 160, atol=1e-6)
+    assert maps[SPOT, 66, 80] == 1 and maps[SPOT, 66, 90] < 0.01
+    np.testing.assert_allclose(maps[:3], np.moveaxis(photo.rgb, -1, 0) - 0.5, atol=1e-6)
+    assert maps[COLOUR, 66, 80].max() < 0.03 < maps[COLOUR, 110, 20].max()
+    assert maps[COSINE, 66, 80] > 0.99
+
+
+def test_of_several_clicks_the_nearest_and_the_likest_count():
+    photo, _ = scene()
+    one, two, both = (features(*photo, clicks) for clicks in ([(80, 66)], [(10, 100)], [(80, 66), (10, 100)]))
+    np.testing.assert_array_equal(both[DISTANCE], np.minimum(one[DISTANCE], two[DISTANCE]))
+    np.testing.assert_array_equal(both[SPOT], np.maximum(one[SPOT], two[SPOT]))
+    np.testing.assert_array_equal(both[COSINE], np.maximum(one[COSINE], two[COSINE]))
+    assert (both[COLOUR].sum(0) <= np.minimum(one[COLOUR].sum(0), two[COLOUR].sum(0)) + 1e-6).all()
+
+
+def test_a_mirrored_photo_has_mirrored_features():
+    photo, _ = scene()
+    other = Photo(photo.rgb[:, ::-1], photo.normal[:, ::-1] * [-1, 1, 1], photo.depth[:, ::-1])
+    there = features(*other, [(159 - 70, 50)])[..., ::-1].copy()
+    there[NORMAL_X] *= -1
+    np.testing.assert_allclose(there, features(*photo, [(70, 50)]), atol=1e-6)
+
+
+def test_a_click_on_the_sky_and_photos_without_surfaces_are_finite():
+    photo, _ = scene()
+    empty = photo._replace(depth=np.zeros_like(photo.depth))
+    assert np.isfinite(features(*empty, [(5, 5)])).all()
+
+
+def test_the_share_is_one_of_each_pixel_and_repeats(untrained):
+    photo, _ = scene()
+    found = object_at(photo, [(80, 66)], weights=untrained)
+    assert found.shape == (120, 160) and found.dtype == np.float32 and 0 <= found.min() <= found.max() <= 1
+    np.testing.assert_array_equal(found, object_at(photo, [(80, 66)], weights=untrained))
+    mirrored = Photo(photo.rgb[:, ::-1], photo.normal[:, ::-1] * np.float32([-1, 1, 1]), photo.depth[:, ::-1])
+    other = object_at(mirrored, [(79, 66)], weights=untrained)[:, ::-1]
+    assert np.abs(found - other).mean() < 0.05
+
+
+@pytest.mark.parametrize("size", [(40, 300), (300, 40), (9, 9)])
+def test_photos_of_any_shape(untrained, size):
+    rng = np.random.default_rng(0)
+    photo = Photo(*(rng.random((*size, *more), np.float32) for more in ((3,), (3,), ())))
+    assert object_at(photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
+
+
+def test_the_second_look_holds_the_object_and_the_clicks_and_stays_inside():
+    mask = np.zeros((400, 600), bool)
+    mask[10:50, 20:80] = True
+    rows, columns = _around(mask, [(90, 60)])
+    assert rows.start == 0 and columns.start == 0 and rows.stop >= 61 and columns.stop >= 91
+    assert columns.stop - columns.start >= LEAST * 600 - 1
+    assert _around(np.ones((400, 600), bool), [(5, 5)]) is None
+    assert _around(np.zeros((400, 600), bool), [(599, 399)])[1].stop == 600
+
+
+def test_bad_input(untrained, tmp_path):
+    photo, _ = scene()
+    for clicks in ([], [(160, 5)], [(5, -1)]):
+        with pytest.raises(InputError, match="give at least one inside 160 x 120"):
+            object_at(photo, clicks, weights=untrained)
+    with pytest.raises(WeightsError, match="materialist train clicks"):
+        object_at(photo, [(5, 5)], weights=tmp_path / "none.safetensors")
+    (tmp_path / "bad.safetensors").write_bytes(b"not weights")
+    with pytest.raises(WeightsError):
+        object_at(photo, [(5, 5)], weights=tmp_path / "bad.safetensors")
+
+
+def test_weights_keep_what_they_are(untrained):
+    network, facts = weights.load(untrained)
+    assert network.architecture == SMALL and facts["step"] == 7 and not network.training
+    maps = torch.zeros(2, CHANNELS, 64, 32)
+    assert network(maps).shape == (2, 64, 32)
+
+
+@pytest.mark.parametrize("click", [(80, 66), (66, 55), (92, 80)])
+def test_the_weights_that_ship_find_a_ball(click):
+    photo, ball = scene()
+    found = object_at(photo, [click]) > 0.5
+    assert (found & ball).sum() / (found | ball).sum() > 0.6
+    assert SIDE % 32 == 0
