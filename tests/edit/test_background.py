@@ -172,6 +172,7 @@ def test_the_light_of_the_surroundings_goes_on_in_the_filled_place():
     plane = np.where(np.arange(30)[None] < 15, 0, 1) * np.ones((20, 1), int)
     change = np.where((plane == 0)[..., None], 0.2, -0.1) * np.ones(3)
     change[filled] = 7.0  # what it says there itself is not read
+    change[2:4] = -0.9  # and this is another surface that came to light
     found = _continued(change, filled, plane)
     np.testing.assert_allclose(found[filled & (plane == 0)], 0.2, atol=1e-6)
     np.testing.assert_allclose(found[filled & (plane == 1)], -0.1, atol=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.edit.exemplar import Plan, exemplar_plan
-from materialist.edit.seamless import LEAST, seamless
+from materialist.edit.seamless import LEAST, MOST, seamless
 
 SHAPE = (40, 80)
 HOLE = np.zeros(SHAPE, bool)
@@ -66,3 +66,15 @@ def test_holes_at_the_frame_are_solved_too(place):
     plan = exemplar_plan(picture, hole, np.ones(SHAPE, bool), np.zeros(SHAPE, int))
     found = seamless(plan, picture)
     assert np.isfinite(found).all() and (found >= 0).all() and found[hole].max() < 3
+
+
+def test_pieces_that_contradict_each_other_stay_near_their_own_levels():
+    """Sources at random over a picture of harsh steps: gradients that belong to no picture."""
+    rng = np.random.default_rng(1)
+    picture = np.where(rng.random((*SHAPE, 1)) < 0.5, 0.0, 50.0) * np.ones(3)
+    rows, columns = np.nonzero(HOLE)
+    known = np.flatnonzero(~HOLE)
+    plan = Plan(rows, columns, rng.choice(known, len(rows)), np.ones(len(rows), np.float32), HOLE, reach=0)
+    found, plain = seamless(plan, picture), plan.fill(picture)
+    off = np.abs(np.log(found + LEAST) - np.log(plain + LEAST))
+    assert off.max() <= MOST + 1e-4 and off[HOLE].max() > 0.3

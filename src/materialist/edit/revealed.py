@@ -14,6 +14,11 @@ from materialist.edit.layers import Layers, denoised
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Photo, Scene
 
+LEAST = 0.02
+"""Added to radiance before its change is taken as a factor."""
+MOST = 0.4
+"""Logarithm of the largest change of light that is carried on."""
+
 
 def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, clean: bool = True):
     """(Photo, Layers) for `composite.into_photo`, of the layers that a `lights.Studio` rendered.
@@ -31,7 +36,8 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     bare = _bare(studio, edited, layers, spp, seed, clean)
     if not _given(edited):
-        bare = bare - _continued(bare - layers.base, filled, edited.geometry.plane_label)
+        factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
+        bare = bare - edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
@@ -59,11 +65,15 @@ def _given(edited: Scene) -> bool:
 
 
 def _continued(change: Array, filled: Array, plane: Array) -> Array:
-    """[H, W, 3] in the filled places, a change beside them carried on, on each plane by itself."""
+    """[H, W, 3] in the filled places, a change beside them (logarithms) carried on, on each plane by itself.
+
+    Changes of more than MOST are not of the light: there another surface is seen.
+    """
     out = np.zeros_like(change)
+    light = np.abs(change).max(-1) < MOST
     for number in np.unique(plane[filled]):
         here = plane == number
-        beside = here & ~filled
+        beside = here & ~filled & light
         if beside.any():
             own = filled & here
             out[own] = membrane(change, beside)[own]

@@ -16,6 +16,8 @@ LEAST = 0.05
 ALIKE = 0.25
 """Logarithms by which what is known beside a hole may differ from a piece that goes on there; what differs more is
 another thing, and says nothing about the level."""
+MOST = 0.5
+"""Logarithms by which a level is changed at most. Where pieces do not fit each other, their gradients contradict."""
 HELD, KNOWN = 1e-4, 1.0
 """Weight of a piece's own level beside that of one gradient: borders reach about a hundred pixels into a hole, but
 hardly where a pattern tells what is hidden (`Plan.told`): there the level is known better than the border knows it."""
@@ -37,8 +39,10 @@ def seamless(plan: Plan, radiance: Array) -> Array:
     first, second, step = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
     held = np.full(hole.shape, HELD)
     held[plan.rows[: plan.told], plan.columns[: plan.told]] = KNOWN
+    solved = _solved(hole, filled, held[hole], first, second, step)
+    off = np.clip(solved - filled[hole], -MOST, MOST)
     out = np.asarray(radiance, np.float32).copy()
-    out[hole] = np.maximum(np.exp(_solved(hole, filled, held[hole], first, second, step)) - LEAST, 0)
+    out[hole] = np.maximum(np.exp(filled[hole] + off) - LEAST, 0)
     return out
 
 

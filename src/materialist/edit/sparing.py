@@ -69,6 +69,6 @@ def noisy(d0: Array, d1: Array, tone: Array) -> Array:
     import cv2
 
     box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (WINDOW, WINDOW), borderType=cv2.BORDER_REFLECT)  # noqa: E731
-    noise = np.sqrt(box(((d0 - d1) / 2) ** 2))
+    noise = np.sqrt(np.maximum(box(((d0 - d1) / 2) ** 2), 0))  # a running sum may end below 0
     slope = 1.055 / 2.4 * np.maximum(box(tone), 0.0031308) ** (1 / 2.4 - 1)  # of the sRGB curve
     return (255 * slope * noise).max(-1) > LEVELS
