@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.types import Array, Camera, Materials, Prediction
 
 
@@ -130,3 +131,14 @@ def _decode(arrays: dict[str, Array]) -> Sample:
         rays=pixel_rays(Camera(width, height, float(arrays["fov"])))[..., :2].copy(),
         shading=None if shading is None else np.nan_to_num(shading.astype(np.float32), posinf=6e4),
     )
+
+
+def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
+    """An .npz of arrays, whole or not at all. Raises OutputError where it cannot be written."""
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    try:
+        with open(temporary, "wb") as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        os.replace(temporary, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

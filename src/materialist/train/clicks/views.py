@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
 from materialist.predict.clicks.features import features
-from materialist.train.samples import SampleFolder, read_sample
+from materialist.train.samples import SampleFolder, read_sample, write_arrays
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
@@ -67,10 +66,11 @@ def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> i
             linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
             camera = Camera(linear.shape[1], linear.shape[0], angle)
             found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
-            _write(
-                target, rgb=(linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), thing=thing,
-                normal=np.rint(found.normal * 127).astype(np.int8), depth=found.depth.astype(np.float16),
-            )  # fmt: skip
+            made = {
+                "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": thing,
+                "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
+            }  # fmt: skip
+            write_arrays(target, made)
         progress("views", number + 1, len(source.paths))
     return len(source.paths)
 
@@ -145,13 +145,3 @@ def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
         if kind.any():
             weight[kind] *= share / weight[kind].sum()
     return int(rng.choice(numbers, p=weight / weight.sum()))
-
-
-def _write(path: Path, **arrays: Array) -> None:
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -15,6 +14,7 @@ from materialist.errors import InputError, OutputError
 from materialist.train.refraction.glassware import SPLITS, shape
 from materialist.train.refraction.paths import Tracer
 from materialist.train.refraction.view import lesson
+from materialist.train.samples import write_arrays
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
@@ -52,7 +52,7 @@ def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> f
     for index in range(plan.shapes):
         path = folder / f"{index:05d}.npz"
         if not path.exists():
-            _write(path, views(index, plan))
+            write_arrays(path, views(index, plan))
         progress("shapes", index + 1, plan.shapes)
     return time.monotonic() - start
 
@@ -98,13 +98,3 @@ def _open(folder: Path, plan: Plan) -> None:
         file.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
-
-
-def _write(path: Path, arrays: dict[str, Array]) -> None:
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
