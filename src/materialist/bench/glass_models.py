@@ -28,13 +28,8 @@ def inpainted_background(
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
     albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
-    from materialist.color import linear_to_srgb
-    from materialist.edit.background import joined
+    from materialist.edit.background import filled, looks, sources
     from materialist.edit.behind import SKY, behind
-    from materialist.edit.exemplar import exemplar_plan
-    from materialist.edit.regular import regular_sources
-    from materialist.edit.seamless import seamless
-    from materialist.geometry.membrane import membrane
 
     hole = _grown(scene.mask)
     depth = np.where(hole, 0, scene.behind.depth)
@@ -48,11 +43,8 @@ def inpainted_background(
         grey = _paint(scene._mi, scene.item.albedo)
         things = {"object": _mesh(scene._mi, body(scene, found, depth), grey)}
     albedo = albedo_of(scene, depth, normal, photo, envmap, ends, things)
-    seen = np.concatenate([linear_to_srgb(albedo), linear_to_srgb(np.clip(photo * gain, 0, 1))], -1)
-    anywhere = np.ones_like(hole)
-    told = regular_sources(seen, hole, anywhere, label, depth, scene.camera)
-    plan = exemplar_plan(seen, hole, anywhere, joined(label, hole), told=told)
-    exposed, albedo = (membrane(x, ~hole) if plan is None else seamless(plan, x) for x in (photo * gain, albedo))
+    plan = sources(looks(albedo, np.clip(photo * gain, 0, 1)), hole, label, depth, scene.camera)
+    exposed, albedo = (filled(plan, x, hole) for x in (photo * gain, albedo))
     return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 
 

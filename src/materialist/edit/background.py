@@ -18,7 +18,7 @@ from materialist.edit.seamless import seamless
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
-from materialist.types import Array, Materials, Photo, Scene
+from materialist.types import Array, Camera, Materials, Photo, Scene
 
 Inpaint = Callable[[Array, Array], Array]
 """inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
@@ -51,7 +51,8 @@ def without(
     label = scene.geometry.plane_label.astype(np.int64)
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
-    plan = _plan(scene, found, hole, seed)
+    features = looks(scene.materials.albedo, scene.photo.linear)
+    plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed)
     shown = _denoised(scene)
     picture = _given(scene, background, inpaint, hole)
     if picture is None:
@@ -70,12 +71,21 @@ def without(
     return noted(removed, "remove", what)
 
 
-def _plan(scene: Scene, found: Behind, hole: Hole, seed: int) -> Plan | None:
-    """Where the hole is filled from: patterns of planes go on; else albedo and photo must look alike, on a surface."""
-    features = np.concatenate([linear_to_srgb(scene.materials.albedo), linear_to_srgb(scene.photo.linear)], -1)
-    anywhere = np.ones(hole.painted.shape, bool)
-    told = regular_sources(features, hole.painted, anywhere, found.label, found.depth, scene.camera)
-    return exemplar_plan(features, hole.painted, anywhere, joined(found.label, hole.painted), told=told, seed=seed)
+def looks(albedo: Array, photo: Array) -> Array:
+    """[H, W, 6] sRGB of albedo and photo [H, W, 3] linear: places that fill a hole must be alike in both."""
+    return np.concatenate([linear_to_srgb(albedo), linear_to_srgb(photo)], -1)
+
+
+def sources(
+    features: Array, hole: Array, label: Array, depth: Array, camera: Camera, *, seed: int = 0
+) -> Plan | None:  # fmt: skip
+    """Where a hole [H, W] bool is filled from: patterns of planes go on; else `looks` must be alike, on a surface.
+
+    `label`, `depth` [H, W]: surfaces in and around the hole (see `behind.Behind`). None where nothing can be copied.
+    """
+    anywhere = np.ones(hole.shape, bool)
+    told = regular_sources(features, hole, anywhere, label, depth, camera)
+    return exemplar_plan(features, hole, anywhere, joined(label, hole), told=told, seed=seed)
 
 
 def joined(label: Array, hole: Array) -> Array:
@@ -93,7 +103,7 @@ def joined(label: Array, hole: Array) -> Array:
     return out
 
 
-def _filled(plan: Plan | None, maps: Array, hole: Array) -> Array:
+def filled(plan: Plan | None, maps: Array, hole: Array) -> Array:
     """[H, W, C] radiance or albedo with the hole filled: patches without seams, or a membrane where there are none."""
     return seamless(plan, maps) if plan is not None else membrane(maps, ~hole)
 
@@ -102,13 +112,13 @@ def _materials(scene: Scene, plan: Plan | None, hole: Array) -> Materials:
     old = scene.materials
     rest = np.stack([old.roughness, old.metallic], -1)
     rest = plan.fill(rest) if plan is not None else membrane(rest, ~hole)
-    albedo = np.clip(_filled(plan, old.albedo, hole), 0, 1)
+    albedo = np.clip(filled(plan, old.albedo, hole), 0, 1)
     return Materials(albedo, *(np.ascontiguousarray(np.clip(part, 0, 1)) for part in (rest[..., 0], rest[..., 1])))
 
 
 def _continued(scene: Scene, plan: Plan | None, hole: Hole, shown: Array) -> tuple[Materials, Photo, Array]:
     """Materials, photo and re-rendering filled with patches."""
-    linear, rerender = (_filled(plan, picture, hole.painted) for picture in (scene.photo.linear, shown))
+    linear, rerender = (filled(plan, picture, hole.painted) for picture in (scene.photo.linear, shown))
     photo = _with_hole(scene.photo, linear, hole.painted, plan)
     return _materials(scene, plan, hole.painted), photo, rerender.astype(np.float32)
 

@@ -60,7 +60,6 @@ def _pairs(plan: Plan, values: Array, filled: Array, where: Array, along: int) -
     near = (hole[first] | hole[second]) & (label[first] == label[second])
     first, second = first[near], second[near]
     total, count = np.zeros((len(first), flat.shape[1])), np.zeros(len(first))
-    told = own.copy()  # what a piece would put at the other one of a pair
     off = np.zeros(len(first))
     for here, there, stride in ((first, second, width ** (1 - along)), (second, first, -(width ** (1 - along)))):
         source = where[here]
@@ -73,7 +72,7 @@ def _pairs(plan: Plan, values: Array, filled: Array, where: Array, along: int) -
         gradient = (flat[beside] - flat[source]) * np.sign(stride)
         total += np.where(sound[:, None], gradient, 0)
         count += sound
-        expected = np.where(sound[:, None], flat[beside], told[here])
+        expected = np.where(sound[:, None], flat[beside], own[here])
         off = np.where(hole[here] & ~hole[there], np.abs(expected - flat[there]).max(-1), off)
     step = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own[second] - own[first])
     alike = off <= ALIKE
