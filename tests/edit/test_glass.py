@@ -108,3 +108,47 @@ def test_masks_at_the_frame_in_parts_and_over_everything():
     ):  # fmt: skip
         with pytest.raises(InputError, match=message):
             glass(scene, bad)
+
+
+def test_the_papers_glass_has_the_front_of_the_lathe_s_body():
+    """Not that of the maps, whose normals have the photo's texture in them; blurred where there is no such body."""
+    import sys
+    from dataclasses import replace
+    from pathlib import Path
+
+    sys.path.append(str(Path(__file__).parents[1] / "geometry"))
+    from test_lathe import CAMERA, UP, prism, solid
+
+    from materialist.edit.glass import _front
+    from materialist.edit.thickness import ObjectThickness
+    from materialist.geometry.lathe import lathed
+
+    depth, normal, mask, _ = solid(prism(180))
+    lathe = lathed(depth, normal, mask, CAMERA, up=UP)
+    rng = np.random.default_rng(0)
+    noisy = normal + 0.3 * rng.normal(size=normal.shape)
+    noisy /= np.linalg.norm(noisy, axis=-1, keepdims=True)
+    scene = replace(flat_scene(), camera=CAMERA, depth=1.2 * depth, normal=noisy)
+    off = lambda n, where: np.degrees(np.arccos(np.clip((n * normal).sum(-1), -1, 1)))[where].mean()  # noqa: E731
+
+    own, front, lean = _front(scene, mask, ObjectThickness(lathe.thickness, 0.1, "lathe", None, lathe), 0.01)
+    assert (own & mask).sum() > 0.95 * mask.sum() and not (own & ~mask).any()
+    np.testing.assert_allclose(front[own], depth[own], rtol=0.02)
+    assert off(lean, own) < 4 < off(noisy, own)
+
+    own, front, lean = _front(scene, mask, ObjectThickness(lathe.thickness, 0.1, "network"), 0.03)
+    assert (own == mask).all() and front is scene.depth
+    assert off(lean, mask) < 0.7 * off(noisy, mask)
+
+
+def test_what_is_brighter_than_the_scene_does_not_turn_black():
+    """The light that goes on in a filled place is a factor on its photo: with a lamp in it, more than the scene has."""
+    from dataclasses import replace
+
+    scene = rendered_scene()
+    edited = glass(scene, MASK, model="two-interface", thickness="symmetry")
+    lamp = edited.photo.linear.copy()
+    lamp[15:21, 15:21] = 40.0
+    edited = replace(edited, photo=replace(edited.photo, linear=lamp, original=lamp))
+    picture = composite(scene, edited, spp=16, denoise=False)
+    assert picture[15:21, 15:21].min() > 20

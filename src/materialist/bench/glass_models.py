@@ -82,12 +82,9 @@ def closed_proxy(
 
 def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
-    from materialist.geometry.closed import closed_proxy as close
+    from materialist.geometry.standing import standing_body
 
-    if found.lathe is not None:
-        return found.lathe.body(scene.camera)
-    front = scene.front
-    return close(front.depth, front.normal, scene.mask, found.solid, scene.camera, behind=depth, back=found.back)
+    return standing_body(scene.front.depth, scene.front.normal, scene.mask, found, scene.camera, behind=depth)
 
 
 def before(

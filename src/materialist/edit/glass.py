@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from materialist.camera import pixel_rays
 from materialist.edit.background import Inpaint, without
 from materialist.edit.hole import GROW
 from materialist.edit.material import noted
 from materialist.edit.region import checked_region
 from materialist.edit.thickness import ObjectThickness, object_thickness
 from materialist.errors import InputError
-from materialist.geometry.closed import closed_proxy
-from materialist.geometry.shell import Shell
+from materialist.geometry.standing import room, standing_body
 from materialist.types import Array, Body, Scene, Surface
 
 MODELS = ("closed", "two-interface")
@@ -56,9 +57,13 @@ def glass(
     )  # fmt: skip
     found = object_thickness(scene, own, thickness, behind=removed.depth)
     if model == "two-interface":
-        edited = _two_interface(scene, removed, own, found, ior, transmission, tint, roughness)
+        look = {"ior": ior, "transmission": transmission, "tint": tint, "roughness": roughness}
+        edited = _two_interface(scene, removed, own, found, look, smooth)
     else:
-        shell = _shell(scene, removed, own, found, hollow, smooth)
+        shell = standing_body(
+            scene.depth, scene.normal, own, found, scene.camera, behind=removed.depth,
+            wall=found.wall if hollow else None, smooth=smooth,
+        )  # fmt: skip
         surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, "glass")
         edited = replace(removed, bodies=(*removed.bodies, body))
@@ -82,38 +87,44 @@ def glass_surface(
     return Surface(albedo, rough, metallic, float(transmission), float(ior), (r, g, b))
 
 
-def _shell(scene: Scene, removed: Scene, own: Array, found: ObjectThickness, hollow: bool, smooth: float) -> Shell:
-    """The closed object in front of what is behind it now."""
-    if found.lathe is not None:
-        return found.lathe.body(scene.camera, wall=found.wall if hollow else None)
-    return closed_proxy(
-        scene.depth, scene.normal, own, found.solid, scene.camera, smooth=smooth,
-        wall=found.wall if hollow else None, behind=removed.depth, back=found.back,
-    )  # fmt: skip
-
-
 def _two_interface(
-    scene: Scene, removed: Scene, own: Array, found: ObjectThickness, ior: float, transmission: float,
-    tint: tuple[float, float, float], roughness: float,
-) -> Scene:  # fmt: skip
+    scene: Scene, removed: Scene, own: Array, found: ObjectThickness, look: dict[str, Any], smooth: float
+) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo."""
     from materialist.edit.background import resized
     from materialist.edit.two_interface import back_of, two_interface
 
+    own, depth, normal = _front(scene, own, found, smooth)
+    factor = room(depth, found.solid, own, removed.depth, scene.camera)
+    depth, solid = factor * depth, factor * found.solid
     picture = two_interface(
-        scene.camera, scene.normal, scene.depth, own, found.solid, removed.depth, removed.photo.linear, scene.envmap,
-        ior=ior, transmission=transmission, tint=tint, roughness=roughness,
-        back=back_of(scene.depth, own, found.solid, found.back, scene.camera),
+        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap,
+        back=back_of(depth, own, solid, found.back, scene.camera), **look,
     )  # fmt: skip
     photo = removed.photo
-    if transmission < 1:
-        picture = picture + (1 - transmission) * scene.photo.linear * own[..., None]
+    if look["transmission"] < 1:
+        picture = picture + (1 - look["transmission"]) * scene.photo.linear * own[..., None]
     linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
     share = np.clip(resized(own.astype(np.float32), native), 0, 1)[..., None]
     near = resized(_beyond(picture, own), native)
     original = (share * near + (1 - share) * photo.original).astype(np.float32)
     return replace(removed, photo=replace(photo, linear=linear, original=original))
+
+
+def _front(scene: Scene, own: Array, found: ObjectThickness, smooth: float) -> tuple[Array, Array, Array]:
+    """Where glass is seen, [H, W] bool, and its front's depth and normals: those of the lathe's body, or of the maps.
+
+    Normals of the maps are blurred as for the closed proxy.
+    """
+    from materialist.geometry.outline import seen_from
+    from materialist.geometry.ridges import blurred_normals
+
+    if found.lathe is None:
+        return own, scene.depth, blurred_normals(scene.normal, own, smooth * float(np.sqrt(own.sum())))
+    rays = pixel_rays(scene.camera).astype(np.float64)
+    depth, normal = seen_from(found.lathe.profile, found.lathe.axis, own, rays)
+    return depth > 0, depth, normal
 
 
 def _beyond(picture: Array, own: Array) -> Array:

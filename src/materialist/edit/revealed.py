@@ -37,7 +37,8 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     bare = _bare(studio, edited, layers, spp, seed, clean)
     if not _given(edited):
         factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
-        bare = bare - edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
+        change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
+        bare = np.maximum(bare - change, 0)  # filled places may be far brighter than what is rendered there
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
