@@ -125,6 +125,26 @@ def test_missing_textures_are_told_and_a_constant_serves(tmp_path):
         read_model(gltf_file(tmp_path, "gone.bin"))
 
 
+@pytest.mark.parametrize("key", ["map_Kd", "map_Pr"])
+@pytest.mark.parametrize("what", ["damaged", "huge", "missing"])
+def test_a_map_of_an_mtl_that_cannot_be_had_is_told(tmp_path, monkeypatch, key, what):
+    from PIL import Image
+
+    if what != "missing":
+        Image.fromarray(np.full((64, 64, 3), 200, np.uint8)).save(tmp_path / "c.png")
+    if what == "damaged":
+        (tmp_path / "c.png").write_bytes(b"no picture")
+    if what == "huge":
+        monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 500)
+    (tmp_path / "m.mtl").write_text(f"newmtl a\nKd 1 0 0\n{key} c.png\n")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (tmp_path / "m.obj").write_text(f"mtllib m.mtl\nusemtl a\n{corners}f 1/1 2/2 3/3\n")
+    model = read_model(tmp_path / "m.obj")
+    wanted = "c.png is missing" if what == "missing" else "a texture cannot be read"
+    assert len([note for note in model.warnings if wanted in note]) == 1, model.warnings
+    np.testing.assert_allclose(model.parts[0].surface.albedo, [[[1, 0, 0]]])
+
+
 def test_a_damaged_texture_is_told(tmp_path):
     path = textured_obj(tmp_path)
     good = (tmp_path / "quad.png").read_bytes()

@@ -12,6 +12,7 @@ from materialist.errors import InputError
 MAX_FACES = 2_000_000
 """Triangles of a file that is still read."""
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp")
 
 
 class MeshFolder:
@@ -19,7 +20,7 @@ class MeshFolder:
 
     `refused` are references that lead outside, by a path, a link or an address: they are never opened. `missing` are
     those inside that are not there. trimesh swallows what a resolver raises, so both are kept for the caller;
-    `damaged` counts the pictures that could not be read.
+    `damaged` counts the pictures that could not be read, or are too large for it.
     """
 
     def __init__(self, folder: Path):
@@ -36,10 +37,12 @@ class MeshFolder:
             self.refused.append(name)
             raise InputError(f"The reference {name} leads outside of {self.folder}.")
         try:
-            return path.read_bytes()
+            data = path.read_bytes()
         except OSError:
             self.missing.append(name)
             raise
+        self.damaged += path.suffix.lower() in PICTURES and not _is_picture(data)
+        return data
 
     def _inside(self, name: str) -> Path | None:
         """The path of a reference, None when it leads outside. Percent-encoding, as of glTF, is taken back."""
@@ -71,6 +74,19 @@ class MeshFolder:
     def write(self, name: str, data: bytes) -> None:
         """Nothing is written beside a mesh."""
         raise InputError("A mesh's folder is only read.")
+
+
+def _is_picture(data: bytes) -> bool:
+    """Whether the bytes begin as a picture that may be decoded, not one too large for that. trimesh says nothing."""
+    import io
+
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data)):
+            return True
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return False
 
 
 def claimed_faces(path: Path, data: bytes) -> int:
