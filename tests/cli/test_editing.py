@@ -9,6 +9,7 @@ from PIL import Image
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
+from materialist.cli.picture import is_unseen
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
 
@@ -108,6 +109,26 @@ def test_relight_by_map_lamp_and_frames(run, folder):
     code, _, err = run("relight", scene, "--rotate", 90, "--frames", 2, "--spp", 2, "-o", folder / "turn")
     assert code == 0, err
     assert sorted(p.name for p in (folder / "turn").iterdir()) == ["0000.png", "0001.png"]
+
+
+def test_an_edit_that_nobody_sees_is_told(run, folder):
+    edit = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--spp", 4, "-o", folder / "o.png", "--force"]
+    assert "nothing of the edit is to be seen" in run(*edit, "--roughness", "+0")[1]
+    assert "to be seen" not in run(*edit, "--value", "-0.3")[1]
+    sun = ["relight", folder / "a.scene", "--spp", 4, "-o", folder / "o.png", "--force", "--sun"]
+    behind_the_wall = run(*sun, "0,10")[1]
+    assert "nothing of the edit is to be seen" in behind_the_wall and "--sun 180,40" in behind_the_wall
+    assert "to be seen" not in run(*sun, "180,40")[1]
+
+
+def test_pictures_that_look_the_same():
+    rng = np.random.default_rng(0)
+    photo = rng.uniform(0.2, 0.8, (100, 100, 3)).astype(np.float32)
+    changed = photo.copy()
+    changed[5, :5] += 0.1
+    assert is_unseen(photo, photo) and is_unseen(photo + 1e-5, photo) and is_unseen(photo, photo, relit=True)
+    assert not is_unseen(changed, photo) and is_unseen(changed, photo, relit=True)
+    assert not is_unseen(0.9 * photo, photo, relit=True)
 
 
 def test_select_writes_a_mask_that_edit_reads(run, folder):

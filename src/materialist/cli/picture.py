@@ -74,10 +74,12 @@ def check_before(output: Path, save: Path | None, spp: int, force: bool) -> None
 
 def write_result(
     command: str, scene: Any, edited: Any, output: Path, *, save: Path | None, spp: int, seed: int, denoise: bool,
-    full_render: bool, device: str, as_json: bool, force: bool, lines: Sequence[str] = (), **facts: Any,
+    full_render: bool, device: str, as_json: bool, force: bool, lines: Sequence[str] = (), unseen: str = "",
+    **facts: Any,
 ) -> None:  # fmt: skip
-    """Render, composite, write, report."""
+    """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
     from materialist.edit.composite import composite, developed
+    from materialist.edit.layers import is_relit
     from materialist.edit.output import write_composite
     from materialist.io.package import save_scene
 
@@ -91,6 +93,8 @@ def write_result(
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=seed, device=device), save, force=force)
     warnings = [note for note in edited.report.warnings if note not in scene.report.warnings]
+    if not full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
+        warnings.append(f"The picture looks like the photo: nothing of the edit is to be seen. {unseen}".rstrip())
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]
     if save is not None:
         shown.append(f"The edited scene is {save}")
@@ -98,3 +102,19 @@ def write_result(
         command, as_json, shown, image=str(output), scene=str(save) if save else None, spp=spp,
         seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings, **facts,
     )  # fmt: skip
+
+
+def is_unseen(picture: Any, photo: Any, *, relit: bool = False) -> bool:
+    """Whether two pictures [H, W, 3] linear look the same: encoded, fewer than one pixel in 10 000 differ by 1/255.
+
+    Another light reaches every pixel, and its noise, too: there fewer than one in 100 by 4/255.
+    """
+    import numpy as np
+
+    from materialist.color import linear_to_srgb
+
+    if np.array_equal(picture, photo):
+        return True
+    step, share = (4 / 255, 1e-2) if relit else (1 / 255, 1e-4)
+    away = np.abs(linear_to_srgb(np.clip(picture, 0, 1)) - linear_to_srgb(np.clip(photo, 0, 1))).max(-1)
+    return float((away > step).mean()) < share

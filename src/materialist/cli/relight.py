@@ -100,7 +100,11 @@ def relight(
         _video(loaded, output, frames, moving, shared, fps, as_json, force)
         return
     edited = change(loaded, rotate=rotate or 0.0, sun=suns[0] if suns else None, lamps=lamps, **options)
-    write_result("relight", loaded, edited, output, save=save, as_json=as_json, force=force, **shared)
+    unseen = "Walls, or what else the photo shows, keep the sun out; --sun 180,40 comes from behind the camera."
+    write_result(
+        "relight", loaded, edited, output, save=save, as_json=as_json, force=force, unseen=unseen if suns else "",
+        **shared,
+    )  # fmt: skip
 
 
 def _video(
