@@ -110,6 +110,18 @@ def test_masks_at_the_frame_in_parts_and_over_everything():
             glass(scene, bad)
 
 
+def test_open_vessels_are_of_the_lathe_and_others_say_so():
+    from materialist.edit import glass as module
+
+    scene = flat_scene()
+    closed, told = (glass(scene, MASK, hollow=h, thickness="symmetry") for h in (True, "open"))
+    np.testing.assert_array_equal(closed.bodies[0].vertices, told.bodies[0].vertices)
+    assert module.LID in told.report.warnings and module.LID not in closed.report.warnings
+    assert told.provenance["edits"][-1]["hollow"] == "open"
+    with pytest.raises(InputError, match="hollow is 'half'; choose true, false or open"):
+        glass(scene, MASK, hollow="half")
+
+
 def test_the_papers_glass_has_the_front_of_the_lathe_s_body():
     """Not that of the maps, whose normals have the photo's texture in them; blurred where there is no such body."""
     import sys

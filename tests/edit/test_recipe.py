@@ -62,7 +62,7 @@ def test_click_box_and_sun(folder):
         ("edits: []", "no list of edits"),
         ("- [", "not valid YAML"),
         ("- paint: {}", "is 'paint'; it must be one of edit,"),
-        ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, not 'maybe'"),
+        ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, or open, not 'maybe'"),
         ("- glass: {mask: block.png, tint: '#88ccf'}", "The tint '#88ccf' must look like"),
         ("- glass: {mask: block.png, thickness: gone.exr}", "There is no file"),
         ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
@@ -90,6 +90,7 @@ def test_tints_are_spelled_as_on_the_command_line(folder):
         for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
     )
     assert one["hollow"] is True and other == {"hollow": True, "tint": pytest.approx(one["tint"], abs=1e-6)}
+    assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1]["hollow"] == "open"
 
 
 def read_step(folder, text):

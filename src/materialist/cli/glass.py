@@ -56,6 +56,7 @@ def glass(
     tint: Annotated[str, typer.Option(metavar="R,G,B", help="Its colour, linear, or #rrggbb.")] = "1,1,1",
     roughness: Annotated[float, typer.Option(help="0 is clear, 0.3 frosted.")] = 0.0,
     hollow: Annotated[bool, typer.Option("--hollow", help="A wall around air.")] = False,
+    open_top: Annotated[bool, typer.Option("--open", help="Hollow, and open at the top, as a vase.")] = False,
     model: Annotated[Model, typer.Option(help="closed: path-traced; two-interface: as in the paper.")] = Model.closed,
     thickness: Annotated[
         str,
@@ -77,7 +78,7 @@ def glass(
     force: Force = False,
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
-    from materialist.edit.glass import check_glass
+    from materialist.edit.glass import OPEN, check_glass
     from materialist.edit.glass import glass as change
     from materialist.edit.hole import told_shadow
     from materialist.edit.material import parse_colour
@@ -93,7 +94,7 @@ def glass(
     loaded = load_scene(scene)
     region = chosen_region(loaded, click, box, mask, method)
     options: dict[str, Any] = {
-        "hollow": hollow, "model": model.value, "thickness": thickness, "background": background,
+        "hollow": OPEN if open_top else hollow, "model": model.value, "thickness": thickness, "background": background,
         "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": told_shadow(shadow), "seed": seed,
     }  # fmt: skip
     if preview:

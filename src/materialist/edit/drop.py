@@ -13,7 +13,7 @@ from materialist.edit.convex import convex_pieces
 from materialist.edit.drop_ground import ground_below
 from materialist.edit.frames import MAX_FRAMES
 from materialist.edit.insert import extent, moved, put
-from materialist.edit.material import noted
+from materialist.edit.material import noted, warned
 from materialist.edit.meshes import Model, read_model, repainted
 from materialist.edit.physics import Pose, Thing, fall, load
 from materialist.edit.support import Support
@@ -126,10 +126,8 @@ class Falling:
             for body in bodies
             if k not in gone
         )
-        known = self.scene.report.warnings
-        new = dict.fromkeys(note for note in (*self.notes, *notes) if note not in known)
-        report = replace(self.scene.report, warnings=(*known, *new))
-        return noted(replace(self.scene, bodies=(*self.scene.bodies, *placed), report=report), "drop", self.what)
+        dropped = replace(self.scene, bodies=(*self.scene.bodies, *placed))
+        return noted(warned(dropped, *self.notes, *notes), "drop", self.what)
 
 
 def prepared(

@@ -11,7 +11,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.edit.background import Inpaint, without
 from materialist.edit.hole import GROW
-from materialist.edit.material import noted
+from materialist.edit.material import noted, warned
 from materialist.edit.region import checked_region
 from materialist.edit.thickness import ObjectThickness, object_thickness
 from materialist.errors import InputError
@@ -19,12 +19,15 @@ from materialist.geometry.standing import room, standing_body
 from materialist.types import Array, Body, Scene, Surface
 
 MODELS = ("closed", "two-interface")
+OPEN = "open"
+"""Value of `hollow`: a vessel without a lid."""
+LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
 IOR = (1.0, 3.0)
 
 
 def glass(
     scene: Scene, mask: Array, *, ior: float = 1.5, transmission: float = 1.0,
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, hollow: bool = False,
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, hollow: bool | str = False,
     model: str = "closed", thickness: str | Array | Path = "auto", background: Array | str | Path | None = None,
     inpaint: Inpaint | None = None, grow: float = GROW, shadow: float | None = None, smooth: float = 0.01,
     seed: int = 0,
@@ -38,7 +41,8 @@ def glass(
             default is clear; the paper's pictures have 0.9.
         tint: colour of white light after a way in and a way out, linear, in [0, 1].
         roughness: perceptual, in [0, 1]; below 0.03 the glass is smooth.
-        hollow: a wall around air, as thick as RefractionNet says (else 5 % of the object's size).
+        hollow: a wall around air, as thick as RefractionNet says (else 5 % of the object's size); `open`: and no lid,
+            for what was turned on a lathe (anything else stays closed, and the report says so).
         model: `closed` path-traces a closed object (`geometry.closed`); `two-interface` is the paper's: every camera
             ray is bent twice and looks up the background, and there are no shadows.
         thickness: see `thickness.object_thickness`.
@@ -51,6 +55,8 @@ def glass(
     check_glass(ior, transmission, tint, roughness)
     if model not in MODELS:
         raise InputError(f"The model is '{model}'; choose one of {', '.join(MODELS)}.")
+    if hollow not in (True, False, OPEN):
+        raise InputError(f"hollow is {hollow!r}; choose true, false or {OPEN}.")
     own = checked_region(scene, mask) > 0.5
     removed = without(
         scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed
@@ -62,11 +68,13 @@ def glass(
     else:
         shell = standing_body(
             scene.depth, scene.normal, own, found, scene.camera, behind=removed.depth,
-            wall=found.wall if hollow else None, smooth=smooth,
+            wall=found.wall if hollow else None, smooth=smooth, open_top=hollow == OPEN,
         )  # fmt: skip
         surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, "glass")
         edited = replace(removed, bodies=(*removed.bodies, body))
+        if hollow == OPEN and (found.lathe is None or not found.lathe.opens(found.wall)):
+            edited = warned(edited, LID)
     what = {
         "ior": ior, "transmission": transmission, "tint": list(tint), "roughness": roughness, "hollow": hollow,
         "model": model, "thickness": found.method, "pixels": int(own.sum()),

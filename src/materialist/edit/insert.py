@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from materialist.camera import project
-from materialist.edit.material import noted
+from materialist.edit.material import noted, warned
 from materialist.edit.meshes import Model, read_model, repainted
 from materialist.edit.support import Support, picture_width, support_at
 from materialist.errors import InputError
@@ -61,13 +61,11 @@ def insert(
         warnings.append(
             f"{model.name} runs into the surface behind or beside it; choose another place, or a smaller scale."
         )
-    known = scene.report.warnings
-    report = replace(scene.report, warnings=(*known, *(note for note in warnings if note not in known)))
     what: dict[str, Any] = {
         "mesh": model.name, "at": [float(v) for v in at], "scale": scale, "turn": turn, "material": material,
         "size": extent(placed), "triangles": sum(len(body.faces) for body in placed),
     }  # fmt: skip
-    return noted(replace(scene, bodies=(*scene.bodies, *placed), report=report), "insert", what)
+    return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *warnings), "insert", what)
 
 
 def put(

@@ -76,6 +76,13 @@ def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
     return replace(scene, provenance={**scene.provenance, "edits": entries})
 
 
+def warned(scene: Scene, *notes: str) -> Scene:
+    """The scene with further warnings in its report, each once."""
+    known = scene.report.warnings
+    new = dict.fromkeys(note for note in notes if note not in known)
+    return replace(scene, report=replace(scene.report, warnings=(*known, *new)))
+
+
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
     """[..., 3] linear albedo moved in the HSV of its sRGB encoding (the numbers colour pickers show); float32.
 

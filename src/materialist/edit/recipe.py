@@ -8,7 +8,7 @@ from typing import Any
 
 from materialist.edit.background import without
 from materialist.edit.drop_rest import settle
-from materialist.edit.glass import glass
+from materialist.edit.glass import OPEN, glass
 from materialist.edit.hole import told_shadow
 from materialist.edit.insert import insert
 from materialist.edit.material import edit, parse_colour
@@ -246,7 +246,8 @@ def glass_arguments(scene: Scene, step: Step):
             float(c) for c in parse_colour(tint if isinstance(tint, str) else _numbers(tint, 3, "tint"), "tint")
         )
     if "hollow" in given:
-        options["hollow"] = _switch(given["hollow"], "hollow")
+        open_top = str(given["hollow"]).lower() == OPEN
+        options["hollow"] = OPEN if open_top else _switch(given["hollow"], "hollow", f", or {OPEN}")
     if "model" in given:
         options["model"] = str(given["model"])
     if "thickness" in given:
@@ -272,10 +273,10 @@ def read_texture(path: str | Path):
     return np.clip(decode_photo(Path(path)).linear, 0, 1)
 
 
-def _switch(value: Any, name: str) -> bool:
+def _switch(value: Any, name: str, other: str = "") -> bool:
     text = str(value).lower()
     if text not in (*ON, *OFF):
-        raise InputError(f"The {name} must be true or false, not {value!r}.")
+        raise InputError(f"The {name} must be true or false{other}, not {value!r}.")
     return text in ON
 
 

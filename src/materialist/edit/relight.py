@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.edit.lights import kelvin_colour
-from materialist.edit.material import noted
+from materialist.edit.material import noted, warned
 from materialist.edit.region import checked_pixel
 from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
@@ -74,8 +74,10 @@ def relight(
         "rotate": rotate or None, "sun": sun, "ambient": ambient if ambient != 1 else None, "lamps": len(lamps) or None,
         "dim": dim,
     }  # fmt: skip
-    new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps), report=_with_warnings(scene))
-    return noted(new, "light", {name: value for name, value in what.items() if value is not None})
+    new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
+    return noted(
+        warned(new, *_warnings(scene)), "light", {name: value for name, value in what.items() if value is not None}
+    )
 
 
 def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: float) -> Lamp:
@@ -181,11 +183,11 @@ def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
     return np.float32(gain)
 
 
-def _with_warnings(scene: Scene):
-    """The report with what relighting may show of the photo's own light (paper, failure cases)."""
+def _warnings(scene: Scene) -> list[str]:
+    """What relighting may show of the photo's own light (paper, failure cases)."""
     from materialist.render.envmap import is_peaked
 
-    notes = []
+    notes: list[str] = []
     if is_peaked(scene.envmap):
         notes.append(
             "The photo has hard light: its shadows may be baked into the albedo and stay beside the new ones "
@@ -194,5 +196,4 @@ def _with_warnings(scene: Scene):
     clipped = float((scene.photo.linear >= 0.99).any(-1).mean())
     if clipped > 0.05 and not scene.photo.hdr:
         notes.append(f"{clipped:.0%} of the photo is clipped; light and albedo are uncertain there.")
-    known = scene.report.warnings
-    return replace(scene.report, warnings=(*known, *(note for note in notes if note not in known)))
+    return notes

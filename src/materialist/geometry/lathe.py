@@ -20,6 +20,7 @@ from materialist.geometry.revolution import fits, profile_of, swept, thickness_o
 from materialist.geometry.shell import Shell
 from materialist.geometry.symmetry import surface_in
 from materialist.geometry.turning import Axis
+from materialist.geometry.vessel import vessel
 from materialist.types import Array, Camera
 
 FEWEST = 64
@@ -52,9 +53,13 @@ class Lathed:
     whole: bool = True
     """Whether the profile is the whole object; else it only tells how far back most of it reaches."""
 
-    def body(self, camera: Camera, *, wall: float | None = None) -> Shell:
-        """The closed object; with `wall`, its thickness in scene units, a hollow one."""
-        return swept(self.profile, self.axis, camera, wall=wall)
+    def body(self, camera: Camera, *, wall: float | None = None, open_top: bool = False) -> Shell:
+        """The closed object; with `wall`, its thickness in scene units, a hollow one, without a lid if `open_top`."""
+        return swept(self.profile, self.axis, camera, wall=wall, open_top=open_top)
+
+    def opens(self, wall: float) -> bool:
+        """Whether it can be a vessel that is open at the top."""
+        return vessel(self.profile, wall) is not None
 
 
 def lathed(

@@ -16,6 +16,7 @@ from materialist.camera import project
 from materialist.geometry.profile import Profile, fitted
 from materialist.geometry.shell import Shell, joined, turned
 from materialist.geometry.turning import Axis
+from materialist.geometry.vessel import vessel
 from materialist.types import Array, Camera
 
 CELLS = 180
@@ -119,11 +120,15 @@ def along(profile: Profile, axis: Axis, ray: Array, first: Array, steps: Array) 
         yield part, profile.at(plane.of(ray[part, None] * at[..., None]))
 
 
-def swept(profile: Profile, axis: Axis, camera: Camera, *, wall: float | None = None) -> Shell:
+def swept(profile: Profile, axis: Axis, camera: Camera, *, wall: float | None = None, open_top: bool = False) -> Shell:
     """The closed body of a profile; with `wall` (scene units) a second surface is added inside.
 
-    Every edge has two faces that run through it in opposite directions.
+    With `open_top`, too, both are one: a vessel without a lid, where `vessel.vessel` makes one of the profile. Every
+    edge has two faces that run through it in opposite directions.
     """
+    line = vessel(profile, wall) if wall and open_top else None
+    if line is not None:
+        return _sheet(*line, axis, camera)
     outer = _sheets(profile, axis, 0.0, camera)
     inner = _sheets(profile, axis, wall, camera) if wall else []
     return joined([*outer, *(turned(sheet) for sheet in inner)])

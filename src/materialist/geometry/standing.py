@@ -37,15 +37,16 @@ class Thick(Protocol):
 
 def standing_body(
     depth: Array, normal: Array, mask: Array, found: Thick, camera: Camera, *, behind: Array,
-    wall: float | None = None, smooth: float = 0.01,
+    wall: float | None = None, smooth: float = 0.01, open_top: bool = False,
 ) -> Shell:  # fmt: skip
     """The body of the lathe where there is one, else the closed proxy, before what stands behind it.
 
-    Arguments and errors as of `closed.closed_proxy`. A wall is brought nearer with the body, by the same factor.
+    Arguments and errors as of `closed.closed_proxy`; with `open_top` a hollow lathed body has no lid, where that can
+    be. A wall is brought nearer with the body, by the same factor.
     """
     mask = np.asarray(mask) > 0.5
     if found.lathe is not None:
-        body = found.lathe.body(camera, wall=wall)
+        body = found.lathe.body(camera, wall=wall, open_top=open_top)
         factor = nearer(body.vertices, mask, behind, camera)
         return body._replace(vertices=body.vertices * np.float32(factor))
     factor = room(depth, found.solid, mask, behind, camera)

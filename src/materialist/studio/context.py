@@ -108,5 +108,6 @@ def glass_values(session: Session) -> dict[str, Any]:
     numbers = {"ior": 1.5, "transmission": 1.0, "roughness": 0.0}
     values: dict[str, Any] = {f"glass_{name}": float(options.get(name, plain)) for name, plain in numbers.items()}
     values["glass_tint"] = tint_colour(options.get("tint", "1,1,1"))
-    values["glass_hollow"] = str(options.get("hollow", "")).lower() in ("true", "yes", "on", "1")
+    hollow = str(options.get("hollow", "")).lower()
+    values["glass_hollow"] = hollow if hollow == "open" else "true" if hollow in ("true", "yes", "on", "1") else ""
     return values

@@ -19,6 +19,7 @@ _SLIDERS = {
     "transmission": (0.0, 1.0, 1.0, 0.01, "How much light goes through"),
     "roughness": (0.0, 1.0, 0.0, 0.01, "Roughness: clear to frosted"),
 }
+_INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 
 
 def layout(context: Context) -> None:
@@ -28,7 +29,7 @@ def layout(context: Context) -> None:
         part = gr.Slider(low, high, start, step=step, label=label, buttons=[], elem_id=f"glass_{name}")
         parts[f"glass_{name}"] = part
     parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
-    parts["glass_hollow"] = gr.Checkbox(False, label="Hollow: a wall around air", elem_id="glass_hollow")
+    parts["glass_hollow"] = gr.Radio(_INSIDE, value="", label="Inside", elem_id="glass_hollow")
     parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
     gr.Markdown("Its body is built once, in half a minute or so; from then on the picture follows the sliders.")
 
@@ -38,7 +39,7 @@ def wire(context: Context, live: dict[str, Any]) -> None:
     parts = context.parts
     texts: dict[str, Callable[[Any], str | None]] = {
         "ior": _plain, "transmission": _plain, "roughness": lambda v: _plain(v) if v else None, "tint": tint_text,
-        "hollow": lambda on: "true" if on else None,
+        "hollow": lambda kind: kind or None,
     }  # fmt: skip
 
     @guarded
@@ -48,7 +49,7 @@ def wire(context: Context, live: dict[str, Any]) -> None:
         return context.everything(session)
 
     def begin(
-        ior: float, transmission: float, roughness: float, tint: str, hollow: bool, request: gr.Request
+        ior: float, transmission: float, roughness: float, tint: str, hollow: str, request: gr.Request
     ) -> dict[Any, Any]:
         return glass(ior, transmission, roughness, tint, hollow, request)
 
