@@ -61,16 +61,32 @@ def test_large_pictures_are_matched_small_and_keep_their_pieces():
 
 def test_a_slanting_border_of_surfaces_stays_where_it_is():
     """A patch across the border is only right where both have it in the same place."""
-    rng = np.random.default_rng(0)
     rows, columns = np.indices((72, 96))
     label = (rows > 40 - columns / 12).astype(int)
-    dots = np.zeros((72, 96), bool)
-    dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
-    floor = np.where(dots[..., None], [0.9, 0.9, 0.3], [0.4, 0.05, 0.1])
     wall = np.where(((rows + columns) % 10 < 4)[..., None], [0.3, 0.4, 0.6], [0.7, 0.7, 0.9])
-    picture = np.where(label[..., None] == 1, floor, wall).astype(np.float32)
     hole = (np.abs(columns - 46) < 0.45 * (rows - 10)) & (rows < 62)
-    plan = exemplar_plan(np.where(hole[..., None], 0.5, picture), hole, ~hole, label)
-    blue = plan.fill(picture)[..., 2]
-    assert blue[hole & (label == 1)].max() < 0.55, "the wall's paler blue is on the floor"
-    assert blue[hole & (label == 0)].min() > 0.3, "the floor's red is on the wall"
+    strange = []
+    for seed in range(8):  # the search is by chance
+        rng = np.random.default_rng(seed)
+        dots = np.zeros((72, 96), bool)
+        dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
+        floor = np.where(dots[..., None], [0.9, 0.9, 0.3], [0.4, 0.05, 0.1])
+        picture = np.where(label[..., None] == 1, floor, wall).astype(np.float32)
+        plan = exemplar_plan(np.where(hole[..., None], 0.5, picture), hole, ~hole, label, seed=seed)
+        blue = plan.fill(picture)[..., 2]
+        # The wall's paler blue on the floor, the floor's red on the wall.
+        strange.append(((label == 1) & (blue > 0.55) | (label == 0) & (blue < 0.3))[hole].mean())
+    assert np.mean(strange) < 0.0018 and max(strange) < 0.003, strange
+
+
+def test_a_hole_in_a_narrow_ring_is_filled_from_the_ring():
+    """At the coarsest size no patch lies in the ring alone; then the search begins at a finer one."""
+    rng = np.random.default_rng(0)
+    rows, columns = np.mgrid[:282, :512]
+    away = np.hypot((rows - 141) / 100, (columns - 256) / 170)
+    light, dark = np.array([0.85, 0.87, 0.8]), np.array([0.25, 0.25, 0.28])
+    picture = np.where((away < 1)[..., None], light, dark) + rng.normal(0, 0.02, (282, 512, 1))
+    hole = away < 0.62
+    plan = exemplar_plan(picture.astype(np.float32), hole, ~hole, np.zeros(hole.shape, int))
+    filled = plan.fill(np.where(hole[..., None], 0, picture))
+    assert np.abs(filled[hole] - light).mean() < 0.05

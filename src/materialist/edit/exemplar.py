@@ -18,6 +18,9 @@ RADIUS = 3
 """Patches reach so many pixels to each side, at the size at which they are compared."""
 FINEST = 256
 """Longer side of the hole's surroundings at which patches are compared last; beyond, pieces keep together."""
+SMALLEST = 24
+"""Least shorter side of the picture at the first size: in a smaller one there are too few patches, and what is nowhere
+near is brought in."""
 ROUNDS = (6, 5, 4, 3, 2)
 """Rounds of matching and averaging, coarsest size first (the last entry goes on)."""
 OTHER = 0.1
@@ -117,7 +120,7 @@ def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed:
         sizes.append(sizes[-1] * 2)
     finest = sizes[-1]
     levels = [finest]
-    while min(hole.shape) / levels[-1] > 24 and np.sqrt(hole.sum()) / levels[-1] > 5:
+    while min(hole.shape) / levels[-1] >= 2 * SMALLEST and np.sqrt(hole.sum()) / levels[-1] > 5:
         levels.append(levels[-1] * 2)
     found: _Match | None = None
     for depth, factor in enumerate(reversed(levels)):
