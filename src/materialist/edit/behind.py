@@ -23,6 +23,9 @@ FARTHEST, NEARER = 1.1, 0.9
 this part of the depth that is seen."""
 AROUND = 0.15
 """Surroundings that are looked at, as a part of the hole's extent."""
+SMALL, BESIDE = 2.0, 0.45
+"""A plane of less than so many holes that does not reach the frame is a face of a thing, which is no background unless
+it is seen around this part of the hole."""
 STRAIGHT = 0.9
 """Planes part along straight lines if such lines sort this share of the pixels around rightly."""
 SLACK = 1e-7
@@ -60,11 +63,24 @@ def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array,
     box = _surroundings(hole)
     seen = np.where(hole | (depth <= 0), LOOSE, plane)
     ends = {int(k): FARTHEST * float(np.percentile(depth[seen == k], 99)) for k in np.unique(seen[seen >= 0])}
+    ends = {k: end for k, end in ends.items() if not _is_thing(seen == k, hole)}
     part = _behind(depth[box], normal[box], plane[box], hole[box], front[box], rays[box], ends)
     out = Behind(depth.astype(np.float32), normal.astype(np.float32), np.where(depth > 0, plane, SKY).astype(np.int64))
     for whole, piece in ((out.depth, part.depth), (out.normal, part.normal), (out.label, part.label)):
         whole[box] = piece
     return out
+
+
+def _is_thing(own: Array, hole: Array) -> bool:
+    """Whether the plane of the pixels `own` [H, W] bool is of something beside a hole, and not its background."""
+    if own[[0, -1]].any() or own[:, [0, -1]].any() or own.sum() >= SMALL * hole.sum():
+        return False
+    rows, columns = np.nonzero(own & _ring(hole))
+    if not len(rows):
+        return False
+    y, x = (v.mean() for v in np.nonzero(hole))
+    seen = np.histogram(np.arctan2(rows - y, columns - x), 36, (-np.pi, np.pi))[0] > 0
+    return bool(seen.mean() < BESIDE)
 
 
 def _surroundings(hole: Array) -> tuple[slice, slice]:
@@ -78,7 +94,7 @@ def _surroundings(hole: Array) -> tuple[slice, slice]:
 def _behind(
     depth: Array, normal: Array, plane: Array, hole: Array, front: Array, rays: Array, ends: dict[int, float]
 ) -> Behind:  # fmt: skip
-    """`behind` of a window; `ends`: the depth at which each plane ends."""
+    """`behind` of a window; `ends`: the depth at which each plane ends; planes that it lacks do not go on."""
     known_label = np.where(depth > 0, plane, SKY).astype(np.int64)
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)
     label = _labels(known_label, hole, inverse, rays, ends)
@@ -105,9 +121,11 @@ def _labels(known: Array, hole: Array, inverse: Array, rays: Array, ends: dict[i
     kinds, count = np.unique(known[~hole], return_counts=True)
     ring = _ring(hole)
     shares = np.array([np.mean(known[ring] == k) if ring.any() else 0.0 for k in kinds])
-    kept = kinds[shares >= LEAST] if (shares >= LEAST).any() else kinds[count.argmax()][None]
+    goes_on = (shares >= LEAST) & ((kinds < 0) | np.isin(kinds, list(ends)))
+    goes_on = goes_on if goes_on.any() else shares >= LEAST
+    kept = kinds[goes_on] if goes_on.any() else kinds[count.argmax()][None]
     loose = ring & (known == LOOSE)
-    near = {int(k): ends[int(k)] for k in kept[kept >= 0]}
+    near = {int(k): ends[int(k)] for k in kept if int(k) in ends}
     firm = kept if _is_background(np.where(hole, SKY, known), loose, inverse, rays, near) else kept[kept != LOOSE]
     if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= FIRM:
         kept = firm
