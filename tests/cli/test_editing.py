@@ -162,6 +162,10 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         (["edit", "SCENE", "--mask", "block.png", "--hue", "9", "-o", "OUT.gif"], ".png"),
         (["edit", "nothing.scene", "--mask", "block.png", "--hue", "9", "-o", "OUT.png"], "nothing.scene"),
         ([*EDIT, "--mask", "block.png", "--hue", "9", "--save", "SCENE"], "--force"),
+        (
+            ["edit", "SCENE", "--mask", "block.png", "--hue", "9", "-o", "out.scene/a.png", "--save", "out.scene"],
+            "beside",
+        ),
         (RELIGHT, "No light"),
         ([*RELIGHT, "--envmap", "square.exr"], "twice as wide"),
         ([*RELIGHT, "--envmap", "none.exr"], "none.exr"),

@@ -118,6 +118,8 @@ def test_open_vessels_are_of_the_lathe_and_others_say_so():
     np.testing.assert_array_equal(closed.bodies[0].vertices, told.bodies[0].vertices)
     assert module.LID in told.report.warnings and module.LID not in closed.report.warnings
     assert told.provenance["edits"][-1]["hollow"] == "open"
+    paper = glass(scene, MASK, hollow=True, model="two-interface", thickness="symmetry")
+    assert module.SOLID in paper.report.warnings
     with pytest.raises(InputError, match="hollow is 'half'; choose true, false or open"):
         glass(scene, MASK, hollow="half")
 

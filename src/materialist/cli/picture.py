@@ -67,6 +67,8 @@ def check_before(output: Path, save: Path | None, spp: int, force: bool) -> None
     from materialist.io.target import ensure_writable
 
     check_paths(spp)
+    if save is not None and output.resolve().is_relative_to(save.resolve()):
+        raise InputError(f"The picture {output} would lie in the scene {save}, which is written whole; put it beside.")
     ensure_image_writable(output, force=force)
     if save is not None:
         ensure_writable(save, force)

@@ -21,6 +21,7 @@ from materialist.types import Array, Body, Scene, Surface
 MODELS = ("closed", "two-interface")
 OPEN = "open"
 """Value of `hollow`: a vessel without a lid."""
+SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
 IOR = (1.0, 3.0)
 
@@ -65,6 +66,7 @@ def glass(
     if model == "two-interface":
         look = {"ior": ior, "transmission": transmission, "tint": tint, "roughness": roughness}
         edited = _two_interface(scene, removed, own, found, look, smooth)
+        edited = warned(edited, SOLID) if hollow else edited
     else:
         shell = standing_body(
             scene.depth, scene.normal, own, found, scene.camera, behind=removed.depth,
