@@ -119,6 +119,9 @@ FramesPerSecond = Annotated[int, typer.Option(help="Frames per second.")]
 # Training.
 ResumeRun = Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")]
 Steps = Annotated[int | None, typer.Option(help="Train this many steps more.")]
+Batch = Annotated[int, typer.Option(help="Samples a step.")]
+Rate = Annotated[float, typer.Option(help="Peak learning rate.")]
+Bfloat16 = Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")]
 Minutes = Annotated[float | None, typer.Option(help="Train this many minutes more.")]
 CheckpointSeconds = Annotated[float, typer.Option(help="Seconds between checkpoints.")]
 

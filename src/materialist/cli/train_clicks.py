@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import CheckpointSeconds, Json, Minutes, ResumeRun, Seed, Steps, output_option
+from materialist.cli.options import (
+    Batch,
+    Bfloat16,
+    CheckpointSeconds,
+    Json,
+    Minutes,
+    Rate,
+    ResumeRun,
+    Seed,
+    Steps,
+    output_option,
+)
 from materialist.cli.outcome import report_success
 
 
@@ -21,9 +32,9 @@ def clicks(
     data: Annotated[Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")],
     steps: Steps = None,
     minutes: Minutes = None,
-    batch: Annotated[int, typer.Option(help="Lessons a step.")] = 16,
-    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 1.5e-3,
-    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False,
+    batch: Batch = 16,
+    rate: Rate = 1.5e-3,
+    bfloat16: Bfloat16 = False,
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,

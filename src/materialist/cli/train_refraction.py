@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import CheckpointSeconds, Json, Minutes, ResumeRun, Seed, Steps, output_option
+from materialist.cli.options import (
+    Batch,
+    Bfloat16,
+    CheckpointSeconds,
+    Json,
+    Minutes,
+    Rate,
+    ResumeRun,
+    Seed,
+    Steps,
+    output_option,
+)
 from materialist.cli.outcome import report_success
 
 
@@ -27,9 +38,9 @@ def refraction(
     heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64,
     steps: Steps = None,
     minutes: Minutes = None,
-    batch: Annotated[int, typer.Option(help="Views a step.")] = 32,
-    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 2e-3,
-    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False,
+    batch: Batch = 32,
+    rate: Rate = 2e-3,
+    bfloat16: Bfloat16 = False,
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,
