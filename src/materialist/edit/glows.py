@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from materialist.edit.material import warned
 from materialist.edit.mesh_material import constant
 from materialist.errors import InputError
 from materialist.render.scene import part
@@ -58,8 +59,7 @@ def dimmed(scene: Scene, dim: float, *, seed: int = 0, device: str = "auto") -> 
     provenance = {**scene.provenance, KEY: {"ambient": ambient, "radiance": radiance}}
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     note = f"Taken for lights, {radiance:g} times as bright as the photo's white: the clipped regions around {places}."
-    report = replace(scene.report, warnings=(*scene.report.warnings, note))
-    return replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance, report=report)
+    return warned(replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance), note)
 
 
 def explained(scene: Scene, edited: Scene) -> Scene:
