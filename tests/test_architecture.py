@@ -23,7 +23,14 @@ PEERS_THAT_MEET = {("io", "render"), ("cli", "bench")}
 
 HEAVY = {"torch", "mitsuba", "drjit"}
 MAY_BE_HEAVY = ("render", "transport", "fit", "train")
-NETWORKS = ("predict.bundled.", "predict.matnet.", "predict.refraction.", "predict.clicks.", "predict.unet")
+NETWORKS = (
+    "predict.bundled.",
+    "predict.matnet.",
+    "predict.refraction.",
+    "predict.clicks.",
+    "predict.unet",
+    "predict.lite",
+)
 """Packages of networks: their own modules need torch at the top; whoever calls them imports them late."""
 LIGHT_START = ("", "types", "errors", "color", "camera", "plain", "cli")
 """Modules that load at every start and so may import nothing slow at the top."""

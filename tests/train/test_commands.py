@@ -37,7 +37,7 @@ def test_one_step_and_its_weights(data, tmp_path):
         (["matnet", "-o", "run"], "--data"),
         (["matnet", "--data", "DATA", "-o", "run"], "either --steps or --minutes"),
         (["matnet", "--data", "nowhere", "-o", "run", "--steps", "1"], "no data folder nowhere"),
-        (["matnet", "--data", "DATA", "-o", "run", "--steps", "1", "--init", "x.pth"], "--init is for --config paper"),
+        (["matnet", "--data", "DATA", "-o", "run", "--steps", "1", "--init", "x.pth"], "x.pth"),
         (["export", "nowhere", "-o", "w.safetensors"], "give the folder of a run"),
         (["export", "nowhere", "-o", "w.bin"], "not w.bin"),
     ],

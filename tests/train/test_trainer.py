@@ -13,13 +13,14 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.predict.bundled.network import srgb
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
 from materialist.train.export import export_run
 from materialist.train.recipes import recipe
 from materialist.train.samples import SampleFolder
-from materialist.train.tasks import BundledTask, encoded, relative_log_depth
+from materialist.train.tasks import BundledTask, relative_log_depth
 from materialist.train.trainer import CURVE, SCORES
 
 
@@ -224,7 +225,7 @@ def test_recipes_survive_json():
 
 def test_targets_of_the_bundled_network():
     values = torch.tensor([0.0, 0.002, 0.18, 1.0])
-    np.testing.assert_allclose(encoded(values), [0, 0.02584, 0.46135, 1], atol=1e-4)
+    np.testing.assert_allclose(srgb(values), [0, 0.02584, 0.46135, 1], atol=1e-4)
     depth = torch.tensor([1.0, 2.0, 4.0, 0.0]).view(1, 1, 2, 2)
     found = relative_log_depth(depth, (depth > 0).float()).flatten()
     np.testing.assert_allclose(found, [-np.log(2), 0, np.log(2), 0], atol=1e-6)

@@ -35,6 +35,7 @@ def clicks(
     batch: Batch = 16,
     rate: Rate = 1.5e-3,
     bfloat16: Bfloat16 = False,
+    init: Annotated[Path | None, typer.Option(help="Weights of an earlier run to begin from.")] = None,
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,
@@ -51,7 +52,7 @@ def clicks(
         produce(data, output / "views", progress)
         trainer = Trainer(
             output, output / "views", budget=budget,
-            recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16), seed=seed, every=every, resume=resume,
+            recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16), seed=seed, every=every, resume=resume, init=init,
             note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
         )  # fmt: skip
         figures = trainer.run(progress)

@@ -21,7 +21,6 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.errors import InputError
 
 
 class Config(StrEnum):
@@ -50,7 +49,8 @@ def matnet(
     ] = None,
     rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None,
     init: Annotated[
-        Path | None, typer.Option(help="paper: a Depth Anything or DINOv2 checkpoint to begin from.")
+        Path | None,
+        typer.Option(help="Weights to begin from; bundled: those of `train export`, paper: Depth Anything or DINOv2."),
     ] = None,
     every: CheckpointSeconds = 300,
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
@@ -65,8 +65,6 @@ def matnet(
 
     budget = Budget(steps=steps, minutes=minutes)
     chosen = recipe(config.value, batch=batch, size=size, rate=rate)
-    if init is not None and config is not Config.paper:
-        raise InputError("--init is for --config paper; the bundled network starts from scratch.")
     from materialist.cli.progress import StageProgress
     from materialist.train.launch import join
     from materialist.train.sources import open_source

@@ -10,16 +10,22 @@ from typing import Any
 from materialist.errors import WeightsError
 from materialist.predict.weights import load_weights, read_state
 
+PREFIX = "encoder."
+"""Where a network keeps the encoder that it shares with others (`predict.lite`): not stored with its weights."""
+
 
 def save(path: Path, network: Any, kind: str, facts: dict[str, Any]) -> None:
     """Write a network that has an `architecture`, as float16, with `facts` (steps, data, scores), whole or not at all.
+
+    The encoder that networks share (`predict.lite`) is not written: it is in the package.
 
     kind: what the file calls itself; another number is another network.
     """
     import torch
     from safetensors.torch import save_file
 
-    tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in network.state_dict().items()}
+    own = {k: v for k, v in network.state_dict().items() if not k.startswith(PREFIX)}
+    tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in own.items()}
     architecture = json.dumps(network.architecture.as_dict())
     partial = path.with_name(path.name + ".part")
     save_file(tensors, str(partial), {"format": kind, "architecture": architecture, "facts": json.dumps(facts)})
@@ -45,8 +51,13 @@ def load(path: Path, kind: str, build: Callable[[dict[str, Any]], Any], remedy: 
         facts = json.loads(metadata.get("facts", "{}"))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
         raise WeightsError(f"{path} describes no usable network ({error}); make it again with: {remedy}.") from error
-    load_weights(network, tensors, path)
+    load_weights(network, tensors | shared(network), path)
     return network.eval().requires_grad_(False), facts
+
+
+def shared(network: Any) -> dict[str, Any]:
+    """Tensors of the network that its file does not hold."""
+    return {k: v for k, v in network.state_dict().items() if k.startswith(PREFIX)}
 
 
 def _metadata(path: Path) -> dict[str, str]:

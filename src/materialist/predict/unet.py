@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Self
 
@@ -21,15 +22,17 @@ class Architecture:
     """Channels at 1/2, 1/4, 1/8, 1/16 and 1/32 of the resolution."""
     blocks: tuple[int, ...] = (1, 1, 2, 2, 2)
     """Residual blocks of the encoder at each."""
+    encoder: str = ""
+    """Variant of EfficientNet-Lite (`predict.lite`) whose features are read as well; "" for none."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain lists, for JSON."""
-        return {k: list(v) for k, v in asdict(self).items()}
+        """Plain lists and texts, for JSON."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Self:
         """The inverse of `as_dict`; raises TypeError for unknown names."""
-        plain: dict[str, Any] = {k: tuple(v) for k, v in values.items()}
+        plain: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
         return cls(**plain)
 
 
@@ -50,13 +53,14 @@ class UNet(nn.Module):
         assert self.head.bias is not None
         nn.init.zeros_(self.head.bias)
 
-    def raw(self, maps: Tensor) -> Tensor:
-        """[B, outputs, S, S] float32 of maps [B, inputs, S, S]; S a multiple of STRIDE."""
+    def raw(self, maps: Tensor, told: Sequence[Tensor | float] = (0.0,) * 4) -> Tensor:
+        """[B, outputs, S, S] float32 of maps [B, inputs, S, S]; S a multiple of STRIDE. `told`: what is added to the
+        levels from 1/4 on, [B, widths[k], S/4, S/4] and so forth."""
         x = self.levels[0](self.stem(F.pixel_unshuffle(maps, 2)))
         skips = []
-        for down, level in zip(self.downs, self.levels[1:], strict=True):
+        for down, level, more in zip(self.downs, self.levels[1:], told, strict=True):
             skips.append(x)
-            x = level(down(x))
+            x = level(down(x) + more)
         for up, decoder, skip in zip(reversed(self.ups), reversed(self.decoders), reversed(skips), strict=True):
             x = decoder(F.interpolate(up(x), scale_factor=2, mode="nearest") + skip)
         return F.pixel_shuffle(self.head(F.silu(x)), 2).float()

@@ -60,7 +60,7 @@ RECIPES = {
         ema=0.999,
         clip=1.0,
         bfloat16=True,
-        network={},
+        network={"encoder": "lite2"},
         betas=(0.9, 0.98),
         growth=((0.6, 128), (0.8, 192)),
     ),

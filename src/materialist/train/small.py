@@ -55,8 +55,9 @@ class Run(ABC):
         torch.manual_seed(seed)
         self.network: Any = network()
         self.averaged: Any = copy.deepcopy(self.network).requires_grad_(False).eval()
+        learnt = [p for p in self.network.parameters() if p.requires_grad]
         self.optimizer = torch.optim.AdamW(
-            self.network.parameters(), recipe.rate, (0.9, 0.98), weight_decay=recipe.weight_decay, fused=True
+            learnt, recipe.rate, (0.9, 0.98), weight_decay=recipe.weight_decay, fused=True
         )
         self.clock, self.epoch = Clock(budget), 0
         exists = (folder / checkpoint.NAME).is_file()

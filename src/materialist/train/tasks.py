@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from materialist.predict.bundled.inference import infer
-from materialist.predict.bundled.network import Architecture, BundledNetwork
-from materialist.train import losses
+from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
+from materialist.train import losses, start
 from materialist.train.augment import augment
 from materialist.train.recipes import Recipe
 from materialist.train.samples import Sample
@@ -69,9 +70,16 @@ class BundledTask:
         "its backbone is not part of this project.",
     )
 
+    def __init__(self, init: Path | None = None):
+        """`init`: exported weights to begin from, of a network with or without an encoder."""
+        self.init = init
+
     def network(self, recipe: Recipe) -> nn.Module:
-        """A fresh network of the recipe's architecture."""
-        return BundledNetwork(Architecture.from_dict(recipe.network)).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        """A network of the recipe's architecture, to begin from."""
+        network = BundledNetwork(Architecture.from_dict(recipe.network))
+        if self.init is not None:
+            start.fill(network, self.init)
+        return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def prepare(self, sample: Sample, size: int, rng: np.random.Generator) -> Sample:
         """Crop, flip, recolour, expose, photograph."""
@@ -81,7 +89,7 @@ class BundledTask:
         """Losses of all maps. L2 stands beside L1 because the mean, not the median, is the better prior in doubt."""
         image = batch["image"].contiguous(memory_format=torch.channels_last)
         out, mask = network(image, batch["rays"]), batch["mask"]
-        albedo = encoded(batch["albedo"])
+        albedo = srgb(batch["albedo"])
         found = {
             "albedo": losses.l1(out["albedo"], albedo, mask) + 2 * losses.l2(out["albedo"], albedo, mask),
             "albedo_scaled": 2 * losses.scaled_l1(out["albedo"] ** 2.2, albedo**2.2, mask),
@@ -115,11 +123,6 @@ class BundledTask:
         return infer(network, sample.image, sample.rays, device=next(network.parameters()).device)
 
 
-def encoded(linear: Tensor) -> Tensor:
-    """sRGB encoding of linear values in [0, 1], any shape."""
-    return torch.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
-
-
 def relative_log_depth(depth: Tensor, mask: Tensor) -> Tensor:
     """Natural logarithm of depth [B, 1, H, W] over each picture's median, limited to [-3, 3]; 0 off the mask."""
     logarithm = depth.clamp(min=1e-4).log()
@@ -134,7 +137,7 @@ def task(recipe: Recipe, options: dict[str, Any] | None = None) -> Task:
         from materialist.train.paper_task import PaperTask
 
         return PaperTask(**(options or {}))
-    return BundledTask()
+    return BundledTask(**(options or {}))
 
 
-__all__ = ["Batch", "BundledTask", "Task", "as_photo", "encoded", "relative_log_depth", "task", "tensors"]
+__all__ = ["Batch", "BundledTask", "Task", "as_photo", "relative_log_depth", "task", "tensors"]

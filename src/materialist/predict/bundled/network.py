@@ -15,6 +15,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from materialist.predict.lite import level, shipped
+
 STRIDE = 32
 """Sides of the input are multiples of this."""
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
@@ -39,6 +41,8 @@ class Architecture:
     """Residual blocks of the decoder at 1/4, 1/8, 1/16."""
     fine: int = 32
     """Channels at 1/2."""
+    encoder: str = ""
+    """Variant of EfficientNet-Lite (`predict.lite`) whose features are read beside the photo; "" for none."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain lists and numbers, for JSON."""
@@ -71,6 +75,11 @@ class BundledNetwork(nn.Module):
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
         self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), _norm(a.fine), nn.SiLU())
         self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
+        if a.encoder:
+            self.encoder = shipped(a.encoder)
+            self.told = nn.ModuleList(nn.Conv2d(c, w[k], 1) for k, c in enumerate(self.encoder.channels))
+            for parameter in self.told.parameters():
+                nn.init.zeros_(parameter)
         _same_subpixels(self.fine)
         _same_subpixels(self.head)
 
@@ -87,12 +96,12 @@ class BundledNetwork(nn.Module):
             [B, 3, H, W] unit; depth [B, 1, H, W] natural logarithm of planar depth, up to a constant; mask
             [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid.
         """
-        picture = encode(image)
+        picture, told = encode(image), self._told(image)
         x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), _shrink(rays, 4)], 1))
-        x, skips = self.levels[0](x), []
+        x, skips = self.levels[0](x + told[0]), []
         for k in range(3):
             skips.append(x)
-            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)))
+            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + told[k + 1])
         x = self._context(x, _shrink(rays, STRIDE))
         for k in (2, 1, 0):
             x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
@@ -100,6 +109,14 @@ class BundledNetwork(nn.Module):
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
         return _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
+
+    def _told(self, image: Tensor) -> list[Tensor | float]:
+        """What the classifier's features add at each level; nothing where there is no encoder."""
+        if not self.architecture.encoder:
+            return [0.0] * 4
+        with torch.no_grad():
+            features = [level(found) for found in self.encoder(srgb(image))]
+        return [part(found) for part, found in zip(self.told, features, strict=True)]
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
         """Attention over the coarsest level [B, C, h, w], told where each cell looks."""
@@ -109,6 +126,12 @@ class BundledNetwork(nn.Module):
         for block in self.attention:
             tokens = block(tokens)
         return tokens.transpose(1, 2).reshape(batch, channels, height, width)
+
+
+def srgb(image: Tensor) -> Tensor:
+    """sRGB encoding of linear radiance of any shape, clipped to [0, 1]."""
+    image = image.clamp(0, 1)
+    return torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
 
 
 def encode(image: Tensor) -> Tensor:

@@ -11,6 +11,8 @@ from materialist.types import Array
 CHANNELS = 14
 NORMAL_X = 3
 """First channel of the normals."""
+SPOT = 12
+"""The channel that is high at the clicks."""
 NEAR = 3.0
 """Pixels within which a click is told sharply."""
 DEEP = 2.0

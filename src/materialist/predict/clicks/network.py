@@ -1,24 +1,51 @@
 """ClickNet: a small U-Net from the photo, its maps and a click to the object that was clicked on.
 
-Clicks are told as Xu et al. 2016 do it, by maps of the distance to them, and by how every pixel differs from them.
+Clicks are told as Xu et al. 2016 do it, by maps of the distance to them, and by how every pixel differs from them: in
+colour, in geometry, and in the features of an image classifier, which know parts of one thing by their kind.
 """
 
 from __future__ import annotations
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
 
-from materialist.predict.clicks.features import CHANNELS
+from materialist.predict.clicks.features import CHANNELS, SPOT
+from materialist.predict.lite import level, shipped
 from materialist.predict.unet import Architecture, UNet
 
-WIDTHS = Architecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2))
+WIDTHS = Architecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
 
 
 class ClickNet(UNet):
     """Features in, one logit a pixel out."""
 
     def __init__(self, architecture: Architecture | None = None):
-        super().__init__(CHANNELS, 1, architecture or WIDTHS)
+        a = architecture or WIDTHS
+        super().__init__(CHANNELS, 1, a)
+        if a.encoder:
+            self.encoder = shipped(a.encoder)
+            channels = self.encoder.channels
+            self.told = nn.ModuleList(nn.Conv2d(2 * c + 1, a.widths[k + 1], 1) for k, c in enumerate(channels))
+            for parameter in self.told.parameters():
+                nn.init.zeros_(parameter)
 
     def forward(self, maps: Tensor) -> Tensor:
         """[B, S, S] float32 logits of belonging to the object, of maps [B, CHANNELS, S, S]; S a multiple of 32."""
-        return self.raw(maps)[:, 0]
+        if not self.architecture.encoder:
+            return self.raw(maps)[:, 0]
+        with torch.no_grad():
+            features = self.encoder((maps[:, :3] + 0.5).clamp(0, 1))
+            seen = [related(level(found), maps[:, SPOT : SPOT + 1]) for found in features]
+        return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[:, 0]
+
+
+def related(features: Tensor, spot: Tensor) -> Tensor:
+    """[B, 2 C + 1, h, w]: features [B, C, h, w], how they differ from those at the clicks, and the cosine to those.
+
+    spot: [B, 1, S, S] high at the clicks.
+    """
+    weight = F.adaptive_avg_pool2d(spot, (features.shape[-2], features.shape[-1])).to(features.dtype)
+    here = (features * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp(min=1e-6)
+    cosine = F.cosine_similarity(features.float(), here.float(), dim=1)[:, None]
+    return torch.cat([features, (features - here).abs(), cosine.to(features.dtype)], 1)

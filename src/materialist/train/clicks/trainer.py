@@ -19,6 +19,7 @@ from materialist.predict.unet import STRIDE
 from materialist.train import small
 from materialist.train.budget import Budget
 from materialist.train.clicks.views import lesson, load
+from materialist.train.start import fill
 
 ASIDE = 48
 """Views that are kept aside, the last ones, where there are ten times as many."""
@@ -48,6 +49,13 @@ class Recipe(small.Recipe):
                 raise InputError(f"The side is {side} pixels; give a multiple of {STRIDE}.")
 
 
+def _begun(init: Path | None) -> ClickNet:
+    network = ClickNet()
+    if init is not None:
+        fill(network, init)
+    return network
+
+
 class Trainer(small.Run):
     """One run in one folder."""
 
@@ -55,16 +63,24 @@ class Trainer(small.Run):
 
     def __init__(
         self, folder: Path, views: Path, *, budget: Budget, recipe: Recipe | None = None, seed: int = 0,
-        every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
+        every: float = 180, resume: bool = False, init: Path | None = None,
+        note: Callable[[str], None] = lambda _: None,
     ):  # fmt: skip
-        """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off."""
+        """Start a run, from the weights in `init`, or resume one. Raises OutputError for a second start."""
         found = load(views)
         if not found:
             raise InputError(f"{views} holds no views to learn from.")
         aside = ASIDE if len(found) >= 10 * ASIDE else 0
         self.views, self.aside = found[: len(found) - aside], found[len(found) - aside :]
         super().__init__(
-            folder, ClickNet, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note
+            folder,
+            lambda: _begun(init),
+            recipe or Recipe(),
+            budget=budget,
+            seed=seed,
+            every=every,
+            resume=resume,
+            note=note,
         )
 
     def figures(self) -> dict[str, float]:
