@@ -9,14 +9,15 @@ from torch import nn
 from materialist.predict.own_weights import shared
 from materialist.predict.weights import load_weights, read_state
 
+WITH_ENCODER = ("told.", "semantics.")
+"""Parts that a network without an encoder has not."""
+
 
 def fill(network: nn.Module, init: Path) -> None:
-    """Give the network the weights in `init`, which a training wrote; where they are of a network without an encoder,
-    what the encoder's features add stays nothing.
+    """Give the network the weights in `init`, which a training wrote; what reads the encoder's features begins anew where
+    the file has none of it, and what those add is nothing then.
 
     Raises WeightsError for a file that is damaged or of another architecture.
     """
-    known = read_state(init)
-    if not any(name.startswith("told.") for name in known):
-        known = {k: v for k, v in network.state_dict().items() if k.startswith("told.")} | dict(known)
-    load_weights(network, known | shared(network), init)
+    fresh = {name: tensor for name, tensor in network.state_dict().items() if name.startswith(WITH_ENCODER)}
+    load_weights(network, fresh | dict(read_state(init)) | shared(network), init)
