@@ -9,13 +9,14 @@ from torch import nn
 from materialist.predict.own_weights import shared
 from materialist.predict.weights import load_weights, read_state
 
-WITH_ENCODER = ("told.", "semantics.")
-"""Parts that a network without an encoder has not."""
+WITH_ENCODER = ("told.",)
+"""What a network without an encoder has not."""
 
 
 def fill(network: nn.Module, init: Path) -> None:
-    """Give the network the weights in `init`, which a training wrote; what reads the encoder's features begins anew where
-    the file has none of it, and what those add is nothing then.
+    """Give the network the weights in `init`, which a training wrote.
+
+    What reads the encoder's features begins anew where the file has none of it; what those add is nothing then.
 
     Raises WeightsError for a file that is damaged or of another architecture.
     """

@@ -102,31 +102,25 @@ class BundledTask:
         # Metal is rare: under L1 and L2 a sigmoid ends at 0 everywhere, where it has no gradient left.
         found["metallic"] = losses.cross_entropy(out["metallic_logit"], metallic, mask)
         found["metallic"] += 0.2 * losses.gradient(out["metallic"], metallic, mask)
-        found["mask"] = 0.2 * nn.functional.binary_cross_entropy_with_logits(out["mask"], mask)
-        found |= geometry(out["depth"], out["normal"], batch)
-        if "semantic_depth" in out:
-            more = geometry(out["semantic_depth"], out["semantic_normal"], batch)
-            found |= {f"semantic_{name}": value for name, value in more.items()}
-        return found
+        found["normal"] = 1.5 * losses.cosine(out["normal"], batch["normal"], mask)
+        found["normal_gradient"] = 0.2 * losses.gradient(out["normal"], batch["normal"], mask)
+        return found | self._geometry(out, batch, mask)
+
+    def _geometry(self, out: Batch, batch: Batch, mask: Tensor) -> dict[str, Tensor]:
+        """Losses of depth and of where there is a surface."""
+        true = relative_log_depth(batch["depth"], mask)
+        return {
+            "depth": 1.5 * losses.centred_l1(out["depth"], true, mask),
+            "depth_level": 0.1 * losses.mean((out["depth"] - true).abs().clamp(max=2), mask),
+            "depth_gradient": 1.5 * losses.gradient(out["depth"], true, mask),
+            "slopes": 0.5 * losses.slopes(out["depth"], batch["rays"], batch["normal"], mask),
+            "mask": 0.2 * nn.functional.binary_cross_entropy_with_logits(out["mask"], mask),
+        }
 
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """As the predictor does it."""
         assert isinstance(network, BundledNetwork)
         return infer(network, sample.image, sample.rays, device=next(network.parameters()).device)
-
-
-def geometry(depth: Tensor, normal: Tensor, batch: Batch) -> dict[str, Tensor]:
-    """Losses of the logarithm of depth [B, 1, H, W] and of normals [B, 3, H, W]."""
-    mask = batch["mask"]
-    true = relative_log_depth(batch["depth"], mask)
-    return {
-        "normal": 1.5 * losses.cosine(normal, batch["normal"], mask),
-        "normal_gradient": 0.2 * losses.gradient(normal, batch["normal"], mask),
-        "depth": 1.5 * losses.centred_l1(depth, true, mask),
-        "depth_level": 0.1 * losses.mean((depth - true).abs().clamp(max=2), mask),
-        "depth_gradient": 1.5 * losses.gradient(depth, true, mask),
-        "slopes": 0.5 * losses.slopes(depth, batch["rays"], batch["normal"], mask),
-    }
 
 
 def relative_log_depth(depth: Tensor, mask: Tensor) -> Tensor:

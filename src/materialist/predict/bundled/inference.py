@@ -18,14 +18,12 @@ from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.predict.bundled.relief import smooth_relief, with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
-NETWORK_SIDES = (160, 224)
+NETWORK_SIDES = (192, 256)
 """Longest sides at which the network sees the photo, and its mirror image: sizes that it was trained on. Answers are
 averaged, and brought to the photo's size with the photo as the guide."""
-SEMANTIC = 0.6
-"""Weight of the depth and normals that are told by features alone, beside those that are told by pixels as well."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
-EDGE_REACH = 0.047
+EDGE_REACH = 0.03
 """How far the network's edges may be off, as a part of the longest side."""
 SMOOTH = 2.0
 """What is smooth, and keeps out of the search for edges, is longer than this times that reach."""
@@ -141,24 +139,13 @@ def _mean_answer(
     answers = []
     for size in sorted({_network_size(linear.shape[:2], side) for side in sides}):
         photo, seen = resample.values(linear, size), resample.values(np.ascontiguousarray(rays), size)
-        answers.append(_blended(_run(network, photo, seen, device)))
+        answers.append(_run(network, photo, seen, device))
         mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
-        answer = _blended(_run(network, *mirrored, device))
-        found = {name: np.ascontiguousarray(m[:, ::-1]) for name, m in answer.items()}
+        found = {name: np.ascontiguousarray(m[:, ::-1]) for name, m in _run(network, *mirrored, device).items()}
         answers.append(found | {"normal": found["normal"] * _MIRROR})
+    for answer in answers:  # what depth is relative to is every answer's own
+        answer["depth"] = answer["depth"] - np.median(answer["depth"])
     return {n: np.mean([resample.values(a[n], target) for a in answers], axis=0) for n in answers[0]}
-
-
-def _blended(answer: dict[str, Array]) -> dict[str, Array]:
-    """The answer with one depth, its median at 0, and one normal for those of pixels and of features."""
-    answer = dict(answer)
-    level = lambda depth: depth - np.median(depth)  # what depth is relative to is every answer's own  # noqa: E731
-    answer["depth"] = level(answer["depth"])
-    if "semantic_depth" in answer:
-        mix = lambda own, semantic: (1 - SEMANTIC) * own + SEMANTIC * semantic  # noqa: E731
-        answer["depth"] = level(mix(answer["depth"], level(answer.pop("semantic_depth"))))
-        answer["normal"] = mix(answer["normal"], answer.pop("semantic_normal"))
-    return answer
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:

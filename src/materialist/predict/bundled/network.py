@@ -15,8 +15,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.predict.bundled.blocks import Attention, Block, conv, norm, shrink
-from materialist.predict.bundled.semantics import SemanticGeometry, facing
 from materialist.predict.lite import level, shipped
 
 STRIDE = 32
@@ -64,25 +62,24 @@ class BundledNetwork(nn.Module):
         super().__init__()
         self.architecture = a = architecture or Architecture()
         w = a.widths
-        self.stem = nn.Sequential(conv(6 * 16 + 2, w[0]), norm(w[0]), nn.SiLU())
-        self.levels = nn.ModuleList(nn.Sequential(*(Block(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
+        self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), _norm(w[0]), nn.SiLU())
+        self.levels = nn.ModuleList(nn.Sequential(*(_Block(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
         self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
         self.place = nn.Conv2d(4, w[3], 1)
-        self.attention = nn.ModuleList(Attention(w[3]) for _ in range(a.attention))
+        self.attention = nn.ModuleList(_Attention(w[3]) for _ in range(a.attention))
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
         self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
         self.decoders = nn.ModuleList(
-            nn.Sequential(*(Block(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
+            nn.Sequential(*(_Block(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
         )
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
-        self.refine = nn.Sequential(conv(a.fine + 24, a.fine), norm(a.fine), nn.SiLU())
-        self.head = conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
+        self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), _norm(a.fine), nn.SiLU())
+        self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
         if a.encoder:
             self.encoder = shipped(a.encoder)
             self.told = nn.ModuleList(nn.Conv2d(c, w[k], 1) for k, c in enumerate(self.encoder.channels))
             for parameter in self.told.parameters():
                 nn.init.zeros_(parameter)
-            self.semantics = SemanticGeometry(self.encoder.channels)
         _same_subpixels(self.fine)
         _same_subpixels(self.head)
 
@@ -97,31 +94,29 @@ class BundledNetwork(nn.Module):
         Returns:
             albedo [B, 3, H, W] sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
             [B, 3, H, W] unit; depth [B, 1, H, W] natural logarithm of planar depth, up to a constant; mask
-            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid. With
-            an encoder also semantic_depth and semantic_normal, see `SemanticGeometry`.
+            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid.
         """
-        picture, features = encode(image), self.features(image)
-        told = [part(found) for part, found in zip(self.told, features, strict=True)] if features else [0.0] * 4
-        x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), shrink(rays, 4)], 1))
+        picture, told = encode(image), self._told(image)
+        x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), _shrink(rays, 4)], 1))
         x, skips = self.levels[0](x + told[0]), []
         for k in range(3):
             skips.append(x)
             x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + told[k + 1])
-        x = self._context(x, shrink(rays, STRIDE))
+        x = self._context(x, _shrink(rays, STRIDE))
         for k in (2, 1, 0):
             x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
             x = self.decoders[k](x + self.skips[k](skips[k]))
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
-        maps = _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
-        return maps | (self.semantics(features) if features else {})
+        return _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
 
-    def features(self, image: Tensor) -> list[Tensor]:
-        """The classifier's features of linear radiance [B, 3, H, W], at 1/4 to 1/32; none without an encoder."""
+    def _told(self, image: Tensor) -> list[Tensor | float]:
+        """What the classifier's features add at each level; nothing where there is no encoder."""
         if not self.architecture.encoder:
-            return []
+            return [0.0] * 4
         with torch.no_grad():
-            return [level(found) for found in self.encoder(srgb(image))]
+            features = [level(found) for found in self.encoder(srgb(image))]
+        return [part(found) for part, found in zip(self.told, features, strict=True)]
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
         """Attention over the coarsest level [B, C, h, w], told where each cell looks."""
@@ -161,10 +156,29 @@ def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
         "roughness": maps["roughness"].sigmoid(),
         "metallic": maps["metallic"].sigmoid(),
         "metallic_logit": maps["metallic"],
-        "normal": facing(maps["normal"]),
+        "normal": _facing(maps["normal"]),
         "depth": maps["depth"],
         "mask": maps["mask"],
     }
+
+
+def _facing(raw: Tensor) -> Tensor:
+    """Unit vectors of raw [B, 3, H, W]; raw zero looks at the viewer."""
+    return F.normalize(raw + raw.new_tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1), dim=1, eps=1e-4)
+
+
+def _shrink(rays: Tensor, factor: int) -> Tensor:
+    """Mean ray of every factor x factor cell."""
+    return F.avg_pool2d(rays, factor)
+
+
+def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:
+    return nn.Conv2d(inputs, outputs, 3, padding=1, bias=bias)
+
+
+def _norm(channels: int) -> nn.GroupNorm:
+    # Statistics over each picture alone: small batches train, and a batch of one predicts, alike.
+    return nn.GroupNorm(8, channels)
 
 
 @torch.no_grad()
@@ -173,3 +187,35 @@ def _same_subpixels(conv: nn.Conv2d) -> None:
     conv.weight.copy_(conv.weight[::4].repeat_interleave(4, 0))
     if conv.bias is not None:
         conv.bias.zero_()
+
+
+class _Block(nn.Module):
+    """Residual block: two normalised 3x3 convolutions, starting as the identity."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.norm1, self.conv1 = _norm(channels), _conv(channels, channels)
+        self.norm2, self.conv2 = _norm(channels), _conv(channels, channels)
+        nn.init.zeros_(self.conv2.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.conv1(F.silu(self.norm1(x)))
+        return x + self.conv2(F.silu(self.norm2(y)))
+
+
+class _Attention(nn.Module):
+    """Pre-norm transformer block over cells [B, n, C]; cells know their place from their rays."""
+
+    def __init__(self, channels: int, head_size: int = 32):
+        super().__init__()
+        self.heads = channels // head_size
+        self.norm1, self.norm2 = nn.LayerNorm(channels), nn.LayerNorm(channels)
+        self.qkv, self.out = nn.Linear(channels, 3 * channels), nn.Linear(channels, channels)
+        self.up, self.down = nn.Linear(channels, 3 * channels), nn.Linear(3 * channels, channels)
+
+    def forward(self, x: Tensor) -> Tensor:
+        batch, cells, channels = x.shape
+        qkv = self.qkv(self.norm1(x)).view(batch, cells, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        seen = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
+        x = x + self.out(seen.transpose(1, 2).reshape(batch, cells, channels))
+        return x + self.down(F.gelu(self.up(self.norm2(x))))
