@@ -54,7 +54,7 @@ def slow_features(state, encoder, x):
     def layer(x, conv, norm, stride=1, groups=1, act=True):
         weight = state[f"{conv}.weight"]
         kernel = weight.shape[-1]
-        for axis, pair in ((-1, (0, 0)), (-2, (0, 0))):
+        for axis in (-1, -2):
             missing = max((-(-x.shape[axis] // stride) - 1) * stride + kernel - x.shape[axis], 0)
             pair = (missing // 2, missing - missing // 2)
             x = F.pad(x, pair if axis == -1 else (0, 0, *pair))
@@ -97,9 +97,8 @@ def test_the_package_has_the_classifier_it_names():
         found = encoder(picture())
     for one, (channels, mean, spread, *values) in zip(found, FIGURES, strict=True):
         assert one.shape[1] == channels
-        assert one.mean().item() == pytest.approx(mean, abs=0.01) and one.std().item() == pytest.approx(
-            spread, rel=4e-3
-        )
+        assert one.mean().item() == pytest.approx(mean, abs=0.01)
+        assert one.std().item() == pytest.approx(spread, rel=4e-3)
         places = [one[0, 0, 0, 0], one[0, -1, -1, -1], one[0, 7, 1, 1]]
         assert [v.item() for v in places] == pytest.approx(values, abs=0.03 * spread)
 

@@ -50,6 +50,7 @@ class Recipe(small.Recipe):
 
 
 def _begun(init: Path | None) -> ClickNet:
+    """A network with the weights in `init`, if given."""
     network = ClickNet()
     if init is not None:
         fill(network, init)
@@ -73,15 +74,9 @@ class Trainer(small.Run):
         aside = ASIDE if len(found) >= 10 * ASIDE else 0
         self.views, self.aside = found[: len(found) - aside], found[len(found) - aside :]
         super().__init__(
-            folder,
-            lambda: _begun(init),
-            recipe or Recipe(),
-            budget=budget,
-            seed=seed,
-            every=every,
-            resume=resume,
+            folder, lambda: _begun(init), recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume,
             note=note,
-        )
+        )  # fmt: skip
 
     def figures(self) -> dict[str, float]:
         """Mean and median intersection over union of one click, on views kept aside."""
