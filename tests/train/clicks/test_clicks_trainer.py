@@ -10,7 +10,7 @@ from materialist.predict.clicks.features import CHANNELS
 from materialist.train.budget import Budget
 from materialist.train.clicks import views
 from materialist.train.clicks.trainer import Recipe, Trainer
-from materialist.train.clicks.views import View, click_in, lesson
+from materialist.train.clicks.views import View, click_in, lesson, worse
 
 RECIPE = Recipe(batch=4, warm_up=1, side=32, last_side=64, rate=2e-3)
 
@@ -54,6 +54,22 @@ def test_a_view_without_anything_large_enough_is_no_lesson():
     view = View(**{**picture(0), "thing": np.zeros((64, 80), np.int16)})
     assert lesson(view, 64, np.random.default_rng(0)) is None
     assert click_in(np.zeros((9, 9), bool), np.random.default_rng(0)) is None
+
+
+def test_worse_maps_lose_edges_and_keep_what_they_are():
+    depth = np.full((96, 96), 2, np.float32)
+    depth[:, 48:], depth[:10] = 4, 0
+    normal = np.zeros((96, 96, 3), np.float32)
+    normal[:, :48, 2], normal[:, 48:, 0] = 1, 1
+    steps = []
+    for seed in range(12):
+        turned, bent = worse(normal, depth, np.random.default_rng(seed))
+        assert ((bent > 0) == (depth > 0)).all(), "what has no depth keeps none, and gives its neighbours none"
+        known = depth > 0
+        np.testing.assert_allclose(np.linalg.norm(turned[known], axis=-1), 1, atol=1e-4)
+        assert abs(np.log(bent[known]).mean() - np.log(depth[known]).mean()) < 0.15
+        steps.append(float(np.log(bent[40:, 50] / bent[40:, 45]).mean() / np.log(2)))
+    assert np.median(steps) < 0.9 and min(steps) < 0.3, "an edge is softer, at times much; waves may add a little"
 
 
 def test_it_learns_resumes_and_leaves_weights(folder, tmp_path):

@@ -25,6 +25,12 @@ MORE = 0.25
 """Share of lessons with several clicks."""
 LEAST_CROP = 0.4
 """Smallest part of a view's side that a lesson shows."""
+WORSE = 0.5
+"""Share of lessons whose maps are made worse: the bundled network learnt from such pictures, and knows photos less."""
+BLUR = (0.008, 0.1)
+"""Blur of such maps, as a part of the side, from and to."""
+WAVES = 0.25
+"""Largest amplitude of waves laid over their normals, and over the logarithm of their depth as a part of its spread."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +117,30 @@ def lesson(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Arra
     clicks = [place for _ in range(count) if (place := click_in(mask & (depth > 0), rng)) is not None]
     if not clicks:
         return None
+    if rng.random() < WORSE:
+        normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
     return features(rgb, normal, depth, clicks), mask
+
+
+def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Normals [H, W, 3] and depth [H, W] as of a photo that the network understands badly: blurred, with slow waves.
+
+    What has no depth keeps none.
+    """
+    import cv2
+
+    side, known = max(depth.shape), depth > 0
+    blur = lambda v, s: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)  # noqa: E731
+    sigma = float(np.exp(rng.uniform(*np.log(BLUR))))
+    logarithm = np.log(np.where(known, depth, 1)) * known
+    share = np.maximum(blur(known, sigma), 1e-3)
+    even = blur(logarithm, sigma) / share
+    waves = blur(rng.normal(size=(*depth.shape, 4)), rng.uniform(0.06, 0.2))
+    waves = waves * (rng.uniform(0, WAVES) / max(float(waves.std()), 1e-6))
+    spread = float(even[known].std()) if known.any() else 0.0
+    bent = np.where(known, np.exp(even + waves[..., 3] * spread), 0).astype(np.float32)
+    return _unit(blur(normal * known[..., None], sigma) / share[..., None] + waves[..., :3]), bent
 
 
 def _unit(normal: Array) -> Array:
