@@ -74,3 +74,35 @@ def floor_scene(width: int = 48, height: int = 36, *, tilt: float = 30.0, native
     envmap = np.ones((8, 16, 3), np.float32)
     prior = Prediction(materials, normals, depth, "made")
     return Scene(camera, photo, prior, materials, normals, depth, geometry, envmap, albedo)
+
+
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
+
+
+def tetrahedron_glb(path: Path, material: dict | None = None, required: tuple[str, ...] = (), **attributes) -> Path:
+    """A .glb of a tetrahedron; `attributes` are further ones, name -> (array [4, n], componentType, normalized)."""
+    import struct
+
+    faces = np.array([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2], "<u2")
+    attributes = {"POSITION": (TETRAHEDRON, 5126, False), **attributes}
+    arrays = [*attributes.values(), (faces[:, None], 5123, False)]
+    data, views, accessors = b"", [], []
+    for array, kind, whole in arrays:
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
+        data += array.tobytes() + b"\0" * (-array.nbytes % 4)
+        what = {"bufferView": len(views) - 1, "componentType": kind, "count": len(array), "normalized": whole}
+        accessors.append({**what, "type": {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}[array.shape[1]]})
+    accessors[0] |= {"min": [0, 0, 0], "max": [1, 1, 1]}
+    primitive = {"attributes": {n: k for k, n in enumerate(attributes)}, "indices": len(attributes)}
+    content = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}], "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}], "extensionsRequired": list(required),
+    }  # fmt: skip
+    if material is not None:
+        content["materials"], primitive["material"] = [material], 0
+    text = json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return path

@@ -224,3 +224,48 @@ def test_other_materials(tmp_path):
     np.testing.assert_allclose(repainted(model, "0.1,0.2,0.3").parts[0].surface.albedo[0, 0], [0.1, 0.2, 0.3])
     with pytest.raises(InputError, match="as-is, glass, mirror"):
         repainted(model, "wood")
+
+
+def red_ball(*, spare=False, flat=False):
+    """A red icosphere of radius 1, with a vertex of no face far away, or with a face without an area."""
+    ball = trimesh.creation.icosphere(2)
+    ball.visual.vertex_colors = np.tile(np.array([255, 0, 0, 255], np.uint8), (len(ball.vertices), 1))
+    vertices, faces = ball.vertices, ball.faces
+    if spare:
+        vertices = np.concatenate([vertices, [[50.0, 50.0, 50.0]]])
+    if flat:
+        faces = np.concatenate([faces, [[0, 0, 1]]])
+    colours = np.tile(np.array([255, 0, 0, 255], np.uint8), (len(vertices), 1))
+    normals = np.concatenate([ball.vertices, np.tile([[0.0, 0.0, 1.0]], (int(spare), 1))])
+    return trimesh.Trimesh(vertices, faces, vertex_normals=normals, vertex_colors=colours, process=False)
+
+
+def test_a_face_without_an_area_leaves_the_colours(tmp_path):
+    red_ball(flat=True).export(tmp_path / "ball.ply")
+    (body,) = read_model(tmp_path / "ball.ply").parts
+    assert len(body.faces) == 320
+    used = body.surface.albedo.reshape(-1, 3)[:320]
+    np.testing.assert_allclose(used, np.tile(RED, (320, 1)), atol=1e-6)
+
+
+def test_a_vertex_of_no_face_is_nowhere(tmp_path):
+    ball = red_ball(spare=True)
+    ball.visual = trimesh.visual.ColorVisuals()
+    ball.export(tmp_path / "ball.ply", vertex_normal=True)
+    model = read_model(tmp_path / "ball.ply")
+    np.testing.assert_allclose(np.ptp(model.vertices, axis=0), [2, 2, 2], atol=0.1)
+
+
+def test_a_mesh_far_from_its_origin_keeps_its_shape(tmp_path):
+    lines = (tmp_path / "box.obj", (0.2, 0.3, 0.4))
+    text = []
+    for line in box_file(*lines).read_text().splitlines():
+        word = line.split()
+        if word[:1] == ["v"]:
+            moved = np.add(np.array(word[1:4], float), (500000, 4000000, 100))
+            line = "v " + " ".join(f"{c:.4f}" for c in moved)
+        text.append(line)
+    (tmp_path / "far.obj").write_text("\n".join(text))
+    np.testing.assert_allclose(np.ptp(read_model(tmp_path / "far.obj").vertices, axis=0), [0.2, 0.3, 0.4], atol=1e-3)
+    near = read_model(tmp_path / "box.obj").vertices
+    np.testing.assert_allclose(near[:, 1].min(), 0, atol=1e-6)

@@ -23,29 +23,31 @@ def constant(albedo: Array | float, roughness: float, metallic: float, **glass: 
     return Surface(colour, flat(roughness), flat(metallic), **glass)
 
 
-def surface_of(material: Any, folder: Any) -> Surface:
-    """The Surface of a trimesh material, None for none; further maps of an .mtl are read through `folder`."""
+def surface_of(material: Any, folder: Any, factor: Any = None) -> Surface:
+    """The Surface of a trimesh material, None for none; further maps of an .mtl are read through `folder`.
+
+    `factor` [3 or 4] is glTF's base colour as the file has it: trimesh keeps 8 bits of it.
+    """
     if material is None:
         return constant(GREY, GREY, 0.0)
     if hasattr(material, "metallicFactor"):
-        return _from_gltf(material, folder)
+        return _from_gltf(material, folder, factor)
     return _from_mtl(material, folder)
 
 
-def from_colours(colours: Array) -> tuple[Surface, Array]:
-    """One texel a face: (surface, uv [F, 2] of its centre), from sRGB colours [F, 3] uint8. Neutral otherwise."""
+def texels(colours: Array) -> tuple[Array, Array]:
+    """One texel a face: (linear texture [n, n, 3], uv [F, 2] of each one's centre), from linear colours [F, 3]."""
     side = max(1, int(np.ceil(np.sqrt(len(colours)))))
-    texels = np.zeros((side * side, 3), np.float32)
-    texels[: len(colours)] = srgb_to_linear(colours.astype(np.float32) / 255)
+    texture = np.zeros((side * side, 3), np.float32)
+    texture[: len(colours)] = colours
     number = np.arange(len(colours))
     uv = (np.stack([number % side, number // side], -1) + 0.5) / side
-    plain = constant(GREY, GREY, 0.0)
-    return Surface(texels.reshape(side, side, 3), plain.roughness, plain.metallic), uv.astype(np.float32)
+    return texture.reshape(side, side, 3), uv.astype(np.float32)
 
 
-def _from_gltf(material: Any, folder: Any) -> Surface:
+def _from_gltf(material: Any, folder: Any, factor: Any) -> Surface:
     """glTF 2.0, section 3.9: factors times textures; green is roughness, blue metallic; factors default to 1."""
-    factor = _rgb(material.baseColorFactor, 1.0)
+    factor = _rgb(material.baseColorFactor if factor is None else np.asarray(factor, np.float32), 1.0)
     albedo = factor.reshape(1, 1, 3)
     colour = _pixels(material.baseColorTexture, folder)
     if colour is not None:

@@ -10,11 +10,16 @@ from typing import Any, cast
 
 import numpy as np
 
+from materialist.color import srgb_to_linear
+from materialist.edit import mesh_gltf
 from materialist.edit.mesh_folder import FORMATS, MAX_FACES, MeshFolder, claimed_faces
-from materialist.edit.mesh_material import constant, from_colours, surface_of
+from materialist.edit.mesh_material import GREY, constant, surface_of, texels
 from materialist.edit.mesh_shape import creased_normals, edge_faults, volume
 from materialist.errors import InputError
-from materialist.types import Array, Body
+from materialist.types import Array, Body, Surface
+
+DISTANT = 16.0
+"""A mesh whose middle is further from its origin than so many times its size is moved there (georeferenced scans)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,11 @@ def read_model(path: str | Path, *, up: str = "auto") -> Model:
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
     data = _bytes(path)
     folder = MeshFolder(path.parent)
-    pieces = list(_pieces(_parsed(path, data, folder), folder))
+    read = _Reader(path, folder)
+    if path.suffix.lower() in (".gltf", ".glb"):
+        data, read.materials = mesh_gltf.prepared(path, data)
+        read.linear = True
+    pieces = list(read.pieces(_parsed(path, data, folder)))
     if folder.refused:
         raise InputError(
             f"{path} refers to {folder.refused[0]}, outside of its folder, which is never followed; "
@@ -63,11 +72,9 @@ def read_model(path: str | Path, *, up: str = "auto") -> Model:
     if count == 0:
         raise InputError(f"{path} has no triangles; give a mesh with faces.")
     _check_size(path, count)
-    if not all(np.isfinite(piece.vertices).all() for piece in pieces):
-        raise InputError(f"{path} has vertices that are NaN or infinite; repair the mesh, in Blender for example.")
     if (up == "z") or (up == "auto" and path.suffix.lower() == ".stl"):
         pieces = [_z_up(piece) for piece in pieces]
-    return _checked(Model(tuple(pieces), path.stem), path, folder)
+    return _checked(Model(tuple(pieces), path.stem), path, folder, read.left_out())
 
 
 def repainted(model: Model, material: str) -> Model:
@@ -142,59 +149,119 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
         quiet.setLevel(level)
 
 
-def _pieces(scene: Any, folder: MeshFolder) -> Iterator[Body]:
-    """The meshes of trimesh's scene, each where its node puts it."""
-    for number, node in enumerate(scene.graph.nodes_geometry):
-        transform, name = scene.graph[node]
-        mesh = scene.geometry[name]
-        if getattr(mesh, "faces", None) is None or len(mesh.faces) == 0:
-            continue
-        if int(np.min(mesh.faces)) < 0 or int(np.max(mesh.faces)) >= len(mesh.vertices):
-            raise InputError(f"The mesh part {name} has faces of vertices that do not exist; export it again.")
-        yield _piece(mesh, np.asarray(transform, np.float64), f"{name or number}", folder)
+class _Reader:
+    """The meshes of a file as bodies."""
 
+    def __init__(self, path: Path, folder: MeshFolder):
+        self.path, self.folder = path, folder
+        self.materials: list[dict[str, Any]] = []
+        """Those of a glTF file, which trimesh knows by their number (see `mesh_gltf.prepared`)."""
+        self.linear = False
+        """Whether colours of vertices are linear, as glTF's are."""
+        self.unpainted = 0
+        """Parts whose colours of vertices are not shown."""
 
-def _piece(mesh: Any, transform: Array, name: str, folder: MeshFolder) -> Body:
-    vertices = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
-    faces = np.asarray(mesh.faces, np.int32)
-    given = getattr(mesh._cache, "cache", {}).get("vertex_normals")  # trimesh would compute others, without creases
-    turn = np.linalg.inv(transform[:3, :3]).T if np.linalg.det(transform[:3, :3]) else np.eye(3)
-    if np.linalg.det(transform[:3, :3]) < 0:
-        faces = faces[:, ::-1]
-    faces = faces[_area(vertices, faces) > 0] if np.isfinite(vertices).all() else faces
-    if given is not None and len(given) == len(vertices):
-        normals = _unit(np.asarray(given, np.float64) @ turn.T)
-    else:
+    def left_out(self) -> list[str]:
+        """What of the file is not shown, in words."""
+        return mesh_gltf.left_out(self.materials) + ["the colours of its vertices"] * bool(self.unpainted)
+
+    def pieces(self, scene: Any) -> Iterator[Body]:
+        """The meshes of trimesh's scene, each where its node puts it."""
+        found = []
+        for number, node in enumerate(scene.graph.nodes_geometry):
+            transform, name = scene.graph[node]
+            mesh = scene.geometry[name]
+            if getattr(mesh, "faces", None) is None or len(mesh.faces) == 0:
+                continue
+            if int(np.min(mesh.faces)) < 0 or int(np.max(mesh.faces)) >= len(mesh.vertices):
+                raise InputError(f"The mesh part {name} has faces of vertices that do not exist; export it again.")
+            transform = np.asarray(transform, np.float64)
+            vertices = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
+            if not np.isfinite(vertices).all():
+                raise InputError(
+                    f"{self.path} has vertices that are NaN or infinite; repair it, in Blender for example."
+                )
+            found.append((mesh, transform, vertices, f"{name or number}"))
+        origin = _origin([vertices[np.unique(mesh.faces)] for mesh, _, vertices, _ in found])
+        for mesh, transform, vertices, name in found:
+            yield self.piece(mesh, transform, vertices - origin, name)
+
+    def piece(self, mesh: Any, transform: Array, vertices: Array, name: str) -> Body:
+        """One mesh with its vertices [V, 3] where they are."""
+        faces = np.asarray(mesh.faces, np.int32)
+        given = getattr(mesh._cache, "cache", {}).get("vertex_normals")  # trimesh would compute others, no creases
+        turn = np.linalg.inv(transform[:3, :3]).T if np.linalg.det(transform[:3, :3]) else np.eye(3)
+        kept = _area(vertices, faces) > 0
+        if np.linalg.det(transform[:3, :3]) < 0:
+            faces = faces[:, ::-1]
         normals = None
-    uv, surface, faces, vertices, normals = _painted(mesh, vertices, faces, normals, folder)
-    if normals is None and len(faces) and np.isfinite(vertices).all():
-        corners = creased_normals(vertices, faces).reshape(-1, 3)
-        own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-        vertices, uv, normals, faces = vertices[faces.ravel()], uv[faces.ravel()], corners, own
-    elif normals is None:
-        normals = np.tile([0.0, 1.0, 0.0], (len(vertices), 1))
-    take = lambda a: np.ascontiguousarray(a, np.float32)  # noqa: E731
-    return Body(take(vertices), np.ascontiguousarray(faces), take(normals), take(uv), surface, name)
+        if given is not None and len(given) == len(vertices):
+            normals = _unit(np.asarray(given, np.float64) @ turn.T)
+        uv, surface, colours = self.paint(mesh, len(vertices), kept)
+        faces = faces[kept]
+        if colours is not None or normals is None:  # every corner is a vertex of its own
+            flat = faces.ravel()
+            normals = creased_normals(vertices, faces).reshape(-1, 3) if normals is None else normals[flat]
+            uv = uv[flat] if colours is None else np.repeat(colours, 3, 0)
+            vertices, faces = vertices[flat], np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
+        # A vertex of no face is nowhere, and must not count where the size is measured.
+        used, number = np.unique(faces, return_inverse=True)
+        take = lambda a: np.ascontiguousarray(a[used], np.float32)  # noqa: E731
+        faces = number.reshape(-1, 3).astype(np.int32)
+        return Body(take(vertices), faces, take(normals), take(uv), surface, name)
+
+    def paint(self, mesh: Any, count: int, kept: Array) -> tuple[Array, Surface, Array | None]:
+        """(uv [V, 2] with v DOWN, surface, uv [F, 2] of a texel for each face of those `kept`, where they have one)."""
+        visual = mesh.visual
+        places: Array | None
+        if visual.kind in ("vertex", "face"):
+            colours = np.asarray(visual.face_colors)[kept, :3].astype(np.float32) / 255
+            texture, places = texels(colours if self.linear else srgb_to_linear(colours))
+            return np.zeros((count, 2)), replace(constant(GREY, GREY, 0.0), albedo=texture), places
+        material = getattr(visual, "material", None)
+        said = self.said(material)
+        surface = surface_of(material, self.folder, (said.get("pbrMetallicRoughness") or {}).get("baseColorFactor"))
+        uv = getattr(visual, "uv", None)
+        uv = np.zeros((count, 2)) if uv is None or np.shape(uv) != (count, 2) else np.asarray(uv, np.float64)
+        uv = np.nan_to_num(uv)
+        uv = np.stack([uv[:, 0], 1 - uv[:, 1]], -1)
+        places = None
+        shades = self.shades(visual, mesh, kept)
+        if shades is not None and surface.albedo.size == 3 and surface.roughness.size == surface.metallic.size == 1:
+            texture, places = texels(shades)
+            surface = replace(surface, albedo=np.clip(texture * surface.albedo, 0, 1).astype(np.float32))
+        elif shades is not None:
+            self.unpainted += 1
+        return mesh_gltf.tiled(uv, said), mesh_gltf.extended(surface, said), places
+
+    def said(self, material: Any) -> dict[str, Any]:
+        """What the glTF file says of a material of trimesh's."""
+        name = str(getattr(material, "name", None))
+        return self.materials[int(name)] if name.isdigit() and int(name) < len(self.materials) else {}
+
+    @staticmethod
+    def shades(visual: Any, mesh: Any, kept: Array) -> Array | None:
+        """[F, 3] linear colours of faces that multiply those of a material (glTF's COLOR_0); None for white or none."""
+        colours = getattr(visual, "vertex_attributes", {}).get("color")
+        if colours is None or len(colours) != len(mesh.vertices):
+            return None
+        colours = np.asarray(colours)[:, :3].astype(np.float64) / (255 if colours.dtype == np.uint8 else 1)
+        return None if (colours > 0.998).all() else np.clip(colours[mesh.faces[kept]].mean(1), 0, 1)
 
 
-def _painted(mesh: Any, vertices: Array, faces: Array, normals: Array | None, folder: MeshFolder) -> tuple:
-    """(uv [V, 2] with v DOWN, surface, faces, vertices, normals); colours of vertices become a texel a face."""
-    visual = mesh.visual
-    if visual.kind in ("vertex", "face") and len(faces) == len(mesh.faces):
-        colours = np.asarray(visual.face_colors)[:, :3]
-        surface, texel = from_colours(colours)
-        own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-        flat = faces.ravel()
-        return np.repeat(texel, 3, 0), surface, own, vertices[flat], None if normals is None else normals[flat]
-    uv = getattr(visual, "uv", None)
-    surface = surface_of(getattr(visual, "material", None), folder)
-    if uv is None or np.shape(uv) != (len(vertices), 2):
-        uv = np.zeros((len(vertices), 2))
-    uv = np.nan_to_num(np.asarray(uv, np.float64))
-    return np.stack([uv[:, 0], 1 - uv[:, 1]], -1), surface, faces, vertices, normals
+def _origin(clouds: list[Array]) -> Array:
+    """[3] what is taken off all vertices: their middle, where single precision would not tell them apart there."""
+    if not clouds:
+        return np.zeros(3)
+    points = np.concatenate(clouds)
+    if not len(points) or not np.isfinite(points).all():
+        return np.zeros(3)
+    low, high = points.min(0), points.max(0)
+    middle = (low + high) / 2
+    return middle if np.abs(middle).max() > DISTANT * (high - low).max() else np.zeros(3)
 
 
-def _checked(model: Model, path: Path, folder: MeshFolder) -> Model:
+def _checked(model: Model, path: Path, folder: MeshFolder, left_out: list[str]) -> Model:
     """The model with its faces to the outside, and warnings of what is wrong with it."""
     corners = np.cumsum([0, *(len(part.vertices) for part in model.parts)])
     vertices = model.vertices
@@ -204,6 +271,7 @@ def _checked(model: Model, path: Path, folder: MeshFolder) -> Model:
     open_edges, crowded = edge_faults(vertices, faces)
     notes = [f"{path.name}: {name} is missing; a constant takes its place." for name in dict.fromkeys(folder.missing)]
     notes += [f"{path.name}: a texture cannot be read; a constant takes its place."] * bool(folder.damaged)
+    notes += [f"{path.name}: {', '.join(left_out)} left out."] * bool(left_out)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
     parts = model.parts

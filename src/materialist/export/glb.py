@@ -112,7 +112,7 @@ class _Document:
             material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
-            material |= self._glass(part.surface, pbr)
+            material.setdefault("extensions", {}).update(self._glass(part.surface, pbr))
         return self._add("materials", material)
 
     def _glass(self, surface: Surface, pbr: dict) -> dict:
@@ -123,10 +123,8 @@ class _Document:
             pbr.pop("baseColorTexture", None)
         self.extensions |= {"KHR_materials_transmission", "KHR_materials_ior"}
         return {
-            "extensions": {
-                "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
-                "KHR_materials_ior": {"ior": float(surface.ior)},
-            }
+            "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
+            "KHR_materials_ior": {"ior": float(surface.ior)},
         }
 
     def _texture(self, name: str, pixels: Array, sampler: int) -> int:
