@@ -15,6 +15,7 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict.bundled.network import Architecture, BundledNetwork
 from materialist.predict.normals import normals_from_depth
+from materialist.train.lpips import lpips
 from materialist.types import Camera
 
 
@@ -39,7 +40,7 @@ def folder(tmp_path):
 
 def test_a_perfect_predictor_scores_perfectly(folder, tmp_path):
     maps = folder / "plane" / "maps"
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},classical")
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},classical", procedural=0)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     best, guess = report["means"][f"maps:{maps}"], report["means"]["classical"]
     assert best["albedo_psnr"] == best["roughness_psnr_pooled"] == 100
@@ -71,15 +72,25 @@ def test_samples_are_seen_by_their_own_camera(tmp_path):
 
 
 def test_what_cannot_be_scored(tmp_path):
-    with pytest.raises(InputError, match="labelled pictures"):
-        bench.run("materials", output=tmp_path / "report")
+    with pytest.raises(InputError, match="nothing to score"):
+        bench.run("materials", output=tmp_path / "report", procedural=0)
     with pytest.raises(InputError, match="neither 'samples'"):
-        bench.run("materials", data=tmp_path, output=tmp_path / "report2", predictor="classical")
+        bench.run("materials", data=tmp_path, output=tmp_path / "report2", predictor="classical", procedural=0)
+
+
+def test_held_out_procedural_pictures_are_made_for_it(folder, tmp_path):
+    maps = f"maps:{folder / 'plane' / 'maps'}"
+    bench.run(
+        "materials", data=folder, output=tmp_path / "report", predictor=f"classical,{maps}", procedural=2, size=64
+    )
+    rows = json.loads((tmp_path / "report" / "report.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["classical", maps, *["classical, procedural"] * 2]
+    assert all(np.isfinite(row["normal_angle"]) and row["roughness_psnr"] < 100 for row in rows[2:])
 
 
 def test_lpips_is_left_out_where_it_is_not_installed():
     picture = np.full((16, 16, 3), 0.5, np.float32)
-    found = materials.lpips(picture, picture)
+    found = lpips(picture, picture)
     assert found is None or found == pytest.approx(0, abs=1e-4)
 
 

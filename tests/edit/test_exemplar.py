@@ -1,6 +1,7 @@
 """Filling by patches: what repeats is found again, and other surfaces are left alone."""
 
 import numpy as np
+import pytest
 
 from materialist.edit.exemplar import exemplar_plan
 
@@ -90,3 +91,31 @@ def test_a_hole_in_a_narrow_ring_is_filled_from_the_ring():
     plan = exemplar_plan(picture.astype(np.float32), hole, ~hole, np.zeros(hole.shape, int))
     filled = plan.fill(np.where(hole[..., None], 0, picture))
     assert np.abs(filled[hole] - light).mean() < 0.05
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+@pytest.mark.parametrize("left", [31, 100, 201])
+def test_a_thin_hole_is_filled(width, left):
+    """A pole is none at a quarter of the size."""
+    picture = np.tile(stripes(200, 512, 40).mean(1, keepdims=True), (1, 512, 1)) + 0.1
+    picture[100:] = [0.2, 0.5, 0.4]
+    hole = hole_in(picture.shape[:2], 30, left, 150, width)
+    broken = np.where(hole[..., None], 0.9, picture)
+    plan = exemplar_plan(broken, hole, np.ones_like(hole), np.zeros(hole.shape, int))
+    if plan is not None:  # the caller has a membrane for where nothing can be copied
+        np.testing.assert_allclose(plan.fill(broken), picture, atol=0.1)
+
+
+def test_what_no_patch_fits_takes_what_is_next_to_it():
+    """A pattern tells all of a hole but a line."""
+    picture = stripes(200, 512)
+    hole = hole_in(picture.shape[:2], 60, 200, 80, 41)
+    told = np.full(hole.shape, -1)
+    rows, columns = np.nonzero(hole)
+    told[rows, columns] = rows * 512 + columns - 80
+    told[60:140, 220] = -1
+    plan = exemplar_plan(np.where(hole[..., None], 0.9, picture), hole, np.ones_like(hole), 0 * told, told=told)
+    found = plan.fill(np.where(hole[..., None], 0.9, picture))
+    others = hole & (np.arange(512) != 220)
+    np.testing.assert_allclose(found[others], picture[others], atol=1e-6)
+    assert found[hole].max() < 0.85, "nothing of the object is left"

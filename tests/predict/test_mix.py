@@ -110,3 +110,13 @@ def test_a_folder_needs_only_the_maps_that_are_wanted(photo, tmp_path):
     assert not any("There is no" in note for note in mixed.warnings)
     with pytest.raises(InputError, match="no depth"):
         get_predictor("classical", depth=f"maps:{tmp_path}").predict(photo)
+
+
+def test_normals_that_will_be_derived_need_no_depth_of_their_own(photo, other, tmp_path):
+    spec, theirs = other
+    (tmp_path / "alone").mkdir()
+    write_exr(tmp_path / "alone" / "albedo.exr", theirs["albedo"])
+    mixed = get_predictor(f"maps:{tmp_path / 'alone'}", depth=spec).predict(photo)
+    assert np.allclose(mixed.materials.albedo, theirs["albedo"], atol=1e-6)
+    assert np.allclose(mixed.normal, normals_from_depth(theirs["depth"], photo.camera, radius=2), atol=1e-6)
+    assert mixed.sources["normal"] == f"derived from the depth of {spec}"

@@ -81,3 +81,30 @@ def test_one_part_alone_and_what_is_wrong(folder):
 def test_procedural_sets_are_still_told_apart(folder):
     made_samples.write_set(folder, 1)
     assert len(open_source(folder)) == 1
+
+
+def test_what_is_lost_is_told(folder):
+    from materialist.bench.materials import lost
+
+    (folder / "dataset_85" / "L3D1" / "001_albedo.exr").unlink()
+    source = InteriorVerse(folder)
+    assert source.bare == 1 and len(source) == 3
+    first, second = source.notes()
+    assert first.startswith("2 scenes of the split 'train' are not there (dataset_85/LOST") and second.startswith(
+        "1 pic"
+    )
+    assert lost(folder, "train") == {"pictures there": 3, "scenes missing": 2, "pictures without maps": 1}
+    assert lost(folder.parent, "train") == {}
+
+
+def test_scores_are_taken_on_the_validation_split(folder):
+    from materialist.train.stream import kept_aside
+
+    assert InteriorVerse(folder).validation() is None, "there is none"
+    scene = folder / "dataset_85" / "L3D9"
+    scene.mkdir()
+    _write(scene, "000")
+    write_exr(scene / "000_albedo.exr", np.full((12, 16, 3), 0.75, np.float32))
+    (folder / "dataset_85" / "val.txt").write_text("L3D9\n")
+    samples = kept_aside(InteriorVerse(folder), 3)
+    assert len(samples) == 1 and samples[0].albedo.mean() == pytest.approx(0.75, rel=1e-3)

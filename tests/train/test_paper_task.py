@@ -31,7 +31,8 @@ def test_what_is_frozen(network):
     freeze(network)
     learns = {name for name, p in network.named_parameters() if p.requires_grad}
     assert not any(name.startswith("pretrained.") for name in learns)
-    assert all(name in learns for name, _ in network.named_parameters() if name.startswith("material_head."))
+    used = [name for name, _ in network.named_parameters() if ".refinenet4.resConfUnit1." not in name]
+    assert all(name in learns for name in used if name.startswith("material_head."))
     depth = {name for name in learns if name.startswith("depth_head.")}
     assert depth and all(".refinenet" in name for name in depth)
     assert {name.split(".refinenet")[1][0] for name in depth} == set("1234")
@@ -50,6 +51,31 @@ def test_a_step_moves_only_what_learns(network, tmp_path):
     optimizer.step()
     moved = {k for k, v in network.state_dict().items() if not torch.equal(v, before[k])}
     assert moved and not any(name.startswith("pretrained.") for name in moved)
+
+
+def test_everything_that_learns_has_a_gradient(network, tmp_path):
+    """Processes that train together wait for all of them."""
+    freeze(network)
+    source = SampleFolder(made_samples.write_set(tmp_path, 2))
+    batch = next(iter(epoch(source, PaperTask(), number=1, size=32, batch=2, seed=0, workers=0)))
+    sum(PaperTask().terms(network, batch).values()).backward()
+    assert [name for name, p in network.named_parameters() if p.requires_grad and p.grad is None] == []
+
+
+def test_lpips_is_taken_where_it_is(monkeypatch):
+    from materialist.train import paper_task
+
+    class Distance(torch.nn.Module):
+        def forward(self, a, b):
+            assert a.min() >= -1 and a.max() <= 1
+            return (a - b).abs().mean((1, 2, 3), keepdim=True)
+
+    monkeypatch.setattr(paper_task, "backbone", lambda name: Distance())
+    task = PaperTask()
+    assert task.notes[0] == "Albedo: L1 and LPIPS (VGG)."
+    found, true, mask = torch.rand(2, 3, 8, 8), torch.full((2, 3, 8, 8), 0.5), torch.zeros(2, 1, 8, 8)
+    assert task._perceptual(found, true, mask) == 0, "nothing counts where there is no surface"
+    assert task._perceptual(found, true, mask + 1) > 0.05
 
 
 def test_the_notes_say_what_stands_in_for_lpips():

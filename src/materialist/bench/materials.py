@@ -7,6 +7,7 @@ the predictor as photographs (clipped to [0, 1]; the procedural ones with tone, 
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
-from materialist.types import Array, Camera, Photo, Prediction
+from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 COLUMNS = (
     Column("albedo_psnr", "albedo PSNR", "higher", 2),
@@ -26,9 +27,11 @@ COLUMNS = (
     Column("roughness_psnr", "roughness PSNR", "higher", 2),
     Column("roughness_psnr_pooled", "roughness PSNR pooled", "higher", 2),
     Column("roughness_ssim", "roughness SSIM", "higher"),
+    Column("roughness_lpips", "roughness LPIPS", "lower"),
     Column("metallic_psnr", "metallic PSNR", "higher", 2),
     Column("metallic_psnr_pooled", "metallic PSNR pooled", "higher", 2),
     Column("metallic_ssim", "metallic SSIM", "higher"),
+    Column("metallic_lpips", "metallic LPIPS", "lower"),
     Column("depth_mae", "depth MAE", "lower"),
     Column("depth_rmse", "depth RMSE", "lower"),
     Column("depth_mae_raw", "depth MAE raw", "lower"),
@@ -45,38 +48,81 @@ NOTE = (
     "of the mean square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a "
     "PSNR is at most 100. Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without "
     "it; SI log RMSE is the standard deviation of log depth error; `order` the part of random pixel pairs in the right "
-    "order (a constant gets 0.5). Normals: mean angle, degrees. LPIPS (AlexNet) only where the lpips package and its "
-    "weights are installed."
+    "order (a constant gets 0.5). Normals: mean angle, degrees. LPIPS (AlexNet, of sRGB-encoded maps, with the "
+    "truth where there is no surface) only where the lpips package and its weights are installed. Rows named "
+    "procedural are seeded held-out pictures of `train data`."
 )
+
+HELD_OUT = 24
+"""Procedural pictures that are made where `data` holds none."""
+FILES = ("maps:", "moge:")
+"""Predictors that know one picture's maps."""
 
 
 def run(
     *, data: Path | None, output: Path, predictor: str = "auto", limit: int = 0, split: str = "test",
-    photographic: bool = True, pictures: int = 8, seed: int = 0, device: str = "auto",
+    photographic: bool = True, pictures: int = 8, procedural: int | None = None, meshes: str = "", envmaps: str = "",
+    size: int = 256, seed: int = 0, device: str = "auto",
 ) -> None:  # fmt: skip
-    """Score predictors (comma-separated) on `data`.
+    """Score predictors (comma-separated) on `data`, and on so many held-out procedural pictures made for it.
 
-    `limit` scores at most so many samples, spread over the set (0: all); `split` is InteriorVerse's; `pictures` are
-    drawn into sheet.png.
+    `limit` scores at most so many samples of `data`, spread over the set (0: all); `split` is InteriorVerse's;
+    `pictures` of each kind are drawn into sheet.png. `procedural` is HELD_OUT unless `data` is a set of `train data`
+    itself; they have `size` pixels a side and use the files of `meshes` and `envmaps` that are kept aside, if given.
     """
-    if data is None:
-        raise InputError("This benchmark needs labelled pictures: --data DIR (docs/training.md says which layouts).")
     from materialist.bench.predictors import opened
 
+    own_set = data is not None and (data / "samples").is_dir()
+    count = (0 if own_set else HELD_OUT) if procedural is None else procedural
+    if data is None and count < 1:
+        raise InputError("There is nothing to score; give --data DIR (docs/training.md), or --procedural above 0.")
+    specs = predictor.split(",")
+    sources = {spec: opened(spec, device) for spec in specs}
     rows: list[dict[str, Any]] = []
-    strips: dict[int, list] = {}
-    for spec in predictor.split(","):
-        source = opened(spec, device)
-        for k, (name, photo, truth) in enumerate(labelled(data, split=split, limit=limit, photographic=photographic)):
-            prediction, row = _scored(source, photo, truth, seed)
-            rows.append({"method": spec, "sample": name, **row})
-            if k < pictures:
-                strips.setdefault(k, [photo.linear]).append(prediction)
-                strips[k].append(truth) if spec == predictor.split(",")[-1] else None
+    strips: dict[tuple[str, int], list] = {}
+
+    def add(folder: Path, kind: str, most: int) -> None:
+        for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
+            for k, (name, photo, truth) in enumerate(
+                labelled(folder, split=split, limit=most, photographic=photographic)
+            ):
+                prediction, row = _scored(sources[spec], photo, truth, seed)
+                rows.append({"method": spec + kind, "sample": name, **row})
+                if k < pictures:
+                    strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
+
+    settings = {"data": str(data), "split": split, "photographic": photographic, "procedural": count, "seed": seed}
+    if data is not None:
+        add(data, "", limit)
+        settings |= lost(data, split)
+    if count:
+        with tempfile.TemporaryDirectory() as place:
+            add(held_out(Path(place) / "set", count, size, seed, meshes, envmaps, device), ", procedural", 0)
     rows = _with_pooled(rows)
-    settings = {"data": str(data), "split": split, "photographic": photographic, "seed": seed}
     write(Report("Predicted maps", NOTE, settings, COLUMNS, rows, plotted=("albedo_psnr", "normal_angle")), output)
     _draw(list(strips.values()), output / "sheet.png")
+
+
+def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmaps: str, device: str) -> Path:
+    """A new set of held-out procedural pictures; see `train.data.produce`."""
+    from materialist.train.data.produce import options_for, produce
+
+    options = options_for(
+        size=size, seed=seed, split="heldout", device=device, meshes=Path(meshes) if meshes else None,
+        envmaps=Path(envmaps) if envmaps else None,
+    )  # fmt: skip
+    produce(folder, options, count=count)
+    return folder
+
+
+def lost(data: Path, split: str) -> dict[str, Any]:
+    """How many scenes of an InteriorVerse split are not there, and how many pictures have been scored without them."""
+    from materialist.train.interiorverse import InteriorVerse, is_interiorverse
+
+    if photo_folders(data) or not is_interiorverse(data):
+        return {}
+    source = InteriorVerse(data, split)
+    return {"pictures there": len(source), "scenes missing": len(source.missing), "pictures without maps": source.bare}
 
 
 def labelled(
@@ -139,17 +185,30 @@ def _spread(things: list, limit: int) -> list:
 def _scored(source: Any, photo: Photo, truth: Prediction, seed: int) -> tuple[Prediction, dict[str, float]]:
     """The prediction and its figures."""
     from materialist.bench.predictors import predicted
-    from materialist.train.scores import best_scale, ordinal_accuracy, score
+    from materialist.train.scores import ordinal_accuracy, score
 
     prediction, seconds = predicted(source, photo, seed)
     found = score(prediction, truth)
     surface = truth.depth > 0
     if surface.any():
         found["depth_order"] = ordinal_accuracy(prediction.depth, truth.depth)
-        scale = best_scale(prediction.materials.albedo, truth.materials.albedo, surface)
-        distance = lpips(prediction.materials.albedo * np.float32(scale), truth.materials.albedo)
-        found |= {} if distance is None else {"albedo_lpips": distance}
+        found |= _perceptual(prediction.materials, truth.materials, surface)
     return prediction, {**found, "seconds": seconds}
+
+
+def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, float]:
+    """LPIPS of albedo (after one factor), roughness and metallic over the true surface, where it is installed."""
+    from materialist.train.lpips import lpips
+    from materialist.train.scores import best_scale
+
+    scale = np.float32(best_scale(found.albedo, true.albedo, surface))
+    pairs = {"albedo": (found.albedo * scale, true.albedo)}
+    pairs |= {name: (getattr(found, name), getattr(true, name)) for name in ("roughness", "metallic")}
+    out: dict[str, float] = {}
+    for name, (a, b) in pairs.items():
+        distance = lpips(np.where(surface[..., None] if a.ndim == 3 else surface, a, b), b)
+        out |= {} if distance is None else {f"{name}_lpips": distance}
+    return out
 
 
 def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -162,34 +221,6 @@ def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         means = summary([{k: v for k, v in r.items() if k.endswith("_mse")} for r in rows if r["method"] == method])
         pooled[method] = {k: means[k] for k in figures if k in means}
     return [{**row, **pooled[row["method"]]} for row in rows]
-
-
-def lpips(a: Array, b: Array) -> float | None:
-    """LPIPS (AlexNet) of two linear pictures [H, W, 3], sRGB-encoded; None where it is not installed with weights."""
-    network = _lpips_network()
-    if network is None:
-        return None
-    import torch
-
-    from materialist.color import linear_to_srgb
-
-    as_tensor = lambda x: torch.from_numpy(linear_to_srgb(x) * 2 - 1).permute(2, 0, 1)[None]  # noqa: E731
-    with torch.inference_mode():
-        return float(network(as_tensor(a), as_tensor(b)))
-
-
-def _lpips_network(_kept: list = []) -> Any:  # noqa: B006 (the list is the memory)
-    """The lpips package's network, once; None unless the package and its backbone are here: nothing is downloaded."""
-    if not _kept:
-        import torch
-
-        backbone = list((Path(torch.hub.get_dir()) / "checkpoints").glob("alexnet*"))
-        try:
-            from lpips import LPIPS  # type: ignore[import-not-found]
-        except ImportError:
-            LPIPS = None
-        _kept.append(LPIPS(net="alex", verbose=False).eval() if LPIPS is not None and backbone else None)
-    return _kept[0]
 
 
 def _draw(lines: list[list], path: Path) -> None:

@@ -105,11 +105,23 @@ def exemplar_plan(
         return plan
     rest = _by_patches(filled, hole & ~use, source & ~hole, label, seed)
     if rest is None:
-        return None
+        return _nearest(told, use, hole)
     own = ~use[rest.rows, rest.columns]
     with_rest = lambda name: np.concatenate([getattr(plan, name), getattr(rest, name)[own]])  # noqa: E731
     rows, columns, sources, weight = (with_rest(name) for name in ("rows", "columns", "source", "weight"))
     return Plan(rows, columns, sources, weight, hole, told=plan.told, label=label)
+
+
+def _nearest(told: Array, use: Array, hole: Array) -> Plan:
+    """The plan of what is told, [H, W] sources where `use`, for a hole whose rest no patch fits: that takes the source
+    of the nearest such pixel.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    near = distance_transform_edt(~use, return_distances=False, return_indices=True)
+    rows, columns = np.nonzero(hole)
+    source = told[near[0][rows, columns], near[1][rows, columns]]
+    return Plan(rows, columns, source, np.ones(len(rows), np.float32), hole, told=len(rows))
 
 
 def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed: int) -> Plan | None:
@@ -125,7 +137,7 @@ def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed:
     found: _Match | None = None
     for depth, factor in enumerate(reversed(levels)):
         level = _Level(features, hole, source, label, factor)
-        if not level.candidates.size:
+        if not level.candidates.size or not level.targets.size:  # a thin hole is none in a small picture
             continue
         found = level.match(found, ROUNDS[min(depth, len(ROUNDS) - 1)], rng)
     if found is None:

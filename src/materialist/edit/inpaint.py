@@ -27,11 +27,13 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     if kind != "sd":
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
     from materialist.predict import hub
+    from materialist.predict.device import on_gpu
 
+    gpu = on_gpu(device)
     try:
         folder, _ = hub.locate(where, DEFAULT)
         pipeline = hub.pipeline(
-            "StableDiffusionInpaintPipeline", folder, hub.on_gpu(device), "inpainting pipeline",
+            "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",
             safety_checker=None, requires_safety_checker=False,
         )  # fmt: skip
     except SetupError as error:

@@ -36,8 +36,10 @@ def segment(
     """
     import torch
 
+    from materialist.predict.device import on_gpu
+
     model = load(where)
-    target = torch.device("cuda" if device != "cpu" and torch.cuda.is_available() else "cpu")
+    target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
     side = int(model.config.vision_config.backbone_config.image_size[0])
     height, width = linear.shape[:2]

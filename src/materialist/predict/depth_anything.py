@@ -9,6 +9,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.predict import hub
+from materialist.predict.device import on_gpu
 from materialist.predict.mix import Part
 from materialist.predict.relative import from_inverse
 from materialist.types import Array, Photo
@@ -49,7 +50,7 @@ class DepthAnything:
         folder, self._label = hub.locate(self._where, "depth-anything")
         digest = hub.checked(folder)
         model = hub.load(hub.library("transformers").DepthAnythingForDepthEstimation, folder)
-        values = _run(model, photo.linear, hub.on_gpu(self._device))
+        values = _run(model, photo.linear, on_gpu(self._device))
         if model.config.depth_estimation_type == "metric":
             return Part({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
         depth, ratio = from_inverse(values, photo.camera, normal)

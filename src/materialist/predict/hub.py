@@ -101,10 +101,3 @@ def pipeline(name: str, folder: Path, gpu: bool, what: str | None = None, **opti
 def _reason(error: Exception) -> str:
     """The first line of what a library says."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-
-
-def on_gpu(device: str) -> bool:
-    """Whether to compute on the GPU."""
-    import torch
-
-    return device == "cuda" or (device == "auto" and torch.cuda.is_available())

@@ -11,6 +11,7 @@ import numpy as np
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
+from materialist.predict.device import on_gpu
 from materialist.predict.mix import MAPS, Part, whole
 from materialist.predict.relative import from_affine, from_inverse
 from materialist.types import Array, Photo, Prediction
@@ -88,7 +89,7 @@ class MarigoldPart:
 
         folder, label = hub.locate(self._where, "")
         source = f"marigold ({label}){hub.checked(folder)}"
-        kind, gpu = _pipeline_class(folder), hub.on_gpu(self._device)
+        kind, gpu = _pipeline_class(folder), on_gpu(self._device)
         pipeline = hub.pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
         output = pipeline(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction

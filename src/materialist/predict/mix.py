@@ -101,7 +101,11 @@ class MixedPredictor:
         warnings: list[str] = []
         for spec in order:
             guide = None if derived else maps.get("normal")
-            part = _parts(self.sources[spec], photo, self.wanted[spec], seed, guide)
+            # What it would derive from a depth of its own, which it need not have, is not asked for.
+            wanted = [name for name in self.wanted[spec] if not (derived and name == "normal")]
+            if not wanted:
+                continue
+            part = _parts(self.sources[spec], photo, wanted, seed, guide)
             maps |= part.maps
             sources |= part.sources
             warnings += part.warnings

@@ -43,12 +43,12 @@ def load(path: Path, kind: str, build: Callable[[dict[str, Any]], Any], remedy: 
         WeightsError: the file is missing, damaged, of another kind, or does not fit its architecture.
     """
     tensors = read_state(path)
-    metadata = _metadata(path)
-    if metadata.get("format") != kind:
-        raise WeightsError(f"{path} has format {metadata.get('format')!r}, not {kind!r}; make it with: {remedy}.")
+    said = metadata(path)
+    if said.get("format") != kind:
+        raise WeightsError(f"{path} has format {said.get('format')!r}, not {kind!r}; make it with: {remedy}.")
     try:
-        network = build(json.loads(metadata["architecture"]))
-        facts = json.loads(metadata.get("facts", "{}"))
+        network = build(json.loads(said["architecture"]))
+        facts = json.loads(said.get("facts", "{}"))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
         raise WeightsError(f"{path} describes no usable network ({error}); make it again with: {remedy}.") from error
     load_weights(network, tensors | shared(network), path)
@@ -60,7 +60,7 @@ def shared(network: Any) -> dict[str, Any]:
     return {k: v for k, v in network.state_dict().items() if k.startswith(PREFIX)}
 
 
-def _metadata(path: Path) -> dict[str, str]:
+def metadata(path: Path) -> dict[str, str]:
     """The texts in the file's header; none for files of another kind."""
     from safetensors import SafetensorError, safe_open
 

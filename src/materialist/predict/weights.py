@@ -74,12 +74,21 @@ def read_state(path: Path) -> dict[str, Tensor]:
     A dict in a dict (`state_dict`, `model`, ...) is opened, a leading `module.` of multi-GPU training dropped.
     Raises WeightsError for a missing, empty, truncated or damaged file, and for one that holds anything but tensors.
     """
-    import torch
+    return state_of(read_content(path), path)
 
+
+def read_content(path: Path) -> object:
+    """What the file holds, as `state_of` takes it. Raises WeightsError for one that is missing, empty or damaged."""
     if not path.is_file() or path.stat().st_size == 0:
         kind = "is empty" if path.is_file() else "is a folder" if path.is_dir() else "does not exist"
         raise WeightsError(f"{path} {kind}; give a .safetensors or .pth file of weights, or {INSTEAD}.")
-    content = _read_safetensors(path) if path.suffix == ".safetensors" else _read_pickle(path)
+    return _read_safetensors(path) if path.suffix == ".safetensors" else _read_pickle(path)
+
+
+def state_of(content: object, path: Path) -> dict[str, Tensor]:
+    """The tensors of a file's content; see `read_state`."""
+    import torch
+
     for key in WRAPPERS:
         if isinstance(content, Mapping) and isinstance(content.get(key), Mapping):
             content = content[key]
@@ -112,8 +121,7 @@ def _read_pickle(path: Path) -> object:
             f"{path} is not a plain file of weights: it is no PyTorch checkpoint, or it wants to run code when it is "
             f"read, which is refused; save its state_dict alone, or {INSTEAD}."
         ) from error
-    # Damaged archives fail in whatever part of the reader meets them first.
-    except (RuntimeError, EOFError, OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+    except Exception as error:  # damaged files fail in whatever part of the reader meets them first
         raise WeightsError(_damaged(path, error)) from error
 
 

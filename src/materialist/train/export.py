@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
 from materialist.predict.bundled.network import Architecture, BundledNetwork
 from materialist.predict.bundled.weights import save
+from materialist.predict.matnet.predictor import FORMAT
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint
 from materialist.train.trainer import SCORES
 
 
 def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any]:
-    """Write the averaged weights of a bundled run as float16 .safetensors; returns step, minutes, megabytes, hash.
+    """Write the weights of a run as float16 .safetensors, of a bundled one the averaged ones.
 
-    Raises WeightsError without a checkpoint, InputError for a run of another network, OutputError when `output` exists.
+    Returns step, minutes, megabytes, hash. Raises WeightsError without a checkpoint, InputError for another kind of
+    file, OutputError when `output` exists.
     """
     if output.suffix != ".safetensors":
         raise InputError(f"The weights are a .safetensors file, not {output.name}.")
     if output.exists() and not force:
         raise OutputError(f"{output} exists; choose another name, or add --force to replace it.")
     state = checkpoint.load(run)
-    if state["recipe"]["task"] != "bundled":
-        raise InputError(f"{run} is a run of the recipe '{state['recipe']['name']}'; only 'bundled' runs are exported.")
-    network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
-    network.load_state_dict(state["averaged" if state["recipe"]["ema"] else "network"])
+    tensors = state["averaged" if state["recipe"]["ema"] else "network"]
     scores = checkpoint.read_lines(run / SCORES)
     facts = {
         "step": state["step"],
@@ -37,7 +37,12 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "scores": scores[-1] if scores else {},
     }
     try:
-        save(output, network, facts)
+        if state["recipe"]["task"] == "paper":
+            _save_matnet(output, tensors, facts)
+        else:
+            network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
+            network.load_state_dict(tensors)
+            save(output, network, facts)
     except OSError as error:
         raise OutputError(f"The weights cannot be written to {output}: {error.strerror or error}.") from error
     return {
@@ -46,3 +51,14 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "megabytes": output.stat().st_size / 1e6,
         "hash": sha256(output)[:16],
     }
+
+
+def _save_matnet(path: Path, tensors: dict[str, Any], facts: dict[str, Any]) -> None:
+    """MatNet's tensors under the names of the published checkpoint, whole or not at all."""
+    import torch
+    from safetensors.torch import save_file
+
+    half = {name: t.detach().cpu().to(torch.float16).contiguous() for name, t in tensors.items()}
+    partial = path.with_name(path.name + ".part")
+    save_file(half, str(partial), {"format": FORMAT, "facts": json.dumps(facts)})
+    partial.replace(path)

@@ -45,6 +45,8 @@ class InteriorVerse:
         self.folder, self.split = Path(folder), split
         self.pictures: list[Path] = []
         self.missing: list[str] = []
+        self.bare = 0
+        """Pictures of scenes that are there, without an albedo."""
         self.refresh()
         if not self.pictures:
             raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
@@ -54,13 +56,32 @@ class InteriorVerse:
 
     def refresh(self) -> None:
         """List the folder again."""
-        self.pictures, self.missing = [], []
+        self.pictures, self.missing, self.bare = [], [], 0
         for part in parts(self.folder):
             for scene in _scenes(part / f"{self.split}.txt"):
                 found = sorted((part / scene).glob("*_im.exr"))
-                self.pictures += [path for path in found if _sibling(path, "albedo").is_file()]
+                whole = [path for path in found if _sibling(path, "albedo").is_file()]
+                self.pictures += whole
+                self.bare += len(found) - len(whole)
                 if not found:
                     self.missing.append(f"{part.name}/{scene}")
+
+    def notes(self) -> list[str]:
+        """What of the split is not there, in words."""
+        found = []
+        if self.missing:
+            names = ", ".join(self.missing[:3])
+            found.append(f"{len(self.missing)} scenes of the split '{self.split}' are not there ({names} ...).")
+        if self.bare:
+            found.append(f"{self.bare} pictures of the split '{self.split}' have no albedo, and are left out.")
+        return found
+
+    def validation(self) -> InteriorVerse | None:
+        """The split that scores are taken on while this one is trained on; None where it holds no pictures."""
+        try:
+            return InteriorVerse(self.folder, "val") if self.split == "train" else None
+        except InputError:
+            return None
 
     def read(self, index: int) -> Sample:
         """Picture number `index`; depth in metres. Raises InputError naming a file that is missing or misshapen."""

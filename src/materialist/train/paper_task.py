@@ -11,11 +11,13 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.errors import WeightsError
+from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.weights import read_state
 from materialist.train import augment, losses
+from materialist.train.lpips import backbone
 from materialist.train.recipes import Recipe
 from materialist.train.samples import Sample
 from materialist.train.tasks import Batch
@@ -23,6 +25,9 @@ from materialist.types import Materials, Prediction
 
 DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
 """Parts of the depth decoder that learn (paper: "the last four layers of the RefineNet"); its rest is frozen."""
+
+UNUSED = ".refinenet4.resConfUnit1."
+"""The first unit of the coarsest layer, which has nothing to be added to it."""
 
 
 class PaperTask:
@@ -35,11 +40,13 @@ class PaperTask:
             "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)." if init is None
             else f"MatNet starts from {self.init}."
         )  # fmt: skip
-        self.notes: tuple[str, ...] = (
-            "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
-            "backbone cannot be had here.",
-            start,
-        )
+        self.lpips = backbone("vgg")
+        perceptual = (
+            "Albedo: L1 and LPIPS (VGG)." if self.lpips is not None
+            else "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
+            "package or backbone is not installed."
+        )  # fmt: skip
+        self.notes: tuple[str, ...] = (perceptual, start)
 
     def network(self, recipe: Recipe) -> nn.Module:
         """MatNet of the recipe's size, its encoder frozen and of its depth decoder all but the RefineNet layers."""
@@ -71,13 +78,20 @@ class PaperTask:
         out = {k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False) for k, v in out.items()}
         albedo = batch["albedo"]
         return {
-            "albedo": losses.l1(out["albedo"], albedo, mask)
-            + losses.perceptual_substitute(out["albedo"], albedo, mask),
+            "albedo": losses.l1(out["albedo"], albedo, mask) + self._perceptual(out["albedo"], albedo, mask),
             "roughness": losses.l1(out["roughness"], batch["roughness"], mask),
             "metallic": losses.l1(out["metallic"], batch["metallic"], mask),
             "normal": losses.cosine(out["normal"], batch["normal"], mask),
             "depth": losses.silog(out["depth"], batch["depth"], mask),
         }
+
+    def _perceptual(self, found: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+        """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or its substitute."""
+        found, true = srgb(found), srgb(true)
+        if self.lpips is None:
+            return losses.perceptual_substitute(found, true, mask)
+        kept = torch.where(mask > 0, found, true)
+        return self.lpips.to(found.device)(2 * kept - 1, 2 * true - 1).mean()
 
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
@@ -89,10 +103,14 @@ class PaperTask:
 
 
 def freeze(network: MatNet) -> None:
-    """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder."""
+    """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder.
+
+    What a decoder never uses is frozen, too: processes that train together wait for every gradient.
+    """
     for name, parameter in network.named_parameters():
         refine = any(f".{layer}." in name for layer in DEPTH_DECODER_LEARNS)
-        parameter.requires_grad_(name.startswith("material_head.") or (name.startswith("depth_head.") and refine))
+        learns = name.startswith("material_head.") or (name.startswith("depth_head.") and refine)
+        parameter.requires_grad_(learns and UNUSED not in name)
 
 
 def load_start(network: MatNet, path: Path) -> list[str]:

@@ -65,15 +65,17 @@ def ordinal_accuracy(
 ) -> float:
     """Part of random pixel pairs whose order in depth [H, W] is right; those closer than `tolerance` do not count.
 
-    A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out.
+    A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out; what is
+    predicted to have none (0) is sky, behind everything.
     """
     rng = np.random.default_rng(seed)
     known = np.flatnonzero(true > 0)
     first, second = rng.choice(known, pairs), rng.choice(known, pairs)
     t = np.log(true.ravel()[first]) - np.log(true.ravel()[second])
     clear = np.abs(t) > np.log1p(tolerance)
-    p = predicted.ravel()[first].astype(np.float64) - predicted.ravel()[second]
-    right = np.where(p == 0, 0.5, np.sign(p) == np.sign(t))
+    found = np.where(predicted > 0, predicted, np.inf).ravel()
+    a, b = found[first], found[second]
+    right = np.where(a == b, 0.5, (a > b) == (t > 0))
     return float(right[clear].mean()) if clear.any() else float("nan")
 
 

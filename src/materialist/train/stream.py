@@ -81,7 +81,13 @@ def trained_on(count: int) -> list[int]:
 
 
 def kept_aside(source: Source, most: int) -> list[Sample]:
-    """Up to `most` samples that are not trained on, spread over those that there are (the first, of a tiny set)."""
+    """Up to `most` samples that are not trained on, spread over those that there are (the first, of a tiny set).
+
+    They are those of the source's own validation split, where it has one.
+    """
+    validation = getattr(source, "validation", lambda: None)()
+    if validation is not None:
+        return [validation.read(k) for k in np.unique(np.linspace(0, len(validation) - 1, most).astype(int))]
     count = len(source)
     chosen = list(range(KEPT_ASIDE - 1, count, KEPT_ASIDE)) or list(range(min(count, most)))
     return [source.read(chosen[k]) for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int))]

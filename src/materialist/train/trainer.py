@@ -69,7 +69,7 @@ class Trainer:
         if exists:
             self._restore(checkpoint.load(folder, self.device), budget)
         self.wrapped = self.processes.wrap(self.network)
-        for text in task.notes:
+        for text in (*task.notes, *getattr(source, "notes", list)()):
             self.note(text)
 
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:

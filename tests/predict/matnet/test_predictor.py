@@ -9,7 +9,7 @@ import torch
 from made_matnet import install, made_network, made_photo
 from safetensors.torch import save_file
 
-from materialist.errors import WeightsError
+from materialist.errors import SetupError, WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.predictor import MatNetPredictor
@@ -169,3 +169,38 @@ def test_loading_draws_no_random_numbers(tmp_path, state):
     torch.manual_seed(1)
     MatNetPredictor(path)
     assert torch.equal(torch.rand(3), wanted)
+
+
+def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
+    """SiLog makes the output depth; the published weights' output falls with distance, and is turned round."""
+    from materialist.predict.matnet.inference import LEAST_DEPTH, planar_depth
+    from materialist.train import checkpoint
+    from materialist.train.export import export_run
+    from materialist.train.recipes import recipe
+
+    photo = made_photo(42, 56)
+    found = {"network": state, "step": 4, "seconds": 9.0, "data": {}, "recipe": recipe("paper").as_dict()}
+    checkpoint.save(tmp_path, found)
+    export_run(tmp_path, tmp_path / "own.safetensors")
+    published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu")
+    output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
+    assert np.ptp(output) > 0
+    np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
+    for name, near in ((checkpoint.NAME, 1e-5), ("own.safetensors", 1e-2)):
+        depth = MatNetPredictor(tmp_path / name, device="cpu").predict(photo).depth
+        np.testing.assert_allclose(depth, np.maximum(output, LEAST_DEPTH), rtol=near, atol=near * output.max())
+
+
+def test_a_device_that_is_not_there(tmp_path, state):
+    if torch.cuda.is_available():
+        pytest.skip("there is a CUDA device here")
+    with pytest.raises(SetupError, match="no CUDA device"):
+        MatNetPredictor(saved(tmp_path / "w.pth", state), device="cuda")
+
+
+def test_a_truncated_file_of_the_old_format_is_refused(tmp_path):
+    torch.save({"w": torch.arange(60.0)}, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
+    data = (tmp_path / "old.pth").read_bytes()
+    for length in range(1, len(data) - 1, 3):
+        (tmp_path / "cut.pth").write_bytes(data[:length])
+        refused(tmp_path / "cut.pth")

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from materialist.errors import SetupError, WeightsError
+from materialist.errors import WeightsError
 from materialist.predict.bundled import WEIGHTS, weights
 from materialist.predict.bundled.inference import infer, rays_of
+from materialist.predict.device import on_gpu
 from materialist.predict.weights import sha256
 from materialist.types import Array, Photo, Prediction
 
@@ -36,10 +37,7 @@ class BundledPredictor:
                 f"There are no weights of the bundled network at {path}; train and export some (materialist train "
                 "matnet, materialist train export), or use --predictor classical."
             )
-        if device == "cuda" and not torch.cuda.is_available():
-            raise SetupError("There is no CUDA device that PyTorch can use; predict with --device cpu.")
-        cuda = device != "cpu" and torch.cuda.is_available()
-        self.device = torch.device("cuda" if cuda else "cpu")
+        self.device = torch.device("cuda" if on_gpu(device) else "cpu")
         network, self.facts = weights.load(path)
         self.network = network.to(self.device)
         own = "" if path == WEIGHTS else f" {path.name}"

@@ -59,6 +59,15 @@ def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple
     return fitted(height), fitted(width)
 
 
+LEAST_DEPTH = 1e-3
+"""Depth below which a network's answer is not believed."""
+
+
+def trained_depth(output: Array) -> Array:
+    """Planar depth [H, W] > 0 from the output of a network trained here, which is depth itself, as SiLog asks."""
+    return np.maximum(output, LEAST_DEPTH).astype(np.float32)
+
+
 def planar_depth(output: Array) -> Array:
     """Planar depth [H, W] > 0 from the published network's depth output [H, W]: 2 max - output.
 

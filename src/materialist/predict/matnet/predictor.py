@@ -8,11 +8,16 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
-from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth
+from materialist.predict.device import on_gpu
+from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth, trained_depth
 from materialist.predict.matnet.network import SIZES, MatNet
 from materialist.predict.models import INSTEAD, hub_model, is_hub_id, require, weights_file
-from materialist.predict.weights import load_weights, read_state, verify_file
+from materialist.predict.own_weights import metadata
+from materialist.predict.weights import load_weights, read_content, state_of, verify_file
 from materialist.types import Materials, Photo, Prediction
+
+FORMAT = "materialist-matnet-1"
+"""What a file of `train export` calls itself in its metadata: its depth output is depth."""
 
 
 class MatNetPredictor:
@@ -30,15 +35,16 @@ class MatNetPredictor:
     def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
         path = _locate(str(where))
         digest = verify_file(path)
-        state = read_state(path)
+        content = read_content(path)
+        state = state_of(content, path)
+        self.trained_here = _trained_here(content, path)
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
         with torch.random.fork_rng(devices=[]):  # the start values are replaced; nobody's random numbers change
             network = MatNet(size)
         load_weights(network, state, path)
-        cuda = device == "cuda" or (device == "auto" and torch.cuda.is_available())
-        self.network = network.to("cuda" if cuda else "cpu").eval()
+        self.network = network.to("cuda" if on_gpu(device) else "cpu").eval()
         self.input_size = input_size
         self.source = f"matnet {size} {path.name} sha256:{digest[:16]}"
 
@@ -52,7 +58,8 @@ class MatNetPredictor:
 
         The network sees linear values, as in training (InteriorVerse). Its albedo is linear, its normals are in our
         camera frame already (the published renderer puts its camera at the origin, looking down -Z, and uses them as
-        they are), roughness is perceptual. Materials are clipped to [0, 1]; for depth see `planar_depth`.
+        they are), roughness is perceptual. Materials are clipped to [0, 1]; for depth see `planar_depth`, and
+        `trained_depth` for weights of `train matnet --config paper`.
         """
         maps = infer(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):
@@ -60,9 +67,16 @@ class MatNetPredictor:
         length = np.linalg.norm(maps["normal"], axis=-1, keepdims=True)
         normal = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), np.array([0, 0, 1], np.float32))
         clipped = {k: np.clip(maps[k], 0, 1) for k in ("albedo", "roughness", "metallic")}
-        return Prediction(
-            Materials(**clipped), normal.astype(np.float32), planar_depth(maps["depth"]), predictor=self.name
-        )
+        depth = (trained_depth if self.trained_here else planar_depth)(maps["depth"])
+        return Prediction(Materials(**clipped), normal.astype(np.float32), depth, predictor=self.name)
+
+
+def _trained_here(content: object, path: Path) -> bool:
+    """Whether the weights are a checkpoint of `train matnet --config paper`, or what `train export` wrote of one."""
+    recipe = content.get("recipe") if isinstance(content, dict) else None
+    if isinstance(recipe, dict):
+        return recipe.get("task") == "paper"
+    return path.suffix == ".safetensors" and metadata(path).get("format") == FORMAT
 
 
 def _locate(where: str) -> Path:
