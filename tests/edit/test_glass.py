@@ -166,3 +166,87 @@ def test_what_is_brighter_than_the_scene_does_not_turn_black():
     edited = replace(edited, photo=replace(edited.photo, linear=lamp, original=lamp))
     picture = composite(scene, edited, spp=16, denoise=False)
     assert picture[15:21, 15:21].min() > 20
+
+
+def balls(*spheres, sky=False):
+    """(scene, number of the ball [H, W], thickness along the rays): balls on a floor before a wall, or before sky."""
+    from dataclasses import replace
+
+    from materialist.camera import pixel_rays
+    from materialist.geometry.build import build_geometry
+    from materialist.types import Camera, Materials, Photo, Prediction, Scene
+
+    camera = Camera(128, 96, 45.0)
+    rays = pixel_rays(camera).astype(float)
+    floor = np.where(rays[..., 1] < -1e-6, -0.6 / np.minimum(rays[..., 1], -1e-6), np.inf)
+    depth, normal = np.minimum(floor, 5.0), np.where((floor < 5)[..., None], [0, 1, 0], [0, 0, 1]).astype(float)
+    number, through = np.full(depth.shape, -1), np.zeros(depth.shape)
+    a = (rays**2).sum(-1)
+    for k, (centre, radius) in enumerate(spheres):
+        b = rays @ np.array(centre)
+        root = np.sqrt(np.maximum(b**2 - a * (np.dot(centre, centre) - radius**2), 0))
+        here = (root > 0) & ((b - root) / a < depth)
+        depth = np.where(here, (b - root) / a, depth)
+        normal[here] = ((rays * depth[..., None] - centre) / radius)[here]
+        number[here], through[here] = k, (2 * root / np.sqrt(a))[here]
+    if sky:
+        depth = np.where(number < 0, 0, depth)
+    depth, normal = depth.astype(np.float32), normal.astype(np.float32)
+    grey = np.full((*depth.shape, 3), 0.4, np.float32)
+    materials = Materials(grey, np.full(depth.shape, 0.5, np.float32), np.zeros_like(depth))
+    light = (grey * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None]).astype(np.float32)
+    photo = Photo(light, camera, light, fov_source="option")
+    prior = Prediction(materials, normal, depth, "made")
+    geometry = build_geometry(depth, normal, camera)
+    made = Scene(camera, photo, prior, materials, normal, depth, geometry, np.ones((8, 16, 3), np.float32), light)
+    return replace(made, rerender=light), number, through
+
+
+def test_two_objects_are_as_thick_together_as_alone():
+    from materialist.edit.several import objects_in
+
+    scene, number, through = balls(((-0.7, -0.2, -3), 0.4), ((0.75, -0.3, -3.6), 0.3))
+    parts = objects_in(number >= 0, scene.depth)
+    assert [part.sum() for part in parts] == [(number == 0).sum(), (number == 1).sum()]
+    edited = glass(scene, number >= 0)
+    assert edited.provenance["edits"][-1]["thickness"] == "lathe"
+    vertices = edited.bodies[0].vertices
+    for centre, radius in (((-0.7, -0.2, -3), 0.4), ((0.75, -0.3, -3.6), 0.3)):
+        own = vertices[np.abs(vertices[:, 0] - centre[0]) < 0.6]
+        away = np.linalg.norm(own - centre, axis=1)
+        assert np.abs(away / radius - 1).max() < 0.05, "each is its own ball"
+    flat = glass(scene, number >= 0, model="two-interface")
+    one = glass(scene, number == 1, model="two-interface")
+    right = (number == 1) & ~np.roll(number >= 0, 1, 0)
+    np.testing.assert_allclose(flat.photo.linear[number == 1], one.photo.linear[number == 1], atol=0.05)
+    assert right.any() and through[number >= 0].min() > 0
+
+
+def test_one_object_behind_a_pole_stays_one():
+    from materialist.edit.several import objects_in
+
+    scene, number, _ = balls(((0.0, -0.1, -3), 0.5))
+    depth = scene.depth.copy()
+    depth[:, 60:66] = 1.5
+    mask = (number == 0) & (depth > 2)
+    assert len(objects_in(mask, depth)) == 1
+    gap = np.where((np.arange(128) >= 60) & (np.arange(128) < 66), 4.9, scene.depth).astype(np.float32)
+    assert len(objects_in(mask, gap)) == 2
+    specks = mask | np.pad(np.ones((1, 1), bool), ((2, 93), (120, 7)))
+    (whole,) = objects_in(specks, depth)
+    np.testing.assert_array_equal(whole, specks)
+
+
+def test_a_wall_without_room_is_told():
+    from materialist.edit.glass import NO_ROOM
+
+    scene = flat_scene()
+    edited = glass(scene, MASK, hollow=True, thickness=np.full(MASK.shape, 0.01, np.float32))
+    assert NO_ROOM in edited.report.warnings
+    assert NO_ROOM not in glass(scene, MASK, hollow=True, thickness="symmetry").report.warnings
+
+
+def test_a_ball_alone_before_the_sky():
+    scene, number, _ = balls(((0.0, -0.1, -3), 0.4), sky=True)
+    with pytest.raises(InputError, match="around the mask is sky"):
+        glass(scene, number == 0)

@@ -13,8 +13,10 @@ from materialist.edit.background import Inpaint, without
 from materialist.edit.hole import GROW
 from materialist.edit.material import noted, warned
 from materialist.edit.region import checked_region
+from materialist.edit.several import objects_in
 from materialist.edit.thickness import ObjectThickness, object_thickness
 from materialist.errors import InputError
+from materialist.geometry.shell import Shell, cavities, joined
 from materialist.geometry.standing import room, standing_body
 from materialist.types import Array, Body, Scene, Surface
 
@@ -23,6 +25,7 @@ OPEN = "open"
 """Value of `hollow`: a vessel without a lid."""
 SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
+NO_ROOM = "There is no room for a wall around air: this glass is solid."
 IOR = (1.0, 3.0)
 
 
@@ -62,26 +65,45 @@ def glass(
     removed = without(
         scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed
     )  # fmt: skip
-    found = object_thickness(scene, own, thickness, behind=removed.depth)
+    each = [
+        (part, object_thickness(scene, part, thickness, behind=removed.depth))
+        for part in objects_in(own, scene.depth) if (part & (scene.depth > 0)).any()
+    ]  # fmt: skip
     if model == "two-interface":
         look = {"ior": ior, "transmission": transmission, "tint": tint, "roughness": roughness}
-        edited = _two_interface(scene, removed, own, found, look, smooth)
+        edited = _two_interface(scene, removed, each, look, smooth)
         edited = warned(edited, SOLID) if hollow else edited
     else:
-        shell = standing_body(
-            scene.depth, scene.normal, own, found, scene.camera, behind=removed.depth,
-            wall=found.wall if hollow else None, smooth=smooth, open_top=hollow == OPEN,
-        )  # fmt: skip
         surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
+        shells = [_shell(scene, removed, part, found, hollow, smooth) for part, found in each]
+        shell = joined(shells)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, "glass")
-        edited = replace(removed, bodies=(*removed.bodies, body))
-        if hollow == OPEN and (found.lathe is None or not found.lathe.opens(found.wall)):
-            edited = warned(edited, LID)
+        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *_unlike(each, shells, hollow))
+    methods = list(dict.fromkeys(found.method for _, found in each))
     what = {
         "ior": ior, "transmission": transmission, "tint": list(tint), "roughness": roughness, "hollow": hollow,
-        "model": model, "thickness": found.method, "pixels": int(own.sum()),
+        "model": model, "thickness": ", ".join(methods), "pixels": int(own.sum()),
     }  # fmt: skip
     return noted(edited, "glass", what)
+
+
+def _shell(
+    scene: Scene, removed: Scene, part: Array, found: ObjectThickness, hollow: bool | str, smooth: float
+) -> Shell:
+    return standing_body(
+        scene.depth, scene.normal, part, found, scene.camera, behind=removed.depth,
+        wall=found.wall if hollow else None, smooth=smooth, open_top=hollow == OPEN,
+    )  # fmt: skip
+
+
+def _unlike(each: list[tuple[Array, ObjectThickness]], shells: list[Shell], hollow: bool | str) -> list[str]:
+    """What of a hollow could not be made, in words."""
+    notes = []
+    for (_, found), shell in zip(each, shells, strict=True):
+        opened = hollow == OPEN and found.lathe is not None and found.lathe.opens(found.wall)
+        notes += [LID] * (hollow == OPEN and not opened)
+        notes += [NO_ROOM] * (bool(hollow) and not opened and not cavities(shell))
+    return list(dict.fromkeys(notes))
 
 
 def glass_surface(
@@ -98,18 +120,25 @@ def glass_surface(
 
 
 def _two_interface(
-    scene: Scene, removed: Scene, own: Array, found: ObjectThickness, look: dict[str, Any], smooth: float
+    scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], look: dict[str, Any], smooth: float
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo."""
     from materialist.edit.background import resized
     from materialist.edit.two_interface import back_of, two_interface
 
-    own, depth, normal = _front(scene, own, found, smooth)
-    factor = room(depth, found.solid, own, removed.depth, scene.camera)
-    depth, solid = factor * depth, factor * found.solid
+    own = np.zeros(scene.depth.shape, bool)
+    maps: list[Array] = []
+    for part, found in each:
+        seen, front, facing = _front(scene, part, found, smooth)
+        factor = room(front, found.solid, seen, removed.depth, scene.camera)
+        front, thick = factor * front, factor * found.solid
+        new = [front, thick, facing, back_of(front, seen, thick, found.back, scene.camera)]
+        # The first says what is just outside of the masks, too.
+        maps = [np.where(seen if a.ndim == 2 else seen[..., None], a, b) for a, b in zip(new, maps)] if maps else new
+        own |= seen
+    depth, solid, normal, back = maps
     picture = two_interface(
-        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap,
-        back=back_of(depth, own, solid, found.back, scene.camera), **look,
+        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap, back=back, **look,
     )  # fmt: skip
     photo = removed.photo
     if look["transmission"] < 1:

@@ -43,6 +43,11 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | 
     gone = _grown(own, round(grow * max(height, width)))
     surface = scene.depth > 0
     if (gone & surface).sum() > MOST * surface.sum() or (gone | ~surface).all():
+        if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
+            raise InputError(
+                "Nearly everything around the mask is sky, so that no scene would be left without it; mark a thing "
+                "that stands on something."
+            )
         raise InputError(
             f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
             "what stands behind; mark one object only."

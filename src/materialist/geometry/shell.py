@@ -35,6 +35,20 @@ def turned(shell: Shell) -> Shell:
     return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv)
 
 
+def cavities(shell: Shell) -> int:
+    """How many of its separate surfaces bound a hollow: faces run clockwise, seen from outside of them."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(shell.vertices)
+    a, b, c = shell.faces.T
+    links = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), (count, count))
+    number = connected_components(links, directed=False)[1]
+    p, q, r = (shell.vertices[k].astype(np.float64) - shell.vertices.mean(0) for k in (a, b, c))
+    volume = np.bincount(number[a], np.einsum("ij,ij->i", p, np.cross(q, r)) / 6)
+    return int((volume < 0).sum())
+
+
 def vertex_normals(vertices: Array, faces: Array) -> Array:
     """[V, 3] float32 unit normals, the area-weighted mean of the faces around each vertex."""
     corner = vertices[faces]
