@@ -91,7 +91,7 @@ def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
     assert np.isfinite(removed.depth).all() and np.isfinite(removed.photo.original).all()
     assert (removed.depth[mask & (np.arange(36)[:, None] > 18)] > 1.99).all()
     only_sky_behind = replace(scene, depth=np.where(mask, scene.depth, 0))
-    with pytest.raises(InputError, match="nothing tells"):
+    with pytest.raises(InputError, match="around the mask is sky"):
         without(only_sky_behind, mask)
 
 
