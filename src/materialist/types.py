@@ -46,6 +46,8 @@ class Photo:
     source: bytes | None = field(default=None, repr=False)
     """The input file, byte for byte."""
     warnings: tuple[str, ...] = ()
+    deep: bool = False
+    """True when it comes from a display file of more than 8 bits a channel that is not in `source` any more."""
 
 
 @dataclass(frozen=True)

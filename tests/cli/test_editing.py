@@ -166,6 +166,7 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
             ["edit", "SCENE", "--mask", "block.png", "--hue", "9", "-o", "out.scene/a.png", "--save", "out.scene"],
             "beside",
         ),
+        ([*EDIT, "--mask", "block.png", "--hue", "9", "--full-render", "--save", "out.scene"], "leave one of them out"),
         (RELIGHT, "No light"),
         ([*RELIGHT, "--envmap", "square.exr"], "twice as wide"),
         ([*RELIGHT, "--envmap", "none.exr"], "none.exr"),
@@ -196,10 +197,29 @@ def test_bad_input_is_exit_2_and_nothing_is_written(run, folder, arguments, word
     assert sorted(p.name for p in folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("command", ["select", "edit", "relight", "apply"])
+@pytest.mark.parametrize(
+    "command", ["select", "edit", "relight", "apply", "insert", "drop", "glass", "remove", "export"]
+)
 def test_help(run, command):
     code, out, _ = run(command, "--help")
-    assert code == 0 and "--json" in out
+    assert code == 0 and all(option in out for option in ("--json", "--seed", "--device", "--force"))
+
+
+def test_the_device_is_chosen_before_anything_renders(run, folder, monkeypatch):
+    """A GPU machine must not begin on its GPU and then be told of the CPU."""
+    from made_meshes import box_file
+
+    from materialist.edit.insert import insert
+    from materialist.render import variant
+
+    box = box_file(folder / "box.ply")
+    save_scene(insert(load_scene(folder / "a.scene"), box, (6, 30), scale=0.3), folder / "c.scene")
+    asked, setup = [], variant.setup
+    monkeypatch.setattr(variant, "setup", lambda device="auto": asked.append(device) or setup(device))
+    options = ["--spp", "2", "--device", "cpu", "-o", folder / "out.png"]
+    code, _, err = run("edit", folder / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)
+    assert code == 0, err
+    assert asked[:1] == ["cpu"]
 
 
 @pytest.mark.parametrize("seed", ["-1", "99999999999999999999"])

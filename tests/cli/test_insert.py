@@ -100,3 +100,12 @@ def test_drop_films_into_a_folder(run, folder, tmp_path):
     first, last = (np.asarray(Image.open(f)).astype(float) for f in (frames[0], frames[-1]))
     assert np.abs(first - last).max() > 20
     assert len(load_scene(tmp_path / "end.scene").bodies) == 1
+
+
+@pytest.mark.parametrize("out", ["same", "same/film"])
+def test_a_film_is_not_written_into_its_scene(run, folder, tmp_path, out):
+    code, _, err = run(
+        "drop", folder / "a.scene", folder / "box.ply", "--at", "24,28", "-o", tmp_path / out, "--save",
+        tmp_path / "same",
+    )  # fmt: skip
+    assert code == 2 and "put it beside" in err and not (tmp_path / "same").exists()

@@ -135,6 +135,13 @@ def test_several_start_clear_of_each_other(box):
     assert np.linalg.norm(told["gravity"]) == pytest.approx(1, abs=1e-5)  # the one that was found
 
 
+def test_one_mesh_needs_no_list(box, tmp_path):
+    alone, listed = (drop(floor_scene(), meshes, (24.0, 26.0), frames=2) for meshes in (box, [box]))
+    np.testing.assert_array_equal(alone[-1].bodies[0].vertices, listed[-1].bodies[0].vertices)
+    path = box_file(tmp_path / "box.ply")
+    assert drop(floor_scene(), str(path), (24.0, 26.0), frames=2)[-1].bodies[0].name == listed[-1].bodies[0].name
+
+
 def test_bad_input(box):
     scene = floor_scene(96, 72)
     for options, sentence in [

@@ -79,6 +79,16 @@ def test_the_module_is_the_function():
     )
 
 
+@pytest.mark.parametrize(("lean", "wanted"), [(1.0, [0, 0, -1]), (-1.0, [0, 0, 1]), (0.0, [0, 1, 0])])
+def test_textures_are_upright_as_the_camera_sees_them(lean, wanted):
+    """On a floor up is away from the camera, on a ceiling towards it; right is right on all."""
+    from materialist.edit.texture import _tangents
+
+    right, up = _tangents(np.array([0.0, lean, 1.0 - abs(lean)]))
+    np.testing.assert_allclose(up, wanted, atol=1e-9)
+    np.testing.assert_allclose(right, [1, 0, 0], atol=1e-9)
+
+
 def test_texture_lies_upright_on_a_wall():
     scene = flat_scene()
     wall = np.zeros((36, 48), bool)

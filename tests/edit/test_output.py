@@ -60,3 +60,16 @@ def test_photos_from_memory_are_not_deep():
     Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(buffer, "JPEG")
     assert not is_deep(SCENE.photo) and not is_deep(replace(SCENE.photo, source=buffer.getvalue()))
     assert srgb_to_linear(np.array([1.0]))[0] == 1
+
+
+def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
+    from materialist.edit.composite import developed
+    from materialist.io.package import load_scene, save_scene
+
+    data = cv2.imencode(".png", np.full((36, 48, 3), 30000, np.uint16))[1].tobytes()
+    scene = replace(SCENE, photo=replace(SCENE.photo, source=data, path="a.png"))
+    save_scene(developed(scene, scene, scene.photo.original), tmp_path / "b.scene")
+    again = load_scene(tmp_path / "b.scene")
+    assert again.photo.source is None and is_deep(again.photo)
+    save_scene(developed(SCENE, SCENE, SCENE.photo.original), tmp_path / "c.scene")
+    assert not is_deep(load_scene(tmp_path / "c.scene").photo)

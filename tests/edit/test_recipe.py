@@ -76,6 +76,9 @@ def test_click_box_and_sun(folder):
         ("- relight: {sun: [1, 2, 3]}", "sun"),
         ("- relight: {lamps: [[1, 2, 3]]}", "lamp"),
         ("- relight: now", "no options"),
+        ("- relight: {}", "changes nothing"),
+        ("- relight: {gain: 3, ambient: 0.5}", "gain says nothing without envmap"),
+        ("- relight: {rotate: 3, sun_power: 2}", "sun_power says nothing without sun"),
     ],
 )
 def test_what_is_wrong_is_named(folder, text, words):

@@ -46,7 +46,7 @@ def apply(
     from materialist.edit.recipe import read_recipe
     from materialist.io.package import load_scene
 
-    check_before(output, save, spp, force)
+    check_before(output, save, spp, force, device=device.value, full_render=full_render)
     steps = read_recipe(edits)
     loaded = load_scene(scene)
     edited = replay(loaded, steps)

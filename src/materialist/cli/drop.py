@@ -23,7 +23,7 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_paths, check_video, numbers
+from materialist.cli.picture import check_paths, check_saved, check_video, numbers
 from materialist.cli.progress import StageProgress
 
 
@@ -68,12 +68,10 @@ def drop(
     from materialist.edit.frames import write_frames
     from materialist.edit.meshes import read_model
     from materialist.io.package import load_scene, save_scene
-    from materialist.io.target import ensure_writable
 
     check_paths(spp)
-    check_video(output, fps, force)
-    if save is not None:
-        ensure_writable(save, force)
+    check_saved(output, save, force, full_render)
+    check_video(output, fps, force, device.value)
     start = time.monotonic()
     places: Any = [numbers(text, 2, "--at") for text in at]
     direction: Any = numbers(gravity, 3, "--gravity") if gravity else None

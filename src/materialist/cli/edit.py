@@ -66,10 +66,10 @@ def edit(
     wanted = (hue, saturation, value, albedo, roughness, metallic, texture)
     if not any(v not in (0.0, None) for v in wanted):
         raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
-    check_before(output, save, spp, force)
+    check_before(output, save, spp, force, device=device.value, full_render=full_render)
     loaded = load_scene(scene)
     picture = read_texture(texture) if texture else None
-    region = chosen_region(loaded, click, box, mask, method)
+    region = chosen_region(loaded, click, box, mask, method, device.value)
     edited = change(
         loaded, region, hue=hue, saturation=saturation, value=value, albedo=albedo, texture=picture,
         texture_scale=texture_scale, roughness=roughness, metallic=metallic,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Force, Json, SceneArgument, output_option
+from materialist.cli.options import Device, DeviceOption, Force, Json, SceneArgument, Seed, output_option
 from materialist.cli.outcome import report_success
 
 
@@ -46,10 +46,15 @@ def export(
     fitted_material: Annotated[
         bool, typer.Option("--fitted-material", help="blend: the material model of the fit, not Blender's Principled.")
     ] = False,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
     as_json: Json = False,
     force: Force = False,
 ) -> None:
-    """Write a scene for another program: glTF, Blender, USD, Mitsuba, or one self-contained page of HTML."""
+    """Write a scene for another program: glTF, Blender, USD, Mitsuba, or one self-contained page of HTML.
+
+    Nothing of it is random, and nothing is computed on a GPU.
+    """
     from rich.console import Console
 
     from materialist.export.run import check_format

@@ -85,14 +85,14 @@ def glass(
     from materialist.errors import InputError
     from materialist.io.package import load_scene
 
-    check_before(output, save, spp, force)
+    check_before(output, save, spp, force, device=device.value, full_render=full_render)
     if preview and (save is not None or full_render or not denoise):
         raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
     r, g, b = (float(c) for c in parse_colour(tint, "tint"))
     look: dict[str, Any] = {"ior": ior, "transmission": transmission, "tint": (r, g, b), "roughness": roughness}
     check_glass(**look)
     loaded = load_scene(scene)
-    region = chosen_region(loaded, click, box, mask, method)
+    region = chosen_region(loaded, click, box, mask, method, device.value)
     options: dict[str, Any] = {
         "hollow": OPEN if open_top else hollow, "model": model.value, "thickness": thickness, "background": background,
         "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": told_shadow(shadow), "seed": seed,

@@ -56,7 +56,7 @@ def insert(
     from materialist.edit.meshes import read_model
     from materialist.io.package import load_scene
 
-    check_before(output, save, spp, force)
+    check_before(output, save, spp, force, device=device.value, full_render=full_render)
     places = [numbers(text, 2, "--at") for text in at]
     model = read_model(mesh, up=up)
     loaded = edited = load_scene(scene)

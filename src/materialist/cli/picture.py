@@ -24,7 +24,9 @@ def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     return values
 
 
-def chosen_region(scene: Any, clicks: list[str] | None, box: str | None, mask: Path | None, method: Method) -> Any:
+def chosen_region(
+    scene: Any, clicks: list[str] | None, box: str | None, mask: Path | None, method: Method, device: str = "auto"
+) -> Any:
     """[H, W] bool from the options of the command line."""
     from materialist.edit.select import select
 
@@ -34,6 +36,7 @@ def chosen_region(scene: Any, clicks: list[str] | None, box: str | None, mask: P
         box=numbers(box, 4, "--box") if box else None,
         mask=mask,
         method=method.value,
+        device=device,
     )
 
 
@@ -52,26 +55,50 @@ def check_paths(spp: int) -> None:
         raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
 
 
-def check_video(output: Path, fps: int, force: bool) -> None:
-    """Everything about a video that can be wrong, before the work starts."""
+def check_video(output: Path, fps: int, force: bool, device: str) -> None:
+    """Everything about a video that can be wrong, before the work starts; renderings are done on `device`."""
     from materialist.edit.frames import ensure_video_writable
 
     if not 1 <= fps <= 120:
         raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
     ensure_video_writable(output, force=force)
+    _choose(device)
 
 
-def check_before(output: Path, save: Path | None, spp: int, force: bool) -> None:
-    """Everything about the output that can be wrong, before the work starts."""
+def check_before(
+    output: Path, save: Path | None, spp: int, force: bool, *, device: str, full_render: bool = False
+) -> None:  # fmt: skip
+    """Everything about the output that can be wrong, before the work starts; renderings are done on `device`."""
     from materialist.io.image import ensure_image_writable
-    from materialist.io.target import ensure_writable
 
     check_paths(spp)
-    if save is not None and output.resolve().is_relative_to(save.resolve()):
-        raise InputError(f"The picture {output} would lie in the scene {save}, which is written whole; put it beside.")
+    check_saved(output, save, force, full_render)
     ensure_image_writable(output, force=force)
-    if save is not None:
-        ensure_writable(save, force)
+    _choose(device)
+
+
+def check_saved(output: Path, save: Path | None, force: bool, full_render: bool) -> None:
+    """Everything about --save that can be wrong, before the work starts."""
+    from materialist.io.target import ensure_writable
+
+    if save is None:
+        return
+    if full_render:
+        raise InputError(
+            "--save keeps the photograph with the edit in it, and --full-render writes the rendering alone; leave one "
+            "of them out."
+        )
+    if output.resolve().is_relative_to(save.resolve()):
+        raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
+    ensure_writable(save, force)
+
+
+def _choose(device: str) -> None:
+    """Let everything of this command render on the device, also what asks for `auto`."""
+    if device != "auto":
+        from materialist.render.variant import setup
+
+        setup(device)
 
 
 def write_result(

@@ -79,14 +79,14 @@ def relight(
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
     if frames is None:
-        check_before(output, save, spp, force)
+        check_before(output, save, spp, force, device=device.value, full_render=full_render)
         if len(suns) > 1:
             raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
     else:
         if save is not None:
             raise InputError("--save writes one scene; leave out --frames.")
         check_paths(spp)
-        check_video(output, fps, force)
+        check_video(output, fps, force, device.value)
     options: dict[str, Any] = {"sun_power": sun_power, "ambient": ambient, "dim": dim}
     if envmap is not None:
         options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}

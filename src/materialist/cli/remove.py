@@ -57,9 +57,9 @@ def remove(
     from materialist.edit.hole import told_shadow
     from materialist.io.package import load_scene
 
-    check_before(output, save, spp, force)
+    check_before(output, save, spp, force, device=device.value, full_render=full_render)
     loaded = load_scene(scene)
-    region = chosen_region(loaded, click, box, mask, method)
+    region = chosen_region(loaded, click, box, mask, method, device.value)
     inpainter = chosen_inpainter(inpaint, seed, device.value)
     edited = without(loaded, region, background=background, inpaint=inpainter, shadow=told_shadow(shadow), seed=seed)
     write_result(

@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Box, Clicks, Force, Json, MaskFile, Method, SceneArgument, With, output_option
+from materialist.cli.options import (
+    Box,
+    Clicks,
+    Device,
+    DeviceOption,
+    Force,
+    Json,
+    MaskFile,
+    Method,
+    SceneArgument,
+    Seed,
+    With,
+    output_option,
+)
 from materialist.cli.outcome import report_success
 from materialist.cli.picture import chosen_region
 from materialist.errors import InputError
@@ -26,10 +39,12 @@ def select(
     mask: MaskFile = None,
     method: With = Method.network,
     native: Annotated[bool, typer.Option("--native", help="At the photo's native size, with soft edges.")] = False,
+    seed: Seed = 0,
+    device: DeviceOption = Device.auto,
     as_json: Json = False,
     force: Force = False,
 ) -> None:
-    """Find the mask of an object from a click, a box or a rough mask."""
+    """Find the mask of an object from a click, a box or a rough mask; nothing of it is random."""
     import numpy as np
 
     from materialist.edit.upsample import matte
@@ -40,7 +55,7 @@ def select(
         raise InputError(f"The mask {output} must end in .png.")
     ensure_image_writable(output, force=force)
     loaded = load_scene(scene)
-    region = chosen_region(loaded, click, box, mask, method)
+    region = chosen_region(loaded, click, box, mask, method, device.value)
     shown = matte(region, loaded.photo.original) if native else region.astype(np.float32)
     # Written as display values: half a pixel inside must be half of white, whatever the curve.
     from materialist.color import srgb_to_linear

@@ -191,12 +191,15 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     import cv2
 
     from materialist import metrics
+    from materialist.edit.output import is_deep
 
     camera = scene.camera
     size = (camera.width, camera.height)
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
-    photo = replace(scene.photo, linear=linear.astype(np.float32), original=picture, source=None)
+    photo = replace(
+        scene.photo, linear=linear.astype(np.float32), original=picture, source=None, deep=is_deep(scene.photo)
+    )
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
     figures["rerender_ssim_path"] = metrics.ssim(again, photo.linear)

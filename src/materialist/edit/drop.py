@@ -52,7 +52,7 @@ class Release:
 
 def drop(
     scene: Scene,
-    meshes: Sequence[str | Path | Model],
+    meshes: str | Path | Model | Sequence[str | Path | Model],
     at: tuple[float, float] | Sequence[tuple[float, float]],
     *,
     frames: int = 48,
@@ -132,12 +132,13 @@ class Falling:
 
 def prepared(
     scene: Scene,
-    meshes: Sequence[str | Path | Model],
+    meshes: str | Path | Model | Sequence[str | Path | Model],
     at: tuple[float, float] | Sequence[tuple[float, float]],
     release: Release,
 ) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
     load()
+    meshes = [meshes] if isinstance(meshes, str | Path | Model) else meshes
     models = [repainted(m if isinstance(m, Model) else read_model(m, up=release.up), release.material) for m in meshes]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")

@@ -40,6 +40,8 @@ def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bo
 
 def is_deep(photo: Photo) -> bool:
     """Whether the photo came from a display file of more than 8 bits a channel: 16-bit PNG, TIFF, camera RAW."""
+    if photo.deep:
+        return True
     head = (photo.source or b"")[:32]
     if head.startswith(b"\x89PNG"):
         return len(head) > 24 and head[24] == 16

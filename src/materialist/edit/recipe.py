@@ -161,6 +161,11 @@ def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
+    if not given:
+        raise InputError("A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim.")
+    for name, needed in (("gain", "envmap"), ("sun_power", "sun")):
+        if name in given and needed not in given:
+            raise InputError(f"relight: {name} says nothing without {needed}; give that, too, or leave {name} out.")
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
     if "envmap" in given:
         options["envmap"] = read_envmap(_file(step, "envmap"))

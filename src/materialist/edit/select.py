@@ -23,6 +23,7 @@ def select(
     box: Sequence[float] | None = None,
     mask: Array | str | Path | None = None,
     method: str = "network",
+    device: str = "auto",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or in a rough mask.
 
@@ -32,6 +33,7 @@ def select(
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
         method: `network` (colour, depth, normals, and ClickNet; in a box as `grabcut`), `grabcut` (without ClickNet) or
             `sam2` (needs its weights).
+        device: `auto`, `cpu` or `cuda`, for `sam2`.
 
     Raises:
         InputError: none or several of click, box and mask; a click or box outside the photo or on the sky; an empty
@@ -48,7 +50,7 @@ def select(
     if method == "sam2":
         from materialist.edit.sam import segment
 
-        found = segment(scene.photo.linear, points, frame)
+        found = segment(scene.photo.linear, points, frame, device=device)
     elif frame is not None:
         found = from_box(scene, frame)
     elif method == "network":

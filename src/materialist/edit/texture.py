@@ -38,8 +38,8 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
 def _tangents(normal: Array) -> tuple[Array, Array]:
     """Unit vectors to the right and up in the plane of `normal` [3], as the camera sees them."""
     normal = normal / max(float(np.linalg.norm(normal)), 1e-9)
-    # On a floor the way up leads into the depth.
-    up = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.9 else np.array([0.0, 0.0, -1.0])
+    # On a floor the way up leads into the depth, on a ceiling out of it.
+    up = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.9 else np.array([0.0, 0.0, -np.sign(normal[1])])
     right = np.cross(up, normal)
     right /= np.linalg.norm(right)
     return right, np.cross(normal, right)

@@ -118,6 +118,7 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "hdr": photo.hdr,
             "fov_source": photo.fov_source,
             "path": photo.path,
+            "deep": photo.deep,
             "warnings": list(photo.warnings),
         },
         "prior": {
@@ -171,6 +172,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
         meta["path"],
         source,
         tuple(meta["warnings"]),
+        bool(meta.get("deep", False)),
     )
 
 
