@@ -91,3 +91,25 @@ def test_cycles_sees_what_we_see(tmp_path):
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
     assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30
+
+
+@pytest.mark.slow
+def test_cycles_has_our_lamps_and_glow(tmp_path):
+    if not shutil.which(BPY):
+        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
+    from dataclasses import replace
+
+    from test_bodies import GLOW, LAMP, with_bodies
+
+    from materialist.edit.lights import rendered
+
+    scene = with_bodies(GLOW)
+    scene = replace(scene, envmap=scene.envmap * 0.2, lamps=(LAMP,))
+    folder = mt.export(scene, tmp_path / "out", to="blend").path
+    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
+    subprocess.run(command, check=True, capture_output=True)
+    ours, theirs = rendered(scene, spp=256, seed=0), read_exr(tmp_path / "r.exr")[..., :3]
+    ratio = theirs / np.maximum(ours, 1e-3)
+    assert abs(float(np.median(ratio)) - 1) < 0.03
+    bright = np.argwhere(ours.max(-1) > 5)  # the lamp itself
+    assert len(bright) > 10 and np.median(theirs.max(-1)[tuple(bright.T)]) > 5

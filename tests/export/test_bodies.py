@@ -13,7 +13,7 @@ from materialist.export import body_parts
 from materialist.export.glb import glb_bytes
 from materialist.export.parts import scene_parts
 from materialist.export.run import export
-from materialist.types import Body, Scene, Surface
+from materialist.types import Body, Lamp, Scene, Surface
 
 
 def with_bodies(*surfaces: Surface) -> Scene:
@@ -95,11 +95,64 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
 
 def test_formats_without_textures_say_so(tmp_path):
     done = export(with_bodies(CHECKS), tmp_path / "folder", to="blend")
-    assert any("without textures" in note for note in done.notes)
+    assert any("without textures;" in note for note in done.notes)
     facts = json.loads((tmp_path / "folder" / "scene.json").read_text())
     np.testing.assert_allclose(facts["parts"]["body0"]["albedo"], CHECKS.albedo.mean((0, 1)), atol=1e-6)
-    done = export(with_bodies(constant(0.2, 0.5, 0.0)), tmp_path / "plain", to="blend")
-    assert not any("without textures" in note for note in done.notes)
+    done = export(with_bodies(GLOW), tmp_path / "plain", to="blend")
+    assert not any("inserted bodies without" in note for note in done.notes)
+    facts = json.loads((tmp_path / "plain" / "scene.json").read_text())
+    assert facts["parts"]["body0"]["emission"] == [3.0, 1.5, 0.75]
+    done = export(with_bodies(GLOW, GLASS), tmp_path / "a.html")
+    assert any("without glass and glow;" in note for note in done.notes)
+    mixed = with_bodies(constant(0.2, 0.1, 0.0, transmission=0.9))
+    assert any("transmission is below 1" in note for note in export(mixed, tmp_path / "m", to="mitsuba").notes)
+
+
+LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)
+
+
+def test_lamps_leave_for_gltf_usd_and_blender(tmp_path):
+    pxr = pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+    assert pxr
+    from pxr import Usd, UsdGeom, UsdLux
+
+    scene = replace(with_bodies(GLOW), lamps=(LAMP,))
+    content = document(scene)
+    (light,) = content["extensions"]["KHR_lights_punctual"]["lights"]
+    np.testing.assert_allclose(light["intensity"] * 4 * np.pi * np.array(light["color"]), LAMP.power)
+    (node,) = [node for node in content["nodes"] if node["name"] == "lamp0"]
+    assert node["translation"] == [0.9, 0.3, -2.6] and "KHR_lights_punctual" in content["extensionsUsed"]
+    stage = Usd.Stage.Open(str(export(scene, tmp_path / "usd", to="usd").path))
+    sphere = UsdLux.SphereLight(stage.GetPrimAtPath("/Scene/lamp0"))
+    radiance = sphere.GetIntensityAttr().Get() * np.array(sphere.GetColorAttr().Get())
+    np.testing.assert_allclose(radiance, LAMP.radiance, rtol=1e-5)
+    place = UsdGeom.Xformable(sphere).ComputeLocalToWorldTransform(0).ExtractTranslation()
+    np.testing.assert_allclose(place, LAMP.position)
+    from pxr import UsdShade
+
+    glow = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/surface")).GetInput("emissiveColor").Get()
+    np.testing.assert_allclose(glow, [3, 1.5, 0.75])
+    done = export(scene, tmp_path / "blend", to="blend")
+    facts = json.loads((done.path / "scene.json").read_text())
+    assert facts["lamps"] == [{"position": [0.9, 0.3, -2.6], "power": [6.0, 4.5, 3.0], "radius": 0.12}]
+    assert not any("none of the scene" in note for note in done.notes)
+    assert any("none of the scene's 1 lamps" in note for note in export(scene, tmp_path / "a.html").notes)
+
+
+def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
+    """They are what is to be seen; those of a saved edit are in the photo."""
+    scene = with_bodies(GLOW, CHECKS)
+
+    def caught(scene, name):
+        folder = export(scene, tmp_path / name, to="blend").path
+        return json.loads((folder / "scene.json").read_text())["in_photo"][3:]
+
+    assert caught(scene, "a") == []
+    stage = {"name": "edit", "edits": [], "bodies": 1}
+    saved = replace(scene, report=replace(scene.report, stages=(*scene.report.stages, stage)))
+    assert caught(saved, "b") == ["body0"]
+    older = replace(scene, report=replace(scene.report, stages=({"name": "edit", "edits": []},)))
+    assert caught(older, "c") == ["body0", "body1"]
 
 
 def test_maps_of_several_sizes_are_brought_to_one():

@@ -203,7 +203,7 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
     figures["rerender_ssim_path"] = metrics.ssim(again, photo.linear)
-    stage = {"name": "edit", "edits": edited.provenance.get("edits", [])}
+    stage = {"name": "edit", "edits": edited.provenance.get("edits", []), "bodies": len(edited.bodies)}
     old = edited.report
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
     return replace(edited, photo=photo, rerender=again, report=report)

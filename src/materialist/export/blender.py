@@ -9,11 +9,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from materialist.errors import SetupError
+from materialist.export.body_parts import in_photo
 from materialist.export.parts import Part
 from materialist.export.run import Exported
 from materialist.export.target import ensure_free, whole_files, whole_folder
@@ -73,6 +75,8 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
         "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,
         "photo_width": native[1], "photo_height": native[0],
         "parts": {part.name: _constants(part) for part in parts},
+        "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(in_photo(scene)))],
+        "lamps": [asdict(lamp) for lamp in scene.lamps],
     }  # fmt: skip
     (folder / "scene.json").write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
     shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")
@@ -82,8 +86,10 @@ def _constants(part: Part) -> dict | None:
     if not part.constant:
         return None
     m = part.materials
+    emission = (0.0, 0.0, 0.0) if part.surface is None else part.surface.emission
     return {
-        "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]), "metallic": float(m.metallic[0, 0])
+        "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]), "metallic": float(m.metallic[0, 0]),
+        "emission": [float(c) for c in emission],
     }  # fmt: skip
 
 

@@ -35,6 +35,7 @@ def main() -> None:
     add_meshes(scene, facts, options.fitted_material)
     add_camera(scene, facts)
     add_light(scene)
+    add_lamps(scene, facts)
     set_rendering(scene, options.samples)
     if options.shadow_catcher:
         catch_shadows(scene, facts)
@@ -71,7 +72,7 @@ def add_meshes(scene, facts, additive) -> None:
 
 
 def material(name, constants, additive):
-    """Material of a part: from its maps, or with `constants` (albedo, roughness, metallic) if it has any."""
+    """Material of a part: from its maps, or with `constants` (albedo, roughness, metallic, emission) if it has any."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
@@ -79,6 +80,13 @@ def material(name, constants, additive):
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (600, 0)
     result, slots = (add_lobes if additive else add_principled)(nodes, links)
+    if constants and max(constants["emission"]) > 0:
+        glow, both = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
+        glow.inputs["Color"].default_value = (*constants["emission"], 1)
+        glow.inputs["Strength"].default_value = 1
+        links.new(result, both.inputs[0])
+        links.new(glow.outputs["Emission"], both.inputs[1])
+        both.location, result = (450, 0), both.outputs["Shader"]
     links.new(result, output.inputs["Surface"])
     for row, (key, sockets) in enumerate(slots.items()):
         source = None if constants else add_texture(nodes, key, (-700, 300 - 300 * row))
@@ -183,6 +191,22 @@ def add_light(scene) -> None:
         node.location = (250 * column, 0)
 
 
+def add_lamps(scene, facts) -> None:
+    """Spheres of light. Cycles gives one of power P and radius r the radiance P / (4 pi^2 r^2), as we do."""
+    for number, lamp in enumerate(facts["lamps"]):
+        most = max(lamp["power"])
+        light = bpy.data.lights.new(f"lamp{number}", "POINT")
+        light.energy, light.shadow_soft_size = most, lamp["radius"]
+        light.color = [part / most for part in lamp["power"]]
+        if hasattr(light, "use_soft_falloff"):  # a disc that faces what it lights, else
+            light.use_soft_falloff = False
+        placed = bpy.data.objects.new(light.name, light)
+        x, y, z = lamp["position"]
+        placed.location = (x, -z, y)
+        placed.visible_camera = True
+        scene.collection.objects.link(placed)
+
+
 def set_rendering(scene, samples) -> None:
     """Cycles as the scene was fitted: light by way of up to three surfaces, a box filter, plain sRGB."""
     scene.render.engine = "CYCLES"
@@ -195,9 +219,9 @@ def set_rendering(scene, samples) -> None:
 
 
 def catch_shadows(scene, facts) -> None:
-    """Shadow-catching proxy over the photo, at the photo's own resolution."""
+    """Shadow-catching proxy over the photo, at the photo's own resolution. Bodies that it lacks are seen."""
     for thing in bpy.data.collections["Reconstruction"].objects:
-        thing.is_shadow_catcher = True
+        thing.is_shadow_catcher = thing.name in facts["in_photo"]
     scene.render.film_transparent, scene.render.dither_intensity = True, 0  # the photo stays as it is
     scene.render.resolution_x, scene.render.resolution_y = facts["photo_width"], facts["photo_height"]
     if hasattr(scene, "compositing_node_group"):  # Blender 5

@@ -27,10 +27,18 @@ def plain(part: Part) -> Part:
     return replace(part, materials=mean)
 
 
-def simplified(parts: list[Part]) -> bool:
-    """Whether `plain` leaves something out: textures, light that enters, light that is given off."""
+def left_out(parts: list[Part], to: str) -> list[str]:
+    """What of bodies a format without their textures does not show."""
     surfaces = [part.surface for part in parts if part.surface is not None]
-    return any(not part.constant for part in parts) or any(s.transmission > 0 or max(s.emission) > 0 for s in surfaces)
+    names = ["textures"] * any(not part.constant for part in parts)
+    names += ["glass"] * any(s.transmission > 0 for s in surfaces)
+    return names + ["glow"] * (to == "html" and any(max(s.emission) > 0 for s in surfaces))
+
+
+def in_photo(scene: Scene) -> int:
+    """How many of the scene's bodies, the first ones, its photo shows: those of edits that were saved."""
+    saved = [stage for stage in scene.report.stages if stage.get("name") == "edit"]
+    return max((int(stage.get("bodies", len(scene.bodies))) for stage in saved), default=0)
 
 
 def _part(name: str, body: Body) -> Part:

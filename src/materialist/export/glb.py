@@ -18,7 +18,7 @@ from materialist import __version__
 from materialist.errors import OutputError
 from materialist.export.parts import Part
 from materialist.export.textures import base_color, metallic_roughness, png
-from materialist.types import Array, Camera, Scene, Surface
+from materialist.types import Array, Camera, Lamp, Scene, Surface
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -37,6 +37,7 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     meshes = [document.add_part(part) for part in parts]
     nodes = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
     nodes.append({"name": "camera", "camera": 0})
+    nodes += _lamps(scene, document)
     camera = scene.camera
     content = {
         "asset": {"version": "2.0", "generator": f"materialist {__version__}"},
@@ -48,6 +49,8 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
         "buffers": [{"byteLength": len(document.data)}],
         "extras": {"photo": {"width": camera.width, "height": camera.height, "horizontal_fov_degrees": camera.fov}},
     }
+    if scene.lamps:
+        content["extensions"] = {"KHR_lights_punctual": {"lights": [_light(lamp) for lamp in scene.lamps]}}
     if document.extensions:
         content["extensionsUsed"] = sorted(document.extensions)
     text = json.dumps(content, separators=(",", ":")).encode()
@@ -65,6 +68,26 @@ def write_hdr(path: Path, envmap: Array) -> None:
     if not done:
         raise OutputError(f"{path} cannot be written: the environment map {envmap.shape} was not taken.")
     path.write_bytes(data.tobytes())
+
+
+def _lamps(scene: Scene, document: _Document) -> list[dict]:
+    """Nodes of the lamps, as KHR_lights_punctual has them."""
+    if scene.lamps:
+        document.extensions.add("KHR_lights_punctual")
+    return [
+        {
+            "name": f"lamp{k}", "translation": [float(c) for c in lamp.position],
+            "extensions": {"KHR_lights_punctual": {"light": k}},
+        }
+        for k, lamp in enumerate(scene.lamps)
+    ]  # fmt: skip
+
+
+def _light(lamp: Lamp) -> dict:
+    """A point of the lamp's intensity, power / (4 pi), in the radiance of the photo x scene units squared."""
+    most = float(max(lamp.power))
+    color = [float(c) / max(most, 1e-30) for c in lamp.power]
+    return {"type": "point", "color": color, "intensity": most / (4 * math.pi)}
 
 
 class _Document:

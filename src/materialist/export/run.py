@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from materialist.errors import InputError
-from materialist.export.body_parts import TEXTURED, body_parts, plain, simplified
+from materialist.export.body_parts import TEXTURED, body_parts, left_out, plain
 from materialist.export.parts import Part, scene_parts
 from materialist.types import Scene
 
@@ -16,6 +16,7 @@ SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
 """Formats that may also be a folder: PATH without a suffix of its own."""
+COATED = "glass whose coat is seen from outside alone: where the transmission is below 1 it is up to 7 % darker there"
 PAGE_TRIANGLES = 60_000
 """Triangles in an HTML page unless the caller says otherwise."""
 
@@ -66,10 +67,12 @@ def export(
         max_triangles = PAGE_TRIANGLES
     bodies = body_parts(scene)
     note: tuple[str, ...] = ()
-    if to not in TEXTURED and simplified(bodies):
-        note = (f"{to} shows inserted bodies without textures and glass; glb and mitsuba have both.",)
-    if scene.lamps and to != "mitsuba":
-        note = (*note, f"{to} has none of the scene's {len(scene.lamps)} lamps; mitsuba has.")
+    if to not in TEXTURED and (names := left_out(bodies, to)):
+        note = (f"{to} shows inserted bodies without {' and '.join(names)}; glb and mitsuba have all of it.",)
+    if scene.lamps and to == "html":
+        note = (*note, f"html has none of the scene's {len(scene.lamps)} lamps; the other formats have.")
+    if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
+        note = (*note, f"Mitsuba has no {COATED}.")
     parts = [*scene_parts(scene, max_triangles), *(bodies if to in TEXTURED else map(plain, bodies))]
     if to != "blend":
         made = _writer(to)(path, scene, parts, force)

@@ -16,7 +16,7 @@ from materialist.export.target import whole_files, whole_folder
 from materialist.export.textures import base_color, png
 from materialist.io.display import to_bytes
 from materialist.io.exr import write_exr
-from materialist.types import Camera, Scene
+from materialist.types import Camera, Lamp, Scene
 
 _APERTURE = 36.0
 """Width of the film, millimetres; only its ratio to the focal length counts."""
@@ -52,6 +52,8 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
         _mesh(stage, part, _material(stage, folder, part, Sdf))
     _camera(stage, scene.camera, parts)
     _light(stage, folder, scene)
+    for number, lamp in enumerate(scene.lamps):
+        _lamp(stage, f"/Scene/lamp{number}", lamp)
     stage.GetRootLayer().Save()
 
 
@@ -92,6 +94,9 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     color = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     roughness = surface.CreateInput("roughness", Sdf.ValueTypeNames.Float)
     metallic = surface.CreateInput("metallic", Sdf.ValueTypeNames.Float)
+    if part.surface is not None and max(part.surface.emission) > 0:
+        glow = surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
+        glow.Set(tuple(float(c) for c in part.surface.emission))
     if part.constant:
         color.Set(tuple(float(c) for c in m.albedo[0, 0]))
         roughness.Set(float(m.roughness[0, 0]))
@@ -139,3 +144,15 @@ def _light(stage: Any, folder: Path, scene: Scene) -> None:
     light.CreateTextureFileAttr(Sdf.AssetPath("./envmap.exr"))
     light.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
     UsdGeom.Xformable(light).AddRotateYOp().Set(180.0)
+
+
+def _lamp(stage: Any, path: str, lamp: Lamp) -> None:
+    """A glowing sphere: intensity times colour is the radiance of its surface."""
+    from pxr import Gf, UsdGeom, UsdLux
+
+    most = max(lamp.radiance)
+    light = UsdLux.SphereLight.Define(stage, path)
+    light.CreateRadiusAttr(float(lamp.radius))
+    light.CreateIntensityAttr(float(most))
+    light.CreateColorAttr(Gf.Vec3f(*(float(c) / max(most, 1e-30) for c in lamp.radiance)))
+    UsdGeom.Xformable(light).AddTranslateOp().Set(Gf.Vec3d(*(float(c) for c in lamp.position)))
