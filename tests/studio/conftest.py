@@ -73,5 +73,7 @@ def session(opened):
     opened.stack, opened.thing = Stack(), {}
     opened.deselect()
     opened._past = []
+    (opened.desk / "edits.yaml").unlink(missing_ok=True)  # a test may have left another page's
+    opened._kept = None
     opened.save()
     return opened

@@ -8,6 +8,7 @@ from materialist.edit.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.context import light_values, material_values
 from materialist.studio.selection import Selection
+from materialist.studio.session import Session
 from materialist.studio.tab_light import place_lamp
 from materialist.studio.tab_object import LIBRARY, library_file, shape
 from materialist.studio.tab_take import commands
@@ -173,3 +174,56 @@ def test_reopened_where_it_was_left(hub, session):
     assert other.live is None and session.live is not None
     with pytest.raises(InputError, match="Open a photo"):
         other.material("hue", "1")
+
+
+def test_edits_that_cannot_be_read_are_left_as_they_are(hub, session):
+    """What somebody wrote by hand must not vanish with the next button."""
+    click(session)
+    session.material("roughness", "0.2")
+    file, project = session.desk / "edits.yaml", session.project
+    text = file.read_text().replace("0.2", "0.2\n    texture: ../wood.png")
+    file.write_text(text)
+    other = Session("me")
+    with pytest.raises(InputError, match=r"left as they are.*wood.*edits\.yaml"):
+        other.open(project)
+    assert other.project is None and other.live is None
+    with pytest.raises(InputError, match="Open a photo first"):
+        other.write_edits()
+    assert file.read_text() == text
+    file.unlink()
+
+
+def test_another_page_s_edits_are_not_overwritten(session):
+    click(session)
+    session.material("roughness", "0.2")
+    other = Session("me")
+    other.open(session.project)
+    other.light(ambient="0.5")
+    written = (session.desk / "edits.yaml").read_bytes()
+    with pytest.raises(InputError, match="changed in another place"):
+        session.material("roughness", "0.9")
+    assert (session.desk / "edits.yaml").read_bytes() == written
+    assert other.final_file != session.final_file
+    other.close()
+
+
+def test_a_job_has_the_edits_of_its_click(session):
+    assert session.edits_now() == ""
+    click(session)
+    session.material("roughness", "0.1")
+    job = session.edits_now()
+    session.material("roughness", "0.9")
+    (step,) = read_recipe(job)
+    assert step.options["roughness"] == "0.1" and (step.folder / step.options["mask"]).is_file()
+    assert session.edits_now() != job
+
+
+def test_each_button_stops_its_own_job(session):
+    from types import SimpleNamespace
+
+    stopped = []
+    session.running.update(invert="a", final="b")
+    jobs = SimpleNamespace(stop=stopped.append)
+    session.stop(jobs, "invert")
+    session.stop(jobs, "take")
+    assert stopped == ["a"]

@@ -77,6 +77,10 @@ class Hub:
         """What a browser keeps of the photo it shows."""
         return f"{self.run}/{project.name}"
 
+    def here(self, kept: Any) -> bool:
+        """Whether what a browser kept is of this studio, and not of one before it."""
+        return str(kept or "").rpartition("/")[0] == self.run
+
     def first(self, kept: Any) -> str:
         """The name of the project that a page which arrives should show; an empty text for none.
 

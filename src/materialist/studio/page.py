@@ -152,7 +152,7 @@ def _turned_to(context: Context, session: Session) -> dict[Any, Any]:
 
 
 def _wire_final(context: Context) -> None:
-    """Path-traced pictures, and the button that stops whatever this person has running."""
+    """Path-traced pictures, and the button that stops the one that this page asked for."""
     hub = context.hub
     outputs = [*context.picture_parts, context["progress"], context["stop"]]
 
@@ -162,15 +162,15 @@ def _wire_final(context: Context) -> None:
             session = context.session(request)
             _ = session.scene
             steps_now = session.stack.active
-            edits = session.write_edits()
+            edits = session.edits_now()
             if not edits or session.project is None:
                 raise gr.Error("There is no edit to render yet: change something first.", print_exception=False)
-            target = session.desk / "final"
+            target = session.final_file
             job = hub.jobs.submit(
                 "final", session.person, session.desk, scene=str(session.project.scene), edits=edits,
                 output=str(target), spp=spp,
             )  # fmt: skip
-            session.running = job
+            session.running["final"] = job
             for html in follow(hub.jobs, job):
                 yield {context["progress"]: html, context["stop"]: gr.update(visible=not job.over)}
             if job.state == "done":
@@ -185,9 +185,7 @@ def _wire_final(context: Context) -> None:
 
     @guarded
     def stop(request: gr.Request) -> None:
-        session = context.session(request)
-        if session.running is not None:
-            hub.jobs.stop(session.running)
+        context.session(request).stop(hub.jobs, "final")
 
     context["stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 

@@ -19,6 +19,7 @@ from materialist.io.examples import PREFIX, example_path
 from materialist.studio import uploads
 from materialist.studio.hub import ALONE, Hub
 from materialist.studio.jobs import Jobs
+from materialist.studio.visitors import Guard, names_of
 from materialist.studio.work import Project, WorkFolder
 
 
@@ -88,7 +89,7 @@ def serve(
             server_name=host, server_port=port, share=False, quiet=True, prevent_thread_lock=True, show_error=True,
             auth=_door(password), auth_message="Any name will do; the password counts.",
             max_file_size=f"{uploads.MAX_MEGABYTES}mb", allowed_paths=[], theme=_theme(gr),
-            css=asset("style.css"),
+            css=asset("style.css"), app_kwargs={"middleware": [_guard(hub, host)]},
             js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
         )  # fmt: skip
         if told is not None:
@@ -116,6 +117,12 @@ def _door(password: str | None) -> Any:
     if not password:
         return None
     return lambda name, word: hmac.compare_digest(word.encode(), password.encode())
+
+
+def _guard(hub: Hub, host: str) -> Any:
+    from starlette.middleware import Middleware
+
+    return Middleware(Guard, names=names_of(host) if hub.alone else None)
 
 
 def _theme(gr: Any) -> Any:

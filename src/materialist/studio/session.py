@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import secrets
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +14,7 @@ from materialist.errors import InputError, MaterialistError
 from materialist.studio import things, views
 from materialist.studio.desk import keep, new_name, read_steps, write_mask
 from materialist.studio.glass import Tracer
-from materialist.studio.jobs import Job
+from materialist.studio.jobs import Job, Jobs
 from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.showing import Final, stage
@@ -42,8 +44,11 @@ class Session:
         self.stack = Stack()
         self._past: list[tuple[str, Stack, Selection]] = []
         self.mask_urls = views.mask_urls(None)
-        self.running: Job | None = None
-        """The last job that this page asked for."""
+        self.running: dict[str, Job] = {}
+        """The last job of each kind (invert, final, take, fall) that this page asked for."""
+        self._mark = secrets.token_hex(4)
+        self._kept: bytes | None = None
+        """The list of edits as this page last read or wrote it."""
         self.final: Final | None = None
 
     @property
@@ -61,6 +66,16 @@ class Session:
         return self.project.desk(self.person)
 
     @property
+    def final_file(self) -> Path:
+        """Where this page's path-traced pictures lie, without the ending: two pages may show one photo."""
+        return self.desk / f"final-{self._mark}"
+
+    def stop(self, jobs: Jobs, kind: str) -> None:
+        """Stop the last job of a kind that this page asked for."""
+        if kind in self.running:
+            jobs.stop(self.running[kind])
+
+    @property
     def in_hand(self) -> str | None:
         """The kind of the step that sliders move, if there is one."""
         k = self.stack.current
@@ -71,11 +86,17 @@ class Session:
         from materialist.io.package import load_scene
 
         loaded = load_scene(project.scene)
+        desk = project.desk(self.person)
+        kept = _content(desk / EDITS)
+        try:
+            steps = read_steps(desk, desk / EDITS) if kept is not None else ()
+        except InputError as error:
+            raise InputError(f"The edits of this photo cannot be read, and were left as they are: {error} Repair or "
+                             f"rename {desk / EDITS}.") from error  # fmt: skip
         with self.lock:
             self.close()
             self.project, self.live, self.glass = project, Live(loaded), Tracer(project.scene)
-            if (self.desk / EDITS).is_file():
-                self.stack = Stack(read_steps(self.desk, self.desk / EDITS))
+            self.stack, self._kept = Stack(steps), kept
 
     def close(self) -> None:
         """Give the memory back; what was done stays in the work folder."""
@@ -84,6 +105,9 @@ class Session:
                 self.live.close()
             if self.glass is not None:
                 self.glass.rest()
+            if self.project is not None:
+                for suffix in (".png", ".exr", ".jpg"):
+                    self.final_file.with_suffix(suffix).unlink(missing_ok=True)
             self.project = self.live = self.glass = self.final = None
             self.stack, self._past = Stack(), []
             self._select(Selection())
@@ -222,6 +246,16 @@ class Session:
             self.save()
             return str(self.desk / EDITS) if self.stack.active else ""
 
+    def edits_now(self) -> str:
+        """A copy of the recipe for a job, which runs later: what is changed meanwhile is not in it. "" as above."""
+        with self.lock:
+            if not self.write_edits():
+                return ""
+            content = (self.desk / EDITS).read_bytes()
+            copy = self.desk / f"job-{hashlib.sha256(content).hexdigest()[:12]}.yaml"
+            copy.write_bytes(content)
+            return str(copy)
+
     def keep(self, file: Path, stem: str, suffix: str) -> str:
         """See `desk.keep`."""
         return keep(self.desk, file, stem, suffix)
@@ -274,10 +308,27 @@ class Session:
         return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
 
     def save(self) -> None:
-        """Write edits.yaml, and let go of the glass that is no longer in it."""
+        """Write edits.yaml, and let go of the glass that is no longer in it.
+
+        Raises InputError where somebody else has written it since: another page, or a person.
+        """
+        if self.project is None:
+            return
+        file = self.desk / EDITS
+        if _content(file) != self._kept:
+            raise InputError("These edits were changed in another place; reload the page to go on with those.")
         if self.glass is not None:
             self.glass.keep(self.stack.steps)
         if self.stack.steps:
-            write_recipe(self.desk / EDITS, list(self.stack.steps))
-        elif self.project is not None:
-            (self.desk / EDITS).unlink(missing_ok=True)
+            write_recipe(file, list(self.stack.steps))
+        else:
+            file.unlink(missing_ok=True)
+        self._kept = _content(file)
+
+
+def _content(file: Path) -> bytes | None:
+    """The bytes of a file; None where there is none."""
+    try:
+        return file.read_bytes()
+    except FileNotFoundError:
+        return None

@@ -150,7 +150,7 @@ def _wire_fall(context: Context) -> None:
             "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
             at=[float(v) for v in step.options["at"]], output=str(file), **told,
         )  # fmt: skip
-        session.running = job
+        session.running["fall"] = job
         for html in follow(hub.jobs, job):
             yield {parts["fall_progress"]: html, parts["fall_stop"]: gr.update(visible=not job.over)}
         if job.state == "done":
@@ -158,9 +158,7 @@ def _wire_fall(context: Context) -> None:
 
     @guarded
     def stop(request: gr.Request) -> None:
-        session = context.session(request)
-        if session.running is not None:
-            hub.jobs.stop(session.running)
+        context.session(request).stop(hub.jobs, "fall")
 
     @guarded
     def rest(height: float, request: gr.Request) -> Any:

@@ -109,16 +109,15 @@ def wire(context: Context, page: gr.Blocks) -> None:
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
         first = hub.first(last)
-        if isinstance(hub.start, Path):
+        there = bool(first) and any(value == first for _, value in known)
+        if isinstance(hub.start, Path) and not (there and hub.here(last)):
             yield {parts["file"]: hub.handed(hub.start)}
-        elif first and any(value == first for _, value in known):
+        elif there:
             yield from _resumed(context, session, first)
 
     @guarded
     def cancel(request: gr.Request) -> None:
-        session = context.session(request)
-        if session.running is not None:
-            hub.jobs.stop(session.running)
+        context.session(request).stop(hub.jobs, "invert")
 
     opening = [
         *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
@@ -196,7 +195,7 @@ def _unpacked(context: Context, session: Session, file: Path) -> Project:
 def _following(context: Context, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
     """Progress and first pictures of an inversion until it is over."""
     parts, hub = context.parts, context.hub
-    session.running = job
+    session.running["invert"] = job
     yield {
         parts["last"]: hub.kept(project),
         parts["cancel"]: gr.update(visible=True),

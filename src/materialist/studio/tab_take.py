@@ -68,17 +68,19 @@ def wire(context: Context) -> None:
         if what == "edits":
             _pack_edits(session, file)
         else:
-            job, steps = _asked(context, session, what, file), session.stack.active
+            steps, final = session.stack.active, session.final
+            job = _asked(context, session, what, file)
             if job is not None:
-                session.running = job
+                session.running["take"] = job
                 for html in follow(hub.jobs, job):
                     yield {parts["make_progress"]: html, parts["make_stop"]: gr.update(visible=not job.over)}
                 if job.state != "done":
                     return
             if what in ("png", "exr"):
                 if job is not None:
-                    session.final = Final(steps, session.desk / "final", SPP)
-                shutil.copyfile((session.desk / "final").with_suffix(file.suffix), file)
+                    final = session.final = Final(steps, session.final_file, SPP)
+                assert final is not None
+                shutil.copyfile(final.path.with_suffix(file.suffix), file)
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
             parts["download"]: gr.update(value=hub.handed(file), label=label, visible=True),
@@ -88,9 +90,7 @@ def wire(context: Context) -> None:
 
     @guarded
     def stop(request: gr.Request) -> None:
-        session = context.session(request)
-        if session.running is not None:
-            hub.jobs.stop(session.running)
+        context.session(request).stop(hub.jobs, "take")
 
     @guarded
     def load(file: str | None, request: gr.Request) -> dict[Any, Any]:
@@ -113,13 +113,13 @@ def wire(context: Context) -> None:
 def _asked(context: Context, session: Session, what: str, file: Path) -> Job | None:
     """The job that makes the file; None where the final picture is there already."""
     assert session.project is not None
-    edits, jobs = session.write_edits(), context.hub.jobs
+    edits, jobs = session.edits_now(), context.hub.jobs
     scene = str(session.project.scene)
     if what in ("png", "exr"):
         final = session.final
         if final is not None and final.of(session.stack.active) and final.spp >= SPP:
             return None
-        output = str(session.desk / "final")
+        output = str(session.final_file)
         return jobs.submit("final", session.person, session.desk, scene=scene, edits=edits, output=output, spp=SPP)
     more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
     return jobs.submit(

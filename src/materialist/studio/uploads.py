@@ -21,7 +21,8 @@ PHOTOS = frozenset(
 )
 _MEMBER = re.compile(
     r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
-    r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr"
+    r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr|"
+    r"bodies/\d{1,4}\.(ply|(albedo|roughness|metallic)\.exr)"
 )
 """The files of a scene package; nothing else is unpacked."""
 

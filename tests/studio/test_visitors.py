@@ -1,0 +1,59 @@
+"""Who may talk to the studio."""
+
+import asyncio
+
+import pytest
+
+from materialist.studio.visitors import Guard, names_of
+
+ALONE = names_of("127.0.0.1")
+
+
+def headers(**values):
+    return {name.replace("_", "-").encode(): value.encode() for name, value in values.items()}
+
+
+@pytest.mark.parametrize(
+    ("sent", "alone", "everyone"),
+    [
+        ({"host": "127.0.0.1:7860"}, True, True),
+        ({"host": "localhost:7860", "origin": "http://localhost:7860"}, True, True),
+        ({"host": "[::1]:7860", "origin": "http://[::1]:7860"}, True, True),
+        ({"host": "evil.example"}, False, True),  # a name that was let point here
+        ({"host": "evil.example", "origin": "http://evil.example"}, False, True),
+        ({"host": "127.0.0.1:7860", "origin": "http://evil.example"}, False, False),
+        ({"host": "127.0.0.1:7860", "origin": "http://127.0.0.1:9000"}, False, False),
+        ({"host": "127.0.0.1:7860", "origin": "null"}, False, False),
+        ({"host": "studio.example", "origin": "https://studio.example"}, False, True),
+        ({"host": "10.0.0.5:7860", "origin": "https://a.example", "x_forwarded_host": "a.example"}, False, True),
+        ({"host": "[broken", "origin": "http://[broken"}, False, False),
+        ({}, False, True),
+    ],
+)
+def test_welcome(sent, alone, everyone):
+    assert Guard(None, ALONE).welcome(headers(**sent)) is alone
+    assert Guard(None, None).welcome(headers(**sent)) is everyone
+
+
+def test_the_address_it_was_started_on_is_one_of_its_names():
+    assert Guard(None, names_of("127.0.0.2")).welcome(headers(host="127.0.0.2:80"))
+    assert not Guard(None, ALONE).welcome(headers(host="127.0.0.2:80"))
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket", "lifespan"])
+def test_what_is_refused_goes_no_further(kind):
+    reached, sent = [], []
+
+    async def app(scope, receive, send):
+        reached.append(scope["type"])
+
+    async def send(message):
+        sent.append(message)
+
+    scope = {"type": kind, "headers": [(b"host", b"evil.example")]}
+    asyncio.run(Guard(app, ALONE)(scope, None, send))
+    assert reached == (["lifespan"] if kind == "lifespan" else [])
+    if kind == "http":
+        assert sent[0]["status"] == 403
+    elif kind == "websocket":
+        assert sent == [{"type": "websocket.close", "code": 1008}]
