@@ -94,6 +94,27 @@ def test_a_scene_of_somebody_else_is_not_replaced(tmp_path):
     outcome = run(source, tmp_path / "runs", resume=True)
     assert "is not of this batch" in reasons(outcome)["b"] and (tmp_path / "runs/b.scene/mine.txt").exists()
     assert outcome.exit_code == 2
+    for force in (False, True):
+        again = run(source, tmp_path / "runs", resume=True, force=force)
+        assert "is not of this batch" in reasons(again)["b"], "it has not become the batch's by being refused"
+        assert (tmp_path / "runs/b.scene/mine.txt").exists()
+
+
+def test_a_picture_of_somebody_else_is_not_replaced(tmp_path):
+    pytest.importorskip("mitsuba")
+    source = photos(tmp_path / "in", "a", "b")
+    run(source, tmp_path / "runs")
+    (tmp_path / "runs/a.png").write_bytes(b"mine")
+    recipe = masks(tmp_path, "a", "b")
+    outcome = run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2)
+    assert "a.png exists and is not of this batch" in reasons(outcome)["a"] and outcome.count("done") == 1
+    assert (tmp_path / "runs/a.png").read_bytes() == b"mine"
+    own = (tmp_path / "runs/b.png").stat().st_mtime_ns
+    recipe.write_text(RECIPE.replace("90", "200"))
+    assert run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2).count("done") == 1
+    assert (tmp_path / "runs/b.png").stat().st_mtime_ns != own, "its own it may replace"
+    (tmp_path / "runs/a.png").unlink()
+    assert run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2).count("done") == 2
 
 
 def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):

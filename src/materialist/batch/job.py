@@ -32,7 +32,9 @@ class Job:
     inverted: bool = False
     """The package is there, whole and of this photo and these options: only the edit is missing."""
     replace: bool = False
-    """An earlier try of this batch may have left results, which are replaced."""
+    """A scene that lies there is of this batch, and may be replaced."""
+    replace_picture: bool = False
+    """So is an edited photo."""
     function: str = INVERSION
 
     @property

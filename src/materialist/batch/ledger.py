@@ -59,7 +59,8 @@ class Ledger:
 
     def _note(self, entry: dict[str, Any]) -> None:
         if entry.get("anew"):  # what was done before is to be done again; whose results lie there stays known
-            self.last = {id: {"event": "begin", "id": id, "name": e["name"]} for id, e in self.last.items()}
+            kept = ("id", "name", "own_scene", "own_picture", "scene_bytes", "picture_hash")
+            self.last = {i: {k: e[k] for k in kept if k in e} | {"event": "begin"} for i, e in self.last.items()}
         if "id" in entry:
             self.last[entry["id"]] = entry
             self.names[entry["id"]] = entry["name"]

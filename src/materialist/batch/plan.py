@@ -68,7 +68,7 @@ def plan(
     def look(photo: Listed) -> tuple[Job, bool]:
         job = Job(
             photo.id, names[photo.id], photo.location, str(runs.resolve()), options, recipe, spp,
-            replace=photo.id in ledger.last, function=function,
+            function=function,
         )  # fmt: skip
         entry = ledger.last.get(photo.id, {})
         if entry.get("key") != ledger.key or not _inverted(entry, job):

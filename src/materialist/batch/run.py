@@ -162,9 +162,15 @@ class _Run:
     def _begin(self, pool: Pool, job: Job) -> None:
         self._tries[job.id] = self._tries.get(job.id, 0) + 1
         self._stages[job.id] = "begin"
-        if not job.inverted:  # what the ledger says of a scene that is kept stays its last word until there is another
-            self._ledger.append("begin", id=job.id, name=job.name)
-        pool.begin(job)
+        before = self._ledger.last.get(job.id, {})
+        # What lies there and is of nobody else is this batch's from now on, however this try ends.
+        own = {"own_scene": _own(before, "own_scene", "scene_bytes") or not job.scene.exists(),
+               "own_picture": _own(before, "own_picture", "picture_hash")
+               or (job.edits is not None and not job.picture.exists())}  # fmt: skip
+        # What the ledger says of a scene that is kept stays its last word until there is another.
+        known = {key: before[key] for key in _OF_THE_SCENE if key in before} if job.inverted else {}
+        self._ledger.append("begin", id=job.id, name=job.name, **known, **own)
+        pool.begin(replace(job, replace=own["own_scene"], replace_picture=own["own_picture"]))
 
     def _hear(self, news: News) -> None:
         job, facts = news.job, news.facts
@@ -173,7 +179,7 @@ class _Run:
             return
         stage = self._stages.pop(job.id, None)
         if news.kind == LOST and self._tries[job.id] < TRIES:
-            self._waiting.appendleft(replace(job, replace=True))
+            self._waiting.appendleft(job)
             self._tell(f"{job.id}: {facts['reason']} It is begun again.")
             return
         if news.kind == FAILED:
@@ -182,9 +188,9 @@ class _Run:
             facts = {**facts, "reason": f"{facts['reason']} It was begun {TRIES} times.", "stage": stage}
         if "photo_hash" in facts and is_url(job.location):
             facts = {**facts, "photo_version": fingerprint(job.location)}
-        before = self._ledger.last.get(job.id, {}) if job.inverted else {}
+        before = self._ledger.last.get(job.id, {})
         kind = DONE if news.kind == DONE else FAILED
-        known = {key: before[key] for key in _OF_THE_SCENE if key in before}
+        known = {key: before[key] for key in (*_OF_THE_SCENE, *_OWN) if key in before}
         self._ledger.append(kind, id=job.id, name=job.name, attempts=self._tries[job.id], **{**known, **facts})
         self._through += 1
         self._failed += kind == FAILED
@@ -207,6 +213,13 @@ class _Run:
 
 _OF_THE_SCENE = ("invert_seconds", "photo_version", "scene_bytes", "photo_hash")
 """Facts of a scene that was kept while its edit was redone."""
+_OWN = ("own_scene", "own_picture")
+"""Whether what lies at a place is of this batch."""
+
+
+def _own(entry: dict[str, Any], key: str, written: str) -> bool:
+    """Whether this batch has made what lies there, says its last word on a photo; `written` is what older ones told."""
+    return bool(entry.get(key, written in entry))
 
 
 def _line(job: Job, kind: str, facts: dict[str, Any]) -> str:

@@ -40,6 +40,8 @@ THUMBNAIL = (240, 150)
 def process(job: Job, tick: Tick) -> dict[str, Any]:
     """Do a job. Returns what the ledger and the summary say of it; raises what the inversion or the edit raises."""
     start, processor = time.perf_counter(), time.process_time()
+    if job.edits is not None and not job.replace_picture and job.picture.exists():
+        raise OutputError(f"{job.picture} exists and is not of this batch; move it away.")
     scene, facts = _scene(job, tick)
     strip = [scene.photo.linear, scene.rerender]
     warnings = [*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings]
@@ -78,7 +80,7 @@ def _scene(job: Job, tick: Tick) -> tuple[Scene, dict[str, Any]]:
     if job.inverted:
         scene = load_scene(job.scene)
         return scene, {"photo_hash": _hash(scene.photo.source)}
-    if not job.replace and (job.scene.exists() or (job.edits and job.picture.exists())):
+    if not job.replace and job.scene.exists():
         raise OutputError(f"{job.scene} exists and is not of this batch; move it away.")
     options = job.named_options()
     size, fov = options.pop("size", 512), options.pop("fov", "auto")

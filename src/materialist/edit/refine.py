@@ -12,6 +12,8 @@ from materialist.types import Array, Scene
 _INNER, _OUTER = 0.02, 0.22
 """How far the border may move inwards and outwards, as a share of the longer side; thin parts stick out."""
 
+_UNLIKELY, _BESIDE = 0.04, 0.015
+"""Likelihood below which, and this far (a share of the longer side) from where it is more, nothing is of the object."""
 _PASSES = 3
 """How often the band follows the border: a first pass stops at a shadow, whose far side the next one can reach."""
 _SETTLED = 0.98
@@ -21,11 +23,14 @@ _GAP = 0.015
 """Half of the gap across which two parts are one, as a share of the longer side."""
 
 
-def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool: the rough mask with its border moved to where colour and depth change, a band at a time."""
-    mask = _moved(scene, rough, points)
+def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array | None = None) -> Array:
+    """[H, W] bool: the rough mask with its border moved to where colour and depth change, a band at a time.
+
+    Where `likely` [H, W] in [0, 1] is given, the border stays out of what is clearly none of the object.
+    """
+    mask = _moved(scene, rough, points, likely)
     for _ in range(_PASSES - 1):
-        wider = _moved(scene, mask, points)
+        wider = _moved(scene, mask, points, likely)
         settled = _overlap(wider, mask) > _SETTLED
         mask = wider
         if settled:
@@ -33,7 +38,7 @@ def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Ar
     return mask
 
 
-def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Array:
+def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array | None) -> Array:
     """[H, W] bool: the rough mask with its border moved within a band."""
     import cv2
 
@@ -41,6 +46,9 @@ def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]]) -> Arr
     inner, outer = cv2.erode(mask, _disc(_INNER, rough), borderValue=1) > 0, cv2.dilate(mask, _disc(_OUTER, rough)) > 0
     if not inner.any():
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=1) > 0
+    if likely is not None:
+        possible = cv2.dilate((likely > _UNLIKELY).astype(np.uint8), _disc(_BESIDE, rough)) > 0
+        outer &= possible | rough
     label = np.where(inner, cv2.GC_FGD, np.where(rough, cv2.GC_PR_FGD, np.where(outer, cv2.GC_PR_BGD, cv2.GC_BGD)))
     for x, y in points:
         label[y, x] = cv2.GC_FGD
