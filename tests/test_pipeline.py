@@ -206,3 +206,30 @@ def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, t
         "normal": f"maps:{folder}", "depth": f"moge:{moge}",
     }  # fmt: skip
     assert invert(**{**mixed, "fov": 45.0}).camera.fov == 45.0
+
+
+@pytest.mark.parametrize("call", ["invert", "batch"])
+def test_misspelt_options_are_refused(call, tmp_path):
+    import materialist as mt
+
+    arguments = ["nothing.png"] if call == "invert" else [str(tmp_path), str(tmp_path / "runs")]
+    with pytest.raises(InputError, match=r"no option 'predicter'; it takes predictor, "):
+        getattr(mt, call)(*arguments, predicter="maps:x")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_only_a_clipped_photo_is_said_to_be_clipped():
+    from types import SimpleNamespace
+
+    from materialist.pipeline import _report
+    from materialist.types import Camera, Materials, Photo, Prediction
+
+    def notes(value, hdr):
+        linear = np.full((8, 8, 3), value, np.float32)
+        flat = np.ones((8, 8), np.float32)
+        prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
+        found = SimpleNamespace(materials=prior.materials, rerender=linear, stages=())
+        photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
+        return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
+
+    assert [notes(1.0, False), notes(4.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.io.photo import HDR_CLIP
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
@@ -76,6 +78,7 @@ def invert(
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
     start = time.perf_counter()
+    check_overrides(overrides)
     preset = "paper" if engine == "path" else preset
     tick = progress or (lambda *_: None)
     found = overrides.get("found") or (lambda *_: None)
@@ -121,6 +124,20 @@ def invert(
     )  # fmt: skip
 
 
+OVERRIDES = ("settings", "prior", "spp", "found")
+"""Further keywords of `invert`."""
+
+
+def check_overrides(given: Iterable[str]) -> None:
+    """Raises InputError for a keyword that `invert` does not know: a misspelt one would change nothing."""
+    import inspect
+
+    known = [name for name in inspect.signature(invert).parameters if name not in ("photo", "overrides", "progress")]
+    unknown = [name for name in given if name not in (*known, *OVERRIDES)]
+    if unknown:
+        raise InputError(f"invert has no option '{unknown[0]}'; it takes {', '.join([*known, *OVERRIDES])}.")
+
+
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
     """Path-trace a scene, with its bodies and lamps, from the photo's camera: [H, W, 3] float32 linear.
 
@@ -143,7 +160,8 @@ def _report(
         for name in ("albedo", "roughness", "metallic")
     }
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
-    clipped = float((picture.linear >= 0.99).any(-1).mean())
+    white = HDR_CLIP if picture.hdr else 0.99
+    clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings, *told]
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")

@@ -67,3 +67,15 @@ def test_unknown_benchmarks_and_options_are_refused(tmp_path):
         bench.run("light", output=tmp_path / "out", colour=3)
     with pytest.raises(InputError, match=r"no method 'magic'.*paper path"):
         bench.run("light", output=tmp_path / "out", methods="default,magic")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({"scenes": "abc"}, "--scenes is 'abc'; give a whole number"), ({"scenes": 2.5}, "--scenes is 2.5"),
+     ({"photographic": 3}, "--photographic is 3; give true or false")],
+)  # fmt: skip
+def test_options_of_another_kind_are_refused(tmp_path, options, words):
+    name = "materials" if "photographic" in options else "select"
+    with pytest.raises(InputError, match=words):
+        bench.run(name, output=tmp_path / "report", **options)
+    assert not (tmp_path / "report").exists()

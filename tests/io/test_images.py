@@ -124,3 +124,75 @@ def test_overview_of_a_scene_with_nothing_in_it(scene):
     geometry = replace(scene.geometry, mesh=replace(empty, face_pixel=np.zeros(0, np.int32)))
     bare = replace(scene, depth=scene.depth * 0, envmap=scene.envmap * 0, geometry=geometry)
     assert overview(bare).shape[1] == 1600
+
+
+def write_channels(path, **channels):
+    import OpenEXR
+
+    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels) as file:
+        file.write(str(path))
+
+
+def test_the_picture_among_layers_of_an_exr(tmp_path):
+    from materialist.io.exr import read_exr
+
+    flat = lambda value, kind=np.float32: np.full((6, 8), value, kind)  # noqa: E731
+    layers = {
+        f"{name}.{c}": flat(value + k) for name, value in (("albedo", 1), ("beauty", 5)) for k, c in enumerate("RGB")
+    }
+    write_channels(tmp_path / "layers.exr", **layers, **{"depth.Z": flat(9)})
+    np.testing.assert_array_equal(read_exr(tmp_path / "layers.exr")[0, 0], [5, 6, 7])
+    write_channels(
+        tmp_path / "mixed.exr", R=flat(1, np.float16), G=flat(2, np.float16), B=flat(3, np.float16), A=flat(1)
+    )
+    np.testing.assert_array_equal(read_exr(tmp_path / "mixed.exr")[0, 0], [1, 2, 3, 1])
+    write_channels(tmp_path / "plain.exr", **layers, R=flat(1), G=flat(2), B=flat(3))
+    np.testing.assert_array_equal(read_exr(tmp_path / "plain.exr")[0, 0], [1, 2, 3])
+    write_channels(
+        tmp_path / "blender.exr",
+        **{f"View.Combined.{c}": flat(k) for k, c in enumerate("RGBA")},
+        **{"View.Mist.Z": flat(9)},
+    )
+    np.testing.assert_array_equal(read_exr(tmp_path / "blender.exr")[0, 0], [0, 1, 2, 3])
+
+
+def tiff(path, pixels, *, planar=1, photometric=2):
+    """A 16-bit TIFF [H, W, 3] or [H, W], its channels together (planar 1) or one after the other (2)."""
+    import struct
+
+    height, width = pixels.shape[:2]
+    bands = 1 if pixels.ndim == 2 else 3
+    planes = [pixels] if planar == 1 or bands == 1 else [pixels[..., k] for k in range(bands)]
+    strips = [np.ascontiguousarray(plane, "<u2").tobytes() for plane in planes]
+    start = 8 + sum(len(strip) for strip in strips)
+    places = [8 + sum(len(s) for s in strips[:k]) for k in range(len(strips))]
+    tags = [(256, 4, [width]), (257, 4, [height]), (258, 3, [16] * bands), (259, 3, [1]), (262, 3, [photometric]),
+            (273, 4, places), (277, 3, [bands]), (278, 4, [height]), (279, 4, [len(s) for s in strips]),
+            (284, 3, [planar])]  # fmt: skip
+    entries, extra = b"", b""
+    after = start + 2 + 12 * len(tags) + 4
+    for tag, kind, values in tags:
+        data = struct.pack("<" + ("H" if kind == 3 else "I") * len(values), *values)
+        if len(data) > 4:
+            entries += struct.pack("<HHII", tag, kind, len(values), after + len(extra))
+            extra += data
+        else:
+            entries += struct.pack("<HHI", tag, kind, len(values)) + data.ljust(4, b"\0")
+    head = struct.pack("<2sHI", b"II", 42, start)
+    path.write_bytes(head + b"".join(strips) + struct.pack("<H", len(tags)) + entries + b"\0" * 4 + extra)
+    return path
+
+
+def test_deep_tiffs_of_odd_layouts(tmp_path):
+    from materialist.errors import InputError
+    from materialist.io.decode import decode
+
+    ramp = np.linspace(0, 65535, 32 * 24).reshape(24, 32).astype(np.uint16)
+    colour = np.stack([ramp, ramp[::-1], ramp[:, ::-1]], -1)
+    together = decode(tiff(tmp_path / "a.tif", colour)).linear
+    assert together[0, 0, 0] < 0.01 < together[-1, -1, 0]
+    with pytest.raises(InputError, match="interleaved"):
+        decode(tiff(tmp_path / "b.tif", colour, planar=2))
+    black, white = (decode(tiff(tmp_path / f"{k}.tif", ramp, photometric=k)).linear for k in (1, 0))
+    np.testing.assert_allclose(black, white[::-1, ::-1], atol=1e-3)
+    assert white[0, 0, 0] > 0.99, "white is zero there"

@@ -366,3 +366,15 @@ def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):
     assert photo.linear.shape == (64, 96, 3) and np.ptp(middle, axis=-1).max() < 0.02
     np.testing.assert_allclose(ratio, np.median(ratio), rtol=0.02)
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(39.598, abs=0.01)
+
+
+def test_places_that_cannot_be_asked_for(tmp_path):
+    from materialist.errors import InputError, SceneError
+    from materialist.io.package import load_scene
+    from materialist.io.photo import read_photo
+
+    name = tmp_path / ("x" * 300)
+    with pytest.raises(InputError, match="cannot be read: file name too long"):
+        read_photo(str(name))
+    with pytest.raises(SceneError, match="cannot be read: file name too long"):
+        load_scene(name)

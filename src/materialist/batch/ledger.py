@@ -76,6 +76,7 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
     """
     folder = Path(runs)
     path = folder / LEDGER
+    options = json.loads(json.dumps(options))  # as they will be read again: tuples are lists
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = [name for name in os.listdir(folder) if name != LOCK]

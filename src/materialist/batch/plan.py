@@ -18,6 +18,7 @@ from materialist.batch.packages import file_hash, whole_size
 from materialist.batch.remote import is_url, version
 from materialist.errors import InputError, MaterialistError
 from materialist.io.decoded import MIN_SIDE
+from materialist.pipeline import check_overrides
 from materialist.predict.base import CHOICES
 
 LARGEST = 8192
@@ -26,6 +27,7 @@ LARGEST = 8192
 
 def check_options(options: dict[str, Any]) -> None:
     """Refuse, before any photo is touched, what would fail every photo in the same way. Raises InputError."""
+    check_overrides(options)
     size, fov, seed = options["size"], options["fov"], options["seed"]
     if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= LARGEST:
         raise InputError(

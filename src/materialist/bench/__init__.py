@@ -35,10 +35,23 @@ def run(name: str, *, output: str | Path, data: str | Path | None = None, force:
     if name not in BENCHMARKS:
         raise InputError(f"There is no benchmark '{name}'; choose one of {', '.join(BENCHMARKS)}.")
     benchmark = import_module(f"materialist.bench.{name}").run
-    known = [p for p in inspect.signature(benchmark).parameters if p not in ("data", "output")]
-    for option in options:
+    parameters = inspect.signature(benchmark).parameters
+    known = [p for p in parameters if p not in ("data", "output")]
+    for option, value in options.items():
         if option not in known:
             raise InputError(f"Benchmark '{name}' has no option '{option}'; it takes {', '.join(known)}.")
+        _check(option, value, parameters[option].default)
     folder = claim(Path(output), force=force)
     benchmark(data=None if data is None else Path(data), output=folder, **options)
     return folder
+
+
+def _check(option: str, value: Any, usual: Any) -> None:
+    """Raises InputError where an option is no number, or no yes or no, and its usual value is one."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if isinstance(usual, bool) and not isinstance(value, bool):
+        raise InputError(f"--{option} is {value!r}; give true or false.")
+    if isinstance(usual, int) and not isinstance(usual, bool) and not (number and value == int(value)):
+        raise InputError(f"--{option} is {value!r}; give a whole number.")
+    if isinstance(usual, float) and not number:
+        raise InputError(f"--{option} is {value!r}; give a number.")

@@ -20,7 +20,7 @@ _APART = 20.0
 """Lab distance of the mean colours of two sides that are clearly different."""
 _KINDS = ("plain", "coarse", "chroma")
 _CANDIDATES = 48
-_LIKELY = 0.1
+_LIKELY = 0.5
 """Worth of a region that agrees with what is likely, beside that of its outline."""
 _SHARES = (0.3, 0.5, 0.7)
 """Shares from which what is likely makes regions of its own."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -127,6 +127,7 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     """16-bit integers and floats, which Pillow would cut to 8 bits, through OpenCV; (linear, scene_linear)."""
     import cv2
 
+    _require_interleaved(image, path)
     decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     if decoded is None:
         raise InputError(f"{path} has an unusual pixel layout; save it as 8- or 16-bit RGB.")
@@ -140,11 +141,31 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
         linear, scene_linear = np.ascontiguousarray(colour, np.float32), True
     elif pixels.dtype in (np.uint8, np.uint16):
         scene_linear = False
-        matrix = matrix_profile(image.info.get("icc_profile") or b"")
+        if _tiff_tag(image, PHOTOMETRIC, 1) == 0:  # white is zero
+            colour = scale - colour
+        profile = image.info.get("icc_profile") or b""
+        matrix = matrix_profile(profile)
+        if profile and matrix is None:
+            warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
         linear = _srgb(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour, scale + 1)
     else:
         raise InputError(f"{path} holds {pixels.dtype} pixels; save it as 8- or 16-bit RGB.")
     return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
+
+
+PHOTOMETRIC, PLANAR = 262, 284
+"""Tags of TIFF: what values mean, and whether channels lie apart."""
+
+
+def _tiff_tag(image: Any, tag: int, usual: int) -> int:
+    """The value of a tag of a TIFF, `usual` where it has none or the image is no TIFF."""
+    return int((getattr(image, "tag_v2", None) or {}).get(tag, usual))
+
+
+def _require_interleaved(image: Any, path: Path) -> None:
+    """OpenCV reads deep TIFFs whose channels lie apart as if they did not. Raises InputError for those."""
+    if _tiff_tag(image, PLANAR, 1) == 2:
+        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
 
 
 def _is_float_tiff(path: Path) -> bool:

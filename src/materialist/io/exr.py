@@ -10,8 +10,9 @@ from materialist.errors import InputError, OutputError
 from materialist.plain import is_utf8
 from materialist.types import Array
 
-_COLOUR = ("RGB", "RGBA", "rgb", "rgba")
 _GREY = ("Y", "V", "L", "Z", "y", "depth")
+_PICTURES = ("beauty", "combined", "rgba", "rgb", "image", "final")
+"""Names of the layer that is the picture, where there are several."""
 
 
 def read_exr(path: str | Path) -> Array:
@@ -28,15 +29,13 @@ def read_exr(path: str | Path) -> Array:
     if not is_utf8(str(path)):
         raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
-        with OpenEXR.File(str(path)) as file:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: channel.pixels for name, channel in file.channels().items()}
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(
             f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
         ) from error
     array = _pick(channels, path)
-    if array.dtype not in (np.float16, np.float32):
-        raise InputError(f"{path} holds {array.dtype} pixels; save it as half or float.")
     return np.ascontiguousarray(array, np.float32)
 
 
@@ -63,13 +62,23 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
 
 
 def _pick(channels: dict[str, Array], path: Path) -> Array:
-    """The picture among the channels: plain RGB(A), then grey, then the first layer that ends in RGB(A)."""
-    for name in (*_COLOUR, *_GREY):
-        if name in channels:
-            return channels[name]
-    for name in sorted(channels):
-        if name.rsplit(".", 1)[-1] in _COLOUR:
-            return channels[name]
-    if len(channels) == 1:
+    """The picture among the channels: plain RGB(A), then grey, then a layer with RGB(A), the one named so first."""
+    odd = [name for name, pixels in channels.items() if pixels.dtype not in (np.float16, np.float32)]
+    layers: dict[str, dict[str, Array]] = {}
+    for name in [name for name in channels if name not in odd]:
+        layer, _, part = name.rpartition(".")
+        layers.setdefault(layer, {})[part.upper() if len(part) == 1 else part] = channels[name]
+    coloured = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
+    named = sorted(coloured, key=lambda layer: layer.rpartition(".")[2].lower() not in _PICTURES)
+    if "" not in coloured:
+        for name in _GREY:
+            if name in channels and name not in odd:
+                return channels[name]
+    for layer in ["", *named] if "" in coloured else named:
+        parts = layers[layer]
+        return np.stack([parts[c].astype(np.float32) for c in ("RGBA" if "A" in parts else "RGB")], -1)
+    if len(channels) == 1 and not odd:
         return next(iter(channels.values()))
+    if odd:
+        raise InputError(f"{path} holds {channels[odd[0]].dtype} pixels; save it as half or float.")
     raise InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")

@@ -212,12 +212,15 @@ def _read_labels(path: Path, shape: tuple[int, int]) -> Array:
 
 def _read_meta(folder: Path) -> dict[str, Any]:
     """scene.json, checked for kind and version."""
-    aside = interrupted_replacement(folder)
+    try:
+        aside, there = interrupted_replacement(folder), folder.is_dir()
+    except OSError as error:  # a folder one may not enter, a name that is too long
+        raise SceneError(f"{folder} cannot be read: {(error.strerror or str(error)).lower()}.") from error
     if aside is not None:
         raise SceneError(
             f"An interrupted save left {folder} without its scene; get the old one back: mv {aside} {folder}"
         )
-    if not folder.is_dir():
+    if not there:
         raise SceneError(f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}")
     meta = _read_json(folder / MARKER)
     if meta.get("format") != FORMAT:

@@ -71,7 +71,25 @@ def header_size(path: Path, shown: str) -> tuple[int, int]:
             f"{shown} has far too many pixels; the studio takes up to {MAX_PIXELS / 1e6:.0f} megapixels."
         ) from error
     except Exception as error:  # decoders raise anything
+        if (size := _tiff_size(path, head)) is not None:
+            return size
         raise InputError(f"{shown} is not an image this program can read; export it again as PNG or JPEG.") from error
+
+
+def _tiff_size(path: Path, head: bytes) -> tuple[int, int] | None:
+    """(width, height) of a TIFF with a layout that Pillow does not know, such as float RGB; None where it has none."""
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    if not head.startswith((b"II*\0", b"MM\0*")):
+        return None
+    try:
+        with path.open("rb") as file:
+            directory = ImageFileDirectory_v2(file.read(8))
+            file.seek(directory.next)
+            directory.load(file)
+        return int(directory[256]), int(directory[257])
+    except Exception:  # whatever a damaged file makes of it
+        return None
 
 
 def _exr_size(path: Path, shown: str) -> tuple[int, int]:

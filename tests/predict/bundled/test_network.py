@@ -215,7 +215,7 @@ def test_the_same_photo_gives_the_same_maps(file):
 def test_sky_is_what_is_joined_to_sure_sky():
     logit = np.full((6, 9), 3.0, np.float32)
     logit[:2, :4] = -2.0
-    logit[0, 0] = -5.0
+    logit[0, 0] = inference.SKY[1] - 0.5
     logit[:2, 6:] = -2.0  # a white wall: likely, and nowhere sure
     surface = inference._surface(logit)
     assert not surface[:2, :4].any() and surface.sum() == 54 - 8

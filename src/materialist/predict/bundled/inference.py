@@ -18,8 +18,8 @@ from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.predict.bundled.relief import smooth_relief, with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
-NETWORK_SIDES = (192, 256)
-"""Longest sides at which the network sees the photo, and its mirror image: sizes that it was trained on. Answers are
+NETWORK_SIDES = (192, 384)
+"""Longest sides at which the network sees the photo, and its mirror image: the whole, and details. Answers are
 averaged, and brought to the photo's size with the photo as the guide."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
@@ -31,7 +31,7 @@ MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
 DEPTH_SPAN = 50.0
 """Largest ratio of a depth to the median, either way."""
-SKY = (-1.0, -3.5)
+SKY = (-1.0, -5.5)
 """Logits of there being a surface below which a pixel is likely, and surely, sky."""
 DETAIL = 0.06
 """Difference (sRGB-encoded) to a picture as smooth as an environment map from which something stands before the sky."""
