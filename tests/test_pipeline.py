@@ -233,3 +233,15 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
         return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
 
     assert [notes(1.0, False), notes(4.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
+
+
+def test_a_photo_already_read_takes_the_field_of_view_that_is_given():
+    from materialist.pipeline import _read
+    from materialist.types import Camera, Photo
+
+    photo = Photo(np.zeros((8, 12, 3), np.float32), Camera(12, 8, 35.0), np.zeros((8, 12, 3), np.float32))
+    assert _read(photo, size=512, fov="auto") is photo
+    read = _read(photo, size=512, fov="60")
+    assert read.camera == Camera(12, 8, 60.0) and read.fov_source == "option"
+    with pytest.raises(InputError, match="field of view"):
+        _read(photo, size=512, fov=400)

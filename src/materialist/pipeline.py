@@ -59,7 +59,7 @@ def invert(
         preset: `default` or `paper`; the path engine always follows the paper.
         fov: horizontal field of view in degrees, or `auto`: from the predictor of the depth where it knows one
             (MoGe), else from EXIF, else 35.
-        size: longer side of the working image, pixels.
+        size: longer side of the working image, pixels; a Photo keeps the size that it was read at.
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
             `floors,backs` ends walls at the frame, `planes` leaves objects open behind, `none` adds nothing. `auto` is
@@ -188,7 +188,12 @@ def _report(
 
 def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
     if isinstance(photo, Photo):
-        return photo
+        if fov in ("auto", None):
+            return photo
+        from materialist.io.photo import option_fov
+
+        angle = option_fov(fov) or photo.camera.fov
+        return replace(photo, camera=replace(photo.camera, fov=angle), fov_source="option")
     from materialist.io.photo import read_photo
 
     return read_photo(photo, size=size, fov=fov)

@@ -131,3 +131,49 @@ def test_bad_input_and_files(tmp_path):
     save_scene(edited, tmp_path / "a.scene")
     assert load_scene(tmp_path / "a.scene").bodies[0].surface.emission == edited.bodies[0].surface.emission
     assert min(edited.bodies[0].surface.emission) > 0
+
+
+def test_edits_before_do_not_change_what_is_found():
+    """The lights are those of the photo, whatever has been done to the floor."""
+    from materialist.edit.glows import KEY
+    from materialist.edit.material import edit
+
+    _, fit = rooms()
+    floor = fit.normal[..., 1] > 0.5
+    after = relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5, fitted=fit)
+    before = edit(relight(fit, dim=0.5), floor, albedo=(0.05, 0.05, 0.05))
+    assert after.provenance[KEY] == before.provenance[KEY]
+    np.testing.assert_array_equal(after.envmap, before.envmap)
+    assert after.bodies[0].surface.emission == before.bodies[0].surface.emission
+    with pytest.raises(InputError, match="fitted="):
+        relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5)
+
+
+def test_off_is_as_good_as_off():
+    from materialist.edit.portrait import free_bodies
+
+    _, fit = rooms()
+    off = dimmed(fit, 0.0)
+    assert max(off.bodies[0].surface.emission) <= 1e-6
+    assert free_bodies(fit, off, lambda names: np.ones((30, 40))) == [], "it keeps the outline that the photo has"
+
+
+def test_an_hdr_photo_tells_how_bright_its_lights_are():
+    _, fit = rooms()
+    even = replace(fit.photo, hdr=True, linear=np.full((30, 40, 3), 1.2, np.float32))
+    assert visible_lights(replace(fit, photo=even)) == [], "a wall lit evenly is no light"
+    shown = np.where(LIGHT[..., None], np.float32(RADIANCE), np.minimum(fit.photo.linear, 0.9))
+    scene = replace(fit, photo=replace(fit.photo, hdr=True, linear=shown))
+    (mask,) = visible_lights(scene)
+    np.testing.assert_array_equal(mask, LIGHT)
+    assert dimmed(scene, 1.0).provenance["photo_lights"]["radiance"] == pytest.approx(RADIANCE)
+
+
+def test_the_preview_of_dimmed_lights_has_their_share():
+    from materialist.edit.preview import Preview
+
+    _, fit = rooms()
+    preview = Preview(fit, diffuse_samples=16, specular_samples=4)
+    base = preview.render(fit)[~LIGHT].mean()
+    as_it_is, less = (preview.render(dimmed(fit, dim))[~LIGHT].mean() for dim in (1.0, 0.3))
+    assert as_it_is == pytest.approx(base, rel=0.03) and less < 0.95 * base

@@ -104,3 +104,19 @@ def read_step(folder, text):
 def test_missing_list(folder):
     with pytest.raises(InputError, match="cannot be read"):
         read_recipe(folder / "none.yaml")
+
+
+def test_a_given_background_is_seen_in_the_light_of_the_photo(tmp_path):
+    """Dimmed first or removed first, the wall behind is the same wall."""
+    from edit_scenes import rendered_scene
+
+    scene = rendered_scene(block=2.0)
+    background = np.full((36, 48, 3), 90, np.uint8)
+    Image.fromarray(background).save(tmp_path / "behind.png")
+    Image.fromarray((block_mask(36, 48) * 255).astype(np.uint8)).save(tmp_path / "block.png")
+    light, remove = "- relight: {ambient: 0.4}\n", "- remove: {mask: block.png, background: behind.png}\n"
+    found = []
+    for k, text in enumerate((light + remove, remove + light, remove)):
+        (tmp_path / f"{k}.yaml").write_text(text)
+        found.append(apply(scene, read_recipe(tmp_path / f"{k}.yaml")).materials.albedo[block_mask(36, 48)].mean())
+    assert found[0] == pytest.approx(found[1], rel=0.02) and found[1] == pytest.approx(found[2], rel=0.02)

@@ -66,3 +66,18 @@ def test_without_a_sign_in_the_light_no_side_moves(maps):
     usual = search.error((wall.usual,))
     even = [search.error((_at(wall, dict.fromkeys(SIDES, level)),)) for level in (0.25, 0.5, 1.0)]
     assert max(even) < 1.25 * usual
+
+
+def test_the_order_of_searches_decides_nothing():
+    """A wall seen straight on: where it ends changes nothing, and the last search has only the better light."""
+    depth = np.full((24, 32), 2, np.float32)
+    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (24, 32, 3)).copy()
+    camera, rng = Camera(32, 24, 35.0), np.random.default_rng(0)
+    albedo = rng.uniform(0.2, 0.8, (24, 32, 3)).astype(np.float32)
+    materials = Materials(albedo, np.full((24, 32), 0.5, np.float32), np.zeros((24, 32), np.float32))
+    walls = walls_of(find_planes(depth, normal, camera), depth, camera)
+    geometry = build_geometry(depth, normal, camera, ends=[farthest(wall) for wall in walls])
+    photo = albedo * np.float32(0.7)
+    engine = TransportEngine(geometry, camera, photo, light_height=16)
+    search = Search(engine, materials, torch.from_numpy(photo.reshape(-1, 3)), DEFAULT.light, walls)
+    assert walls and search.found() is None

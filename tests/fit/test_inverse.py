@@ -97,6 +97,48 @@ def test_rerendering_comes_close_to_the_photo(room, fitted):
     assert metrics.psnr(after, room.photo.linear) > max(28, metrics.psnr(before, room.photo.linear) + 8)
 
 
+def test_a_dark_photo_gets_no_brighter_light_than_it_needs(room):
+    """What the photo hardly constrains stays where the light starts: behind the camera, mostly."""
+    from materialist.fit.light import START_RADIANCE, start_radiance
+
+    assert start_radiance(torch.full((9, 3), 0.21)) == start_radiance(torch.ones(9, 3)) == START_RADIANCE
+    share = 0.1
+    dark = room.photo.linear * np.float32(share)
+    fit = room.fit(short(DEFAULT, 60), prior=room.truth)
+    fit.engine.set_radiance(dark)
+    state = replace(fit, photo=replace(room.photo, linear=dark, original=dark)).run()
+    assert 0.6 < state.envmap.mean() / (share * room.light.mean()) < 1.6  # from 0.6 it ended at more than three times
+
+
+def test_each_correction_has_noise_of_its_own(room):
+    seeds = []
+
+    def judge(materials, envmap, spp, seed=0):
+        seeds.append(seed)
+        return room.judge(materials, envmap, spp, seed)
+
+    settings = replace(short(DEFAULT, 3), corrections=2, rounds=1)
+    room.fit(settings, judge=judge, seed=5).run()
+    assert len(set(seeds)) == len(seeds) == 2
+
+
+def test_a_speck_of_surface_is_fitted(room):
+    """A share of a dozen pixels would be none of them."""
+    from materialist.geometry.build import build_geometry
+
+    camera = Camera(64, 48, 40.0)
+    depth = np.zeros((48, 64), np.float32)
+    depth[10:13, 10:14] = 2
+    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (48, 64, 3)).copy()
+    grey = np.full((48, 64, 3), 0.4, np.float32)
+    materials = Materials(grey, np.full((48, 64), 0.5, np.float32), np.zeros((48, 64), np.float32))
+    engine = TransportEngine(build_geometry(depth, normal, camera), camera, grey, light_height=8, light_pixels=60)
+    problem = engine.light_problem(materials)
+    surface = np.isin(problem.pixels.numpy(), engine.pixels.numpy())
+    assert surface.sum() == len(engine.pixels) > 0
+    assert torch.isfinite(problem.render(torch.ones(8, 16, 3))).all()
+
+
 def test_maps_are_in_range(fitted):
     fit, state = fitted
     materials = fit.materials(state)
@@ -213,3 +255,6 @@ def test_visible_sky_is_pasted_where_it_is_seen():
     np.testing.assert_allclose(pasted[ahead & (d[..., 0] > 0.03)], 3.0)  # clipped: at least 1, and 3 is more
     np.testing.assert_allclose(pasted[(d[..., 1] < -0.03) | (d[..., 2] > 0)], 3.0)
     assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera) is envmap
+    # An HDR photo measures up to its own white.
+    measured = paste_visible_sky(envmap, 1.5 * photo, surface, camera, white=10.0)
+    np.testing.assert_allclose(measured[ahead & (d[..., 0] > 0.03)], 1.5)

@@ -26,7 +26,7 @@ Inpaint = Callable[[Array, Array], Array]
 
 def without(
     scene: Scene, mask: Array, *, background: Array | str | Path | None = None, inpaint: Inpaint | None = None,
-    grow: float = GROW, shadow: float | None = None, seed: int = 0,
+    grow: float = GROW, shadow: float | None = None, seed: int = 0, fitted: Scene | None = None,
 ) -> Scene:  # fmt: skip
     """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
 
@@ -42,6 +42,7 @@ def without(
         shadow: how far the surface it stands on is filled as well, as a part of the object's size, in [0, 2]; None:
             where its shadow and reflection are found (`cast.cast`). What the albedo kept of them goes with the object.
         seed: of the patch search.
+        fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
 
     Raises:
         InputError: a mask that is empty, of another size, all sky, or (nearly) all of the photo; a background of
@@ -67,7 +68,7 @@ def without(
     cast = "auto" if shadow is None else shadow
     what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast}
     if picture is not None:
-        removed = _matched(removed, hole, picture)
+        removed = _matched(removed, hole, picture, fitted or scene)
     return noted(removed, "remove", what)
 
 
@@ -152,27 +153,28 @@ def _painted(
     return Materials(albedo.astype(np.float32), rough.astype(np.float32), metal), photo, linear
 
 
-def _matched(removed: Scene, hole: Hole, picture: Array, *, spp: int = 24) -> Scene:
-    """The scene with the albedo in the hole that makes it look like `picture` under the fitted light.
+def _matched(removed: Scene, hole: Hole, picture: Array, fitted: Scene, *, spp: int = 24) -> Scene:
+    """The scene with the albedo in the hole that makes it look like `picture` in the light of the fitted scene.
 
     One rendering says how far the guess was off; for a matt surface the radiance goes with the albedo.
     """
     from materialist.edit.layers import denoised
     from materialist.edit.lights import Studio
 
-    studio = Studio(removed)
+    known = replace(removed, envmap=fitted.envmap, lamps=fitted.lamps, bodies=fitted.bodies)
+    studio = Studio(known)
     guides = (removed.materials.albedo, removed.materials.albedo, removed.normal)
     wanted = resized(picture, hole.painted.shape)
     for _ in range(2):
-        render, _ = studio.twins(removed)
+        render, _ = studio.twins(known)
         seen = render(spp, 1)
         seen, _ = denoised(seen, seen, guides)
         factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.2, 5)
-        albedo = np.where(hole.painted[..., None], removed.materials.albedo * factor, removed.materials.albedo)
+        albedo = np.where(hole.painted[..., None], known.materials.albedo * factor, known.materials.albedo)
         albedo = np.clip(albedo, 0, 1).astype(np.float32)
-        removed = replace(removed, materials=replace(removed.materials, albedo=albedo))
-        studio = Studio(removed)
-    return removed
+        known = replace(known, materials=replace(known.materials, albedo=albedo))
+        studio = Studio(known)
+    return replace(removed, materials=known.materials)
 
 
 def _with_hole(photo: Photo, linear: Array, hole: Array, plan: Plan | None) -> Photo:

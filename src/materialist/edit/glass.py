@@ -34,7 +34,7 @@ def glass(
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, hollow: bool | str = False,
     model: str = "closed", thickness: str | Array | Path = "auto", background: Array | str | Path | None = None,
     inpaint: Inpaint | None = None, grow: float = GROW, shadow: float | None = None, smooth: float = 0.01,
-    seed: int = 0,
+    seed: int = 0, fitted: Scene | None = None,
 ) -> Scene:  # fmt: skip
     """The scene with the object under a mask of glass, before what it hid.
 
@@ -50,7 +50,7 @@ def glass(
         model: `closed` path-traces a closed object (`geometry.closed`); `two-interface` is the paper's: every camera
             ray is bent twice and looks up the background, and there are no shadows.
         thickness: see `thickness.object_thickness`.
-        background, inpaint, grow, shadow: see `background.without`.
+        background, inpaint, grow, shadow, fitted: see `background.without`.
         smooth: see `geometry.closed.closed_proxy`.
 
     Raises:
@@ -63,7 +63,7 @@ def glass(
         raise InputError(f"hollow is {hollow!r}; choose true, false or {OPEN}.")
     own = checked_region(scene, mask) > 0.5
     removed = without(
-        scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed
+        scene, mask, background=background, inpaint=inpaint, grow=grow, shadow=shadow, seed=seed, fitted=fitted
     )  # fmt: skip
     each = [
         (part, object_thickness(scene, part, thickness, behind=removed.depth))

@@ -22,6 +22,10 @@ RADIANCES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 """Radiances that are tried, in units of the photo's white."""
 WORSE = 1.02
 """Errors of the photo that are alike: up to so many times the least one."""
+DARK = 1e-6
+"""Radiance of a light that is off: it is still the photo's own, with its outline."""
+BRIGHTER = 4.0
+"""So many times as bright as an HDR photo in the median is a light in it, at least."""
 SPP = 32
 NAME = "photo light"
 KEY = "photo_lights"
@@ -32,34 +36,55 @@ def visible_lights(scene: Scene) -> list[Array]:
     """Masks [H, W] bool of the lights on surfaces of the photo: connected clipped regions, the largest first."""
     from scipy import ndimage
 
-    bright = (scene.photo.linear.min(-1) >= CLIPPED) & (scene.depth > 0)
+    photo, surface = scene.photo, scene.depth > 0
+    least = CLIPPED
+    if photo.hdr and surface.any():
+        least = max(CLIPPED, BRIGHTER * float(np.median(photo.linear[surface].mean(-1))))
+    bright = (photo.linear.min(-1) >= least) & surface
     label, count = ndimage.label(bright)
     masks = [label == k for k in range(1, count + 1)]
     return sorted((m for m in masks if m.sum() >= LEAST * bright.size), key=lambda m: -int(m.sum()))
 
 
-def dimmed(scene: Scene, dim: float, *, seed: int = 0, device: str = "auto") -> Scene:
+def dimmed(
+    scene: Scene, dim: float, *, fitted: Scene | None = None, seed: int = 0, device: str = "auto"
+) -> Scene:  # fmt: skip
     """The scene with its visible lights as glowing surfaces of `dim` times their radiance; the photo's is 1.
 
     The fitted environment map explains the whole photo. Here it is scaled down to leave room for the lights, whose
     radiance is the largest of `RADIANCES` with which the two together explain the photo best, and at least its white.
     With dim = 1 the scene is about what it was.
 
+    Args:
+        fitted: the scene before its edits, whose rendering is the photo: the lights are found in it.
+
     Raises:
-        InputError: dim is not in [0, 10], or no clipped region of the photo is large enough.
+        InputError: the scene is edited, and `fitted` is not given; dim is not in [0, 10], or no clipped region of the
+            photo is large enough.
     """
     if not (np.isfinite(dim) and 0 <= dim <= 10):
         raise InputError(f"The dimming is {dim:g}; it must lie in [0, 10], 1 for as it is, 0 for off.")
     if any(body.name.startswith(NAME) for body in scene.bodies):
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")
-    masks = visible_lights(scene)
+    if fitted is None and is_edited(scene):
+        raise InputError(
+            "The lights of a photo are found in the scene before its edits; give that as fitted=, or dim first."
+        )
+    known = fitted or scene
+    masks = visible_lights(known)
     if not masks:
         raise InputError("The photo shows no light: no clipped region on a surface covers a thousandth of it.")
-    ambient, radiance = _explained(scene, masks, seed, device)
-    provenance = {**scene.provenance, KEY: {"ambient": ambient, "radiance": radiance}}
+    ambient, radiance = _explained(known, masks, seed, device)
+    provenance = {**scene.provenance, KEY: {"ambient": ambient, "radiance": radiance, "dim": dim}}
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     note = f"Taken for lights, {radiance:g} times as bright as the photo's white: the clipped regions around {places}."
     return warned(replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance), note)
+
+
+def is_edited(scene: Scene) -> bool:
+    """Whether a scene has edits that its photo and its re-rendering do not show."""
+    saved = [len(stage.get("edits", ())) for stage in scene.report.stages if stage.get("name") == "edit"]
+    return len(scene.provenance.get("edits", ())) > max(saved, default=0)
 
 
 def explained(scene: Scene, edited: Scene) -> Scene:
@@ -74,7 +99,8 @@ def explained(scene: Scene, edited: Scene) -> Scene:
 
 
 def _shining(scene: Scene, masks: list[Array], ambient: float, radiance: float) -> Scene:
-    lights = tuple(_patch(scene, mask, radiance, f"{NAME} {k}") for k, mask in enumerate(masks))
+    glow = max(radiance, DARK)
+    lights = tuple(_patch(scene, mask, glow, f"{NAME} {k}") for k, mask in enumerate(masks))
     return replace(scene, envmap=scene.envmap * np.float32(ambient), bodies=(*scene.bodies, *lights))
 
 
@@ -99,7 +125,9 @@ def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tupl
         factor = float(np.clip((weight**2 * rest * base).sum() / max((weight**2 * base**2).sum(), 1e-12), 0, 2))
         return factor, float((np.abs(rest - factor * base) * weight).mean())
 
-    found = {radiance: fitted(radiance) for radiance in RADIANCES}
+    # An HDR photo tells how bright its lights are.
+    tried = (float(photo[np.any(masks, 0)].mean()),) if scene.photo.hdr else RADIANCES
+    found = {radiance: fitted(radiance) for radiance in tried}
     best = min(error for _, error in found.values())
     chosen = max(radiance for radiance, (_, error) in found.items() if error <= WORSE * best)
     return found[chosen][0], chosen

@@ -57,6 +57,7 @@ class Preview:
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
         self._check(edited)
+        edited = self._seen(edited)
         light = self._light_for(edited)
         if light is None:
             return self._image(self._reshaded(edited), self._sky(edited.envmap))
@@ -84,6 +85,20 @@ class Preview:
     def _check(self, edited: Scene) -> None:
         if edited.geometry is not self.scene.geometry:
             raise InputError("The preview was built for another geometry; build one for this scene.")
+
+    def _seen(self, edited: Scene) -> Scene:
+        """The scene as it is shaded: lights of the photo that were dimmed are not shown, but their share of the light
+        comes from around, as the fit has it."""
+        from dataclasses import replace
+
+        from materialist.edit.glows import KEY
+
+        found = edited.provenance.get(KEY)
+        if not found or KEY in self.scene.provenance:
+            return edited
+        ambient, dim = float(found["ambient"]), float(found.get("dim", 1.0))
+        share = (ambient + max(1 - ambient, 0) * dim) / max(ambient, 1e-6)
+        return replace(edited, envmap=(edited.envmap * share).astype(np.float32))
 
     def _light_for(self, edited: Scene):
         """None for the fitted light; the `OtherLight` is kept until there is a third."""

@@ -175,7 +175,7 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
         options["sun"] = _numbers(given["sun"], 2, "sun")
     if "lamps" in given:
         options["lamps"] = [lamp(scene, *_numbers(one, 5, "lamp")) for one in _list_of(given["lamps"])]
-    return relight(edited, **options)
+    return relight(edited, **options, fitted=scene)
 
 
 def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -218,7 +218,7 @@ def _thing(step: Step) -> dict[str, Any]:
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return without(edited, _region(scene, step), **_removal(step))
+    return without(edited, _region(scene, step), **_removal(step), fitted=scene)
 
 
 def _removal(step: Step) -> dict[str, Any]:
@@ -238,7 +238,7 @@ def _removal(step: Step) -> dict[str, Any]:
 
 def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
     region, options = glass_arguments(scene, step)
-    return glass(edited, region, **options)
+    return glass(edited, region, **options, fitted=scene)
 
 
 def glass_arguments(scene: Scene, step: Step):

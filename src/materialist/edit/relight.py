@@ -34,6 +34,7 @@ def relight(
     sun_power: float = 1.0,
     ambient: float = 1.0,
     lamps: tuple[Lamp, ...] | list[Lamp] = (),
+    fitted: Scene | None = None,
 ) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of arguments.
 
@@ -47,6 +48,7 @@ def relight(
         sun_power: irradiance of the sun on a surface that faces it, relative to that of the light before.
         ambient: factor on the environment map (not on its new sun), 0 for lamps alone.
         lamps: glowing spheres to add; make them with `lamp`.
+        fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
 
     Raises:
         InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
@@ -57,7 +59,7 @@ def relight(
     if dim is not None:
         from materialist.edit.glows import dimmed
 
-        scene = dimmed(scene, dim)
+        scene = dimmed(scene, dim, fitted=fitted)
     light = scene.envmap
     if envmap is not None:
         light = checked_envmap(envmap) * _gain(gain, envmap, scene.envmap)

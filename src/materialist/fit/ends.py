@@ -119,10 +119,18 @@ class Search:
         """Where the walls end; None where no ends are clearly better than the usual ones."""
         usual = tuple(wall.usual for wall in self.walls)
         self.error(usual)
+        first = self._light
         self.tried.clear()  # the first light began from nothing; from now on all begin alike
         best = self.best(usual)
-        error, before = self.error(best), self.error(usual)
+        # Each search goes on from the light of the one before: what came late has the better light. Both once more.
+        error, before = (self._afresh(ends, first) for ends in (best, usual))
         return Found(best, error, before) if _clearly(error, before) else None
+
+    def _afresh(self, ends: tuple[Ends, ...], light: torch.Tensor | None) -> float:
+        """The error of ends whose search for a light begins from the given one."""
+        self.tried.pop(ends, None)
+        self._light = light
+        return self.error(ends)
 
     def best(self, usual: tuple[Ends, ...]) -> tuple[Ends, ...]:
         """The ends of least error that a descent from the usual ones, or from even ones, comes to."""

@@ -112,7 +112,9 @@ class TransportEngine:
     def _light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
-        rows = _subset(rng, len(self.cache.pixels), min(1.0, share))
+        count = len(self.cache.pixels)
+        # Of a speck before the sky, all pixels: a share of them may be none.
+        rows = _subset(rng, count, min(1.0, max(share, FEWEST / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
         matrix = light_matrix(self.cache, materials, rows, self.light_height)
         indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
@@ -192,6 +194,10 @@ class PathEngine:
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
     """[height, 2 height, 3] float32 numpy map from a torch map of any size."""
     return resize_envmap(envmap.detach(), height).contiguous().numpy().astype(np.float32)
+
+
+FEWEST = 256
+"""Surface pixels that the light is fitted to at least, where there are as many."""
 
 
 def _subset(rng, size: int, share: float) -> Array:

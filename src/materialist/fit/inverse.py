@@ -13,21 +13,24 @@ from materialist.color import linear_to_srgb
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.fields import EnvmapTexels
-from materialist.fit.light import envmap_field, fit_light
+from materialist.fit.light import envmap_field, fit_light, start_radiance
 from materialist.fit.loop import Progress
 from materialist.fit.losses import residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
+from materialist.io.photo import HDR_CLIP
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 
 STRICT_STEPS = 120
 """Steps of the light fit that measures how far the prior can be trusted."""
 MAX_TRUST = 100.0
+WHITE = 0.99
+"""Linear value from which a channel of a photo that is not HDR is taken for clipped."""
 
-Judge = Callable[[Materials, Array, int], Array]
-"""judge(materials, envmap, spp) -> path-traced [H, W, 3]."""
+Judge = Callable[[Materials, Array, int, int], Array]
+"""judge(materials, envmap, spp, seed) -> path-traced [H, W, 3]."""
 
 
 @dataclass
@@ -94,7 +97,7 @@ class Fit:
         """The stage in which that light is fitted."""
         strict = replace(self.settings.light, slack=None)
         problem = self.engine.light_problem(self.prior)
-        light = envmap_field(strict, seed=self.seed)
+        light = envmap_field(strict, seed=self.seed, start=start_radiance(self._photo()))
         result = fit_light(
             problem, self._photo(), light, strict, steps=STRICT_STEPS, seed=self.seed, progress=self.progress
         )
@@ -109,7 +112,7 @@ class Fit:
         """Fit the light with the materials of the prior: the light must not explain what later stages have baked in."""
         settings = self.settings.light
         problem = self.engine.light_problem(self.prior if round_ == 0 else self._slack_base(state))
-        light = envmap_field(settings, seed=self.seed)
+        light = envmap_field(settings, seed=self.seed, start=start_radiance(self._photo()))
         if round_ > 0 and isinstance(light, EnvmapTexels):
             with torch.no_grad():
                 light.log.copy_(state_log(state.envmap, settings.height))
@@ -117,7 +120,10 @@ class Fit:
         result = fit_light(problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress)
         state.stages.append(result.summary())
         state.envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
-        state.envmap = paste_visible_sky(state.envmap, self.photo.linear, self._surface(), self.photo.camera)
+        white = HDR_CLIP if self.photo.hdr else WHITE
+        state.envmap = paste_visible_sky(
+            state.envmap, self.photo.linear, self._surface(), self.photo.camera, white=white
+        )  # fmt: skip
 
     def _slack_base(self, state: FitState) -> Materials:
         """The prior's albedo with the roughness and metallic found so far."""
@@ -151,17 +157,17 @@ class Fit:
             state.stages += [r.summary() for r in results]
             state.maps = model().detach()
             if k < corrections:
-                correction = self._correction(state, problem.render)
+                correction = self._correction(state, problem.render, self.seed + 101 + k)
         if isinstance(self.engine, TransportEngine):
             self.engine.set_radiance(self._image(problem.render(state.maps)))
 
-    def _correction(self, state: FitState, render) -> torch.Tensor:
+    def _correction(self, state: FitState, render, seed: int) -> torch.Tensor:
         """[P, 3] ratio of the path-traced to the cached rendering, both smoothed along surfaces.
 
         A factor, not a difference: where the cache is too bright, a difference would leave nothing to optimise.
         """
         assert self.judge is not None
-        traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp)
+        traced = self.judge(self.materials(state), state.envmap, self.settings.correction_spp, seed)
         cached = self._image(render(state.maps))
         both = torch.from_numpy(np.concatenate([traced, cached], -1)).reshape(-1, 6)[self.engine.pixels]
         traced_smooth, cached_smooth = self._smooth(both, (1, 2)).split(3, -1)
@@ -186,6 +192,8 @@ class Fit:
         state.maps = neutral
         start._materials(state, stages=(MaterialStage(("roughness", "metallic"), schedule),))
         refined = replace(start, prior=self._as_materials(state.maps))
+        if isinstance(self.engine, TransportEngine):  # what the white map made surfaces send is not in the photo
+            self.engine.set_radiance(self.photo.linear)
         refined._light(state)
         refined._materials(state, stages=(MaterialStage(("albedo",), schedule),), corrections=self.settings.corrections)
         return state
@@ -232,10 +240,12 @@ def state_log(envmap: Array, height: int) -> torch.Tensor:
     return resize_envmap(torch.from_numpy(np.ascontiguousarray(envmap)), height).clamp_min(1e-6).log()
 
 
-def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camera) -> Array:
+def paste_visible_sky(
+    envmap: Array, photo: Array, surface: Array, camera: Camera, *, white: float = WHITE
+) -> Array:  # fmt: skip
     """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
 
-    Clipped photo pixels only raise a texel. surface: [H, W] bool.
+    Photo pixels from `white` on, which are clipped, only raise a texel. surface: [H, W] bool.
     """
     if surface.all():
         return envmap
@@ -248,7 +258,7 @@ def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camer
     r, c = np.where(inside, row, 0).astype(int), np.where(inside, col, 0).astype(int)
     seen = (inside & ~surface[r, c])[..., None]
     value = photo[r, c]
-    value = np.where(value >= 0.99, np.maximum(value, envmap), value)
+    value = np.where(value >= white, np.maximum(value, envmap), value)
     return np.where(seen, value, envmap).astype(np.float32)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import torch
 
+from materialist.fit.light import start_radiance
 from materialist.fit.losses import encode, residual
 from materialist.fit.settings import LightSettings
 
@@ -11,6 +12,8 @@ ROUNDS = 2
 """Reweightings towards the absolute error of encoded radiance,"""
 DESCENT = 30
 """and steps of projected gradients after each."""
+START = 0.5
+"""Radiance at which the light of a photo that is not dark begins."""
 RIDGE = 1e-3
 """Price of bright texels that hardly reach anything, relative to that of a mean texel's error."""
 SMALL = 0.02
@@ -34,7 +37,7 @@ def explained(
     """
     rest, photo = rest.T, photo.T  # [3, Q]
     if start is None:
-        start = torch.full(transport.shape[::2], 0.5)
+        start = torch.full(transport.shape[::2], start_radiance(photo, START))
     light = start
     for _ in range(ROUNDS):
         radiance = (transport @ light[..., None])[..., 0] + rest

@@ -15,16 +15,22 @@ from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, resid
 from materialist.fit.settings import LightSettings
 from materialist.transport.light import LightMatrix
 
-START_RADIANCE = 0.6
-"""Grey level at which plain texels start."""
+START_RADIANCE, START_ALBEDO = 0.6, 0.35
+"""Grey level at which plain texels start at most, and the reflectance by which a darker photo tells where: texels that
+hardly reach anything stay near it, and must not be brighter than what lights the photo."""
 SEEN = 0.5
 """Share of its light that must reach the scene for a texel to be free to differ from its neighbours."""
 STIFFEST = 3.0
 """Largest factor on the smoothness of texels that are hidden."""
 
 
-def envmap_field(settings: LightSettings, *, seed: int = 0) -> nn.Module:
-    """A fresh field of the kind the settings name."""
+def start_radiance(photo: torch.Tensor, most: float = START_RADIANCE) -> float:
+    """Where the light of a photo [..., 3] linear starts."""
+    return float(min(max(float(photo.mean()) / START_ALBEDO, 1e-3), most))
+
+
+def envmap_field(settings: LightSettings, *, seed: int = 0, start: float = START_RADIANCE) -> nn.Module:
+    """A fresh field of the kind the settings name; plain texels begin at `start`."""
     torch.manual_seed(seed)
     if settings.field == "mlp":
         return EnvmapMLP()
@@ -33,7 +39,7 @@ def envmap_field(settings: LightSettings, *, seed: int = 0) -> nn.Module:
     if settings.field == "sh":
         return EnvmapSH(3)
     if settings.field == "texels":
-        return EnvmapTexels(torch.full((settings.height, 2 * settings.height, 3), START_RADIANCE))
+        return EnvmapTexels(torch.full((settings.height, 2 * settings.height, 3), start))
     raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
 
 

@@ -29,7 +29,7 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
     """
-    angle = _option_fov(fov)
+    angle = option_fov(fov)
     if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= 8192:
         raise InputError(f"The working size must be a whole number of pixels from {MIN_SIDE} to 8192, not {size!r}.")
     name = str(path)
@@ -78,7 +78,7 @@ def decode_photo(file: Path) -> Decoded:
     return decoded
 
 
-def _option_fov(fov: float | str | None) -> float | None:
+def option_fov(fov: float | str | None) -> float | None:
     """The --fov option as degrees, or None for automatic."""
     if fov is None or fov == "auto":
         return None
