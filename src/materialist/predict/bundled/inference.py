@@ -31,7 +31,7 @@ MEDIAN_DEPTH = 3.0
 """Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
 DEPTH_SPAN = 50.0
 """Largest ratio of a depth to the median, either way."""
-SKY = (-1.0, -5.5)
+SKY = (-1.0, -5.0)
 """Logits of there being a surface below which a pixel is likely, and surely, sky."""
 DETAIL = 0.06
 """Difference (sRGB-encoded) to a picture as smooth as an environment map from which something stands before the sky."""
