@@ -142,8 +142,9 @@ def test_edits_before_do_not_change_what_is_found():
     floor = fit.normal[..., 1] > 0.5
     after = relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5, fitted=fit)
     before = edit(relight(fit, dim=0.5), floor, albedo=(0.05, 0.05, 0.05))
-    assert after.provenance[KEY] == before.provenance[KEY]
-    np.testing.assert_array_equal(after.envmap, before.envmap)
+    # Threads add up paths in another order each time.
+    assert after.provenance[KEY] == pytest.approx(before.provenance[KEY], rel=1e-6)
+    np.testing.assert_allclose(after.envmap, before.envmap, rtol=1e-5)
     assert after.bodies[0].surface.emission == before.bodies[0].surface.emission
     with pytest.raises(InputError, match="fitted="):
         relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5)
