@@ -122,6 +122,13 @@ def test_each_correction_has_noise_of_its_own(room):
     assert len(set(seeds)) == len(seeds) == 2
 
 
+def test_the_light_after_a_white_one_is_fitted_to_what_the_photo_sends(room, monkeypatch):
+    sent, light = [], Fit._light
+    monkeypatch.setattr(Fit, "_light", lambda fit, *a: sent.append(fit.engine.radiance) or light(fit, *a))
+    room.fit(short(DEFAULT, 2), strategy="white-light-first").run()
+    assert len(sent) == 1 and sent[0] is room.photo.linear
+
+
 def test_a_speck_of_surface_is_fitted(room):
     """A share of a dozen pixels would be none of them."""
     from materialist.geometry.build import build_geometry

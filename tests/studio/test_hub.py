@@ -22,6 +22,7 @@ def shared(tmp_path):
 
 def test_a_page_shows_what_it_showed_before_or_what_the_studio_was_started_on(shared):
     mine, given = shared.work.new("Mine", "a" * 16), shared.work.new("Given", ALONE)
+    assert shared.here(shared.kept(mine)) and not shared.here("other/" + mine.name) and not shared.here("")
     assert shared.first("") == "" and shared.first(None) == "" and shared.first(shared.kept(mine)) == mine.name
     shared.start = given
     assert shared.first("") == given.name and shared.first(shared.kept(mine)) == mine.name

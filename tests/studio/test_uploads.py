@@ -56,6 +56,18 @@ def test_sizes_of_other_headers(tmp_path):
         uploads.checked_picture(tmp_path / "a.hdr", "a.hdr")
 
 
+def test_the_size_of_a_float_tiff(tmp_path):
+    """Pillow does not know its pixels, and `invert` reads it."""
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "a.tif"), np.full((20, 30, 3), 0.5, np.float32))
+    assert uploads.header_size(tmp_path / "a.tif", "a.tif") == (30, 20)
+    assert uploads.checked_picture(tmp_path / "a.tif", "a.tif") == ".tif"
+    (tmp_path / "b.tif").write_bytes((tmp_path / "a.tif").read_bytes()[:6])
+    with pytest.raises(InputError, match="not an image"):
+        uploads.header_size(tmp_path / "b.tif", "b.tif")
+
+
 def test_too_many_bytes(tmp_path, monkeypatch):
     monkeypatch.setattr(uploads, "MAX_MEGABYTES", 0.001)
     file = tmp_path / "a.png"

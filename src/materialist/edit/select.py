@@ -80,11 +80,9 @@ def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | 
 
     small, scale = _smaller(scene)
     seeds = [(int(x * scale), int(y * scale)) for x, y in points]
-    whole = share
-    if share is not None:
-        share = np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
-    rough = object_around(small, seeds, share)
-    return refined(scene, _larger(rough, scene), points, None if share is None else whole)
+    shrunk = None if share is None else np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
+    rough = object_around(small, seeds, shrunk)
+    return refined(scene, _larger(rough, scene), points, share)
 
 
 def from_box(scene: Scene, box: tuple[int, int, int, int]) -> Array:

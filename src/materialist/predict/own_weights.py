@@ -21,14 +21,19 @@ def save(path: Path, network: Any, kind: str, facts: dict[str, Any]) -> None:
 
     kind: what the file calls itself; another number is another network.
     """
+    own = {k: v for k, v in network.state_dict().items() if not k.startswith(PREFIX)}
+    architecture = json.dumps(network.architecture.as_dict())
+    write(path, own, {"format": kind, "architecture": architecture, "facts": json.dumps(facts)})
+
+
+def write(path: Path, tensors: dict[str, Any], texts: dict[str, str]) -> None:
+    """Write tensors as float16, with `texts` in the header, whole or not at all."""
     import torch
     from safetensors.torch import save_file
 
-    own = {k: v for k, v in network.state_dict().items() if not k.startswith(PREFIX)}
-    tensors = {k: v.detach().cpu().to(torch.float16).contiguous() for k, v in own.items()}
-    architecture = json.dumps(network.architecture.as_dict())
+    half = {name: tensor.detach().cpu().to(torch.float16).contiguous() for name, tensor in tensors.items()}
     partial = path.with_name(path.name + ".part")
-    save_file(tensors, str(partial), {"format": kind, "architecture": architecture, "facts": json.dumps(facts)})
+    save_file(half, str(partial), texts)
     partial.replace(path)
 
 

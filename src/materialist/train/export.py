@@ -10,6 +10,7 @@ from materialist.errors import InputError, OutputError
 from materialist.predict.bundled.network import Architecture, BundledNetwork
 from materialist.predict.bundled.weights import save
 from materialist.predict.matnet.predictor import FORMAT
+from materialist.predict.own_weights import write
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint
 from materialist.train.trainer import SCORES
@@ -38,7 +39,7 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
     }
     try:
         if state["recipe"]["task"] == "paper":
-            _save_matnet(output, tensors, facts)
+            write(output, tensors, {"format": FORMAT, "facts": json.dumps(facts)})
         else:
             network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
             network.load_state_dict(tensors)
@@ -51,14 +52,3 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "megabytes": output.stat().st_size / 1e6,
         "hash": sha256(output)[:16],
     }
-
-
-def _save_matnet(path: Path, tensors: dict[str, Any], facts: dict[str, Any]) -> None:
-    """MatNet's tensors under the names of the published checkpoint, whole or not at all."""
-    import torch
-    from safetensors.torch import save_file
-
-    half = {name: t.detach().cpu().to(torch.float16).contiguous() for name, t in tensors.items()}
-    partial = path.with_name(path.name + ".part")
-    save_file(half, str(partial), {"format": FORMAT, "facts": json.dumps(facts)})
-    partial.replace(path)
