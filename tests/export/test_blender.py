@@ -42,7 +42,10 @@ def test_the_folder_holds_what_the_script_reads(tmp_path):
     ast.parse(script)
     facts = json.loads((folder / "scene.json").read_text())
     assert (facts["width"], facts["height"], facts["fov"]) == (64, 40, 50.0)
-    assert list(facts["parts"]) == ["surface", "plane0", "plane1"] and facts["parts"]["surface"] is None
+    assert list(facts["parts"]) == ["surface", "plane0", "plane1"] and facts["parts"]["surface"] == {
+        "maps": "",
+        "repeat": False,
+    }
     with np.load(folder / "meshes.npz") as arrays:
         assert arrays["surface_uv"].shape[1] == 2 and arrays["plane1_faces"].shape[1] == 3
     np.testing.assert_array_equal(read_exr(folder / "albedo.exr"), room().materials.albedo)
@@ -113,3 +116,39 @@ def test_cycles_has_our_lamps_and_glow(tmp_path):
     assert abs(float(np.median(ratio)) - 1) < 0.03
     bright = np.argwhere(ours.max(-1) > 5)  # the lamp itself
     assert len(bright) > 10 and np.median(theirs.max(-1)[tuple(bright.T)]) > 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["texture", "glass", "rough glass", "coat"])
+def test_cycles_has_our_bodies(tmp_path, kind):
+    if not shutil.which(BPY):
+        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
+    from dataclasses import replace
+
+    import trimesh
+    from test_bodies import CHECKS
+
+    from materialist.edit.lights import rendered
+    from materialist.edit.mesh_material import constant
+    from materialist.types import Body
+
+    surface = {
+        "texture": CHECKS, "glass": constant(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
+        "rough glass": constant(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),
+        "coat": constant(0.3, 0.3, 0.0, transmission=0.6, ior=1.3),
+    }[kind]  # fmt: skip
+    ball = trimesh.creation.icosphere(4, 0.5)
+    ways = np.asarray(ball.vertices / 0.5, np.float32)
+    uv = np.stack([ways[:, 0] * 0.7 + 1.3, 0.4 - ways[:, 1] * 0.7], 1).astype(np.float32)
+    vertices = (ways * 0.5 + [0.1, 0, -2.2]).astype(np.float32)
+    body = Body(vertices, np.asarray(ball.faces, np.int32), ways, uv, surface, "ball")
+    scene = replace(room(), bodies=(body,))
+    folder = mt.export(scene, tmp_path / "out", to="blend").path
+    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
+    subprocess.run([*command, "--samples", "512"], check=True, capture_output=True)
+    ours, theirs = rendered(scene, spp=512, seed=0), read_exr(tmp_path / "r.exr")[..., :3]
+    y, x = np.indices(ours.shape[:2])
+    inside = (x - 34.9) ** 2 + (y - 19.5) ** 2 < 14**2
+    np.testing.assert_allclose(theirs[inside].mean(0), ours[inside].mean(0), rtol=0.04)
+    blurred = [np.stack([x[k : 40 - 5 + k : 5] for k in range(5)]).mean(0) for x in (ours, theirs)]  # rows, five each
+    assert np.corrcoef(blurred[0].ravel(), blurred[1].ravel())[0, 1] > 0.97

@@ -13,6 +13,7 @@ from materialist.export import body_parts
 from materialist.export.glb import glb_bytes
 from materialist.export.parts import scene_parts
 from materialist.export.run import export
+from materialist.io.exr import read_exr
 from materialist.types import Body, Lamp, Scene, Surface
 
 
@@ -93,19 +94,61 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     np.testing.assert_allclose(picture.mean((0, 1)), expected.mean((0, 1)), rtol=0.03)
 
 
-def test_formats_without_textures_say_so(tmp_path):
-    done = export(with_bodies(CHECKS), tmp_path / "folder", to="blend")
-    assert any("without textures;" in note for note in done.notes)
-    facts = json.loads((tmp_path / "folder" / "scene.json").read_text())
-    np.testing.assert_allclose(facts["parts"]["body0"]["albedo"], CHECKS.albedo.mean((0, 1)), atol=1e-6)
-    done = export(with_bodies(GLOW), tmp_path / "plain", to="blend")
-    assert not any("inserted bodies without" in note for note in done.notes)
-    facts = json.loads((tmp_path / "plain" / "scene.json").read_text())
-    assert facts["parts"]["body0"]["emission"] == [3.0, 1.5, 0.75]
-    done = export(with_bodies(GLOW, GLASS), tmp_path / "a.html")
-    assert any("without glass and glow;" in note for note in done.notes)
+def test_what_a_format_does_not_show_is_told(tmp_path):
+    scene = with_bodies(GLOW, GLASS, CHECKS)
+    for to in ("blend", "mitsuba"):
+        assert not any("shows bodies without" in note for note in export(scene, tmp_path / to, to=to).notes)
+    notes = export(scene, tmp_path / "a.html").notes
+    assert any("without textures but for their colours at the vertices and glass and glow;" in note for note in notes)
     mixed = with_bodies(constant(0.2, 0.1, 0.0, transmission=0.9))
     assert any("transmission is below 1" in note for note in export(mixed, tmp_path / "m", to="mitsuba").notes)
+
+
+def test_blender_gets_textures_glass_and_glow(tmp_path):
+    """What Cycles makes of them: test_blender.py."""
+    coat = constant(0.2, 0.01, 0.0, transmission=0.9, tint=(0.25, 1.0, 0.81))
+    folder = export(with_bodies(GLOW, coat, CHECKS), tmp_path / "folder", to="blend").path
+    facts = json.loads((folder / "scene.json").read_text())
+    parts = facts["parts"]
+    assert parts["body0"]["emission"] == [3.0, 1.5, 0.75] and "glass" not in parts["body0"]
+    assert parts["body1"]["glass"] == {
+        "share": 0.9, "ior": 1.5, "roughness": 0.0, "tint": [0.25, 1.0, 0.81],
+    }  # fmt: skip
+    assert parts["surface"] == {"maps": "", "repeat": False} and parts["body2"] == {"maps": "body2_", "repeat": True}
+    np.testing.assert_array_equal(read_exr(folder / "body2_albedo.exr"), CHECKS.albedo)
+    assert facts["bounces"] == 14
+    plain = export(with_bodies(CHECKS), tmp_path / "plain", to="blend").path
+    assert json.loads((plain / "scene.json").read_text())["bounces"] == 2
+
+
+def test_usd_gets_textures_and_says_that_nothing_refracts(tmp_path):
+    pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+    from PIL import Image
+    from pxr import Usd, UsdShade
+
+    done = export(with_bodies(CHECKS, GLASS), tmp_path / "usd", to="usd")
+    assert any("without refraction and tint of glass;" in note for note in done.notes)
+    np.testing.assert_array_equal(
+        np.asarray(Image.open(tmp_path / "usd" / "body0_base_color.png")), CHECKS.albedo * 255
+    )
+    stage = Usd.Stage.Open(str(done.path))
+    texture = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/base_color"))
+    assert (
+        texture.GetInput("file").Get().path == "./body0_base_color.png" and texture.GetInput("wrapS").Get() == "repeat"
+    )
+    own = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/surface/base_color"))
+    assert own.GetInput("file").Get().path == "./base_color.png" and own.GetInput("wrapS").Get() == "clamp"
+    glass = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body1/surface"))
+    assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(1.4)
+
+
+def test_the_page_has_a_texture_s_colours_at_the_vertices():
+    from materialist.export.page import _vertices
+
+    (part,) = body_parts.body_parts(with_bodies(CHECKS))
+    inside = replace(part.mesh, uv=np.float32([[0.25, 0.25], [0.75, 0.25], [1.25, -0.25], [0.75, 0.75]]))
+    colours = _vertices(replace(part, mesh=inside))["colour"]
+    np.testing.assert_array_equal(colours / 255, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]])
 
 
 LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)

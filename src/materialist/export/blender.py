@@ -21,6 +21,8 @@ from materialist.export.run import Exported
 from materialist.export.target import ensure_free, whole_files, whole_folder
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
+from materialist.render.bodies import SMOOTH, is_glowing, is_transparent
+from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
 from materialist.types import Scene
 
 _MINUTES = 20
@@ -59,14 +61,15 @@ def export_blend(
 
 def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     """Fill an empty folder with `build.py` and what it reads: meshes, float32 maps, light, photo, camera."""
-    surface, arrays = parts[0], {}
+    arrays = {}
     for part in parts:
         mesh = part.mesh
         for key in ("vertices", "normals", "uv", "faces"):
             arrays[f"{part.name}_{key}"] = getattr(mesh, key)
+        if not part.constant:
+            for key in ("albedo", "roughness", "metallic"):
+                write_exr(folder / f"{_prefix(part)}{key}.exr", getattr(part.materials, key))
     np.savez_compressed(folder / "meshes.npz", **arrays)  # type: ignore[arg-type]
-    for key in ("albedo", "roughness", "metallic"):
-        write_exr(folder / f"{key}.exr", getattr(surface.materials, key))
     write_exr(folder / "envmap.exr", scene.envmap)
     write_png(folder / "photo.png", scene.photo.original)
     reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
@@ -74,7 +77,8 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     facts = {
         "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,
         "photo_width": native[1], "photo_height": native[0],
-        "parts": {part.name: _constants(part) for part in parts},
+        "parts": {part.name: _look(part) for part in parts},
+        "bounces": (GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH) - 2,
         "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(in_photo(scene)))],
         "lamps": [asdict(lamp) for lamp in scene.lamps],
     }  # fmt: skip
@@ -82,15 +86,30 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")
 
 
-def _constants(part: Part) -> dict | None:
-    if not part.constant:
-        return None
-    m = part.materials
-    emission = (0.0, 0.0, 0.0) if part.surface is None else part.surface.emission
-    return {
-        "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]), "metallic": float(m.metallic[0, 0]),
-        "emission": [float(c) for c in emission],
-    }  # fmt: skip
+def _prefix(part: Part) -> str:
+    """What the names of a part's maps begin with."""
+    return "" if part.surface is None else f"{part.name}_"
+
+
+def _look(part: Part) -> dict:
+    """The material of a part, for `build.py`: its maps or three constants, and for a body what it has beyond them."""
+    m, surface = part.materials, part.surface
+    look: dict = {"maps": _prefix(part), "repeat": surface is not None}
+    if part.constant:
+        look = {
+            "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]),
+            "metallic": float(m.metallic[0, 0]),
+        }  # fmt: skip
+    if surface is not None and is_glowing(surface):
+        look["emission"] = [float(c) for c in surface.emission]
+    if surface is not None and is_transparent(surface):
+        roughness = float(surface.roughness.mean())
+        look["glass"] = {
+            "share": float(surface.transmission), "ior": max(float(surface.ior), 1.0001),
+            "roughness": 0.0 if roughness < SMOOTH else roughness,
+            "tint": [float(c) for c in surface.tint],
+        }  # fmt: skip
+    return look
 
 
 def _find_blender(named: str | None) -> list[str] | None:

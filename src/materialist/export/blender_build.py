@@ -36,7 +36,7 @@ def main() -> None:
     add_camera(scene, facts)
     add_light(scene)
     add_lamps(scene, facts)
-    set_rendering(scene, options.samples)
+    set_rendering(scene, options.samples, facts["bounces"])
     if options.shadow_catcher:
         catch_shadows(scene, facts)
     bpy.ops.file.pack_all()
@@ -71,8 +71,8 @@ def add_meshes(scene, facts, additive) -> None:
             collection.objects.link(bpy.data.objects.new(name, mesh))
 
 
-def material(name, constants, additive):
-    """Material of a part: from its maps, or with `constants` (albedo, roughness, metallic, emission) if it has any."""
+def material(name, look, additive):
+    """Material of a part: its maps, or constants; glass over them, and what it gives off."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
@@ -80,21 +80,23 @@ def material(name, constants, additive):
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (600, 0)
     result, slots = (add_lobes if additive else add_principled)(nodes, links)
-    if constants and max(constants["emission"]) > 0:
+    if "glass" in look:
+        result = add_glass(nodes, links, look["glass"], result)
+    if "emission" in look:
         glow, both = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
-        glow.inputs["Color"].default_value = (*constants["emission"], 1)
+        glow.inputs["Color"].default_value = (*look["emission"], 1)
         glow.inputs["Strength"].default_value = 1
         links.new(result, both.inputs[0])
         links.new(glow.outputs["Emission"], both.inputs[1])
         both.location, result = (450, 0), both.outputs["Shader"]
     links.new(result, output.inputs["Surface"])
     for row, (key, sockets) in enumerate(slots.items()):
-        source = None if constants else add_texture(nodes, key, (-700, 300 - 300 * row))
+        source = add_texture(nodes, look, key, (-700, 300 - 300 * row)) if "maps" in look else None
         for socket in sockets:
             if source is not None:
                 links.new(source, socket)
             else:
-                socket.default_value = (*constants[key], 1) if key == "albedo" else constants[key]
+                socket.default_value = (*look[key], 1) if key == "albedo" else look[key]
     return made
 
 
@@ -137,12 +139,38 @@ def add_lobes(nodes, links):
     return both.outputs["Shader"], {"albedo": colours, "metallic": shares, "roughness": [specular.inputs["Roughness"]]}
 
 
-def add_texture(nodes, key, location):
-    """The output of a map looked up without filtering: neighbouring pixels may lie on different surfaces."""
+def add_glass(nodes, links, glass, opaque):
+    """A dielectric interface in place of `share` of the opaque one; light that has entered meets it alone.
+
+    Principled shares the tint between the ways in and out, as we do, and reflects white.
+    """
+    interface = nodes.new("ShaderNodeBsdfPrincipled")
+    interface.distribution = "GGX"
+    values = {"Base Color": (*glass["tint"], 1), "Roughness": glass["roughness"], "IOR": glass["ior"]}
+    for slot, value in {**values, "Transmission Weight": 1, "Metallic": 0}.items():
+        interface.inputs[slot].default_value = value
+    interface.location = (0, -300)
+    if glass["share"] >= 1:
+        return interface.outputs[0]
+    side, share, mixed = (nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "Math", "MixShader"))
+    share.operation = "MAXIMUM"
+    share.inputs[1].default_value = glass["share"]
+    links.new(side.outputs["Backfacing"], share.inputs[0])
+    links.new(share.outputs[0], mixed.inputs[0])
+    links.new(opaque, mixed.inputs[1])
+    links.new(interface.outputs[0], mixed.inputs[2])
+    for column, node in enumerate((side, share)):
+        node.location = (200 * column, 300)
+    mixed.location = (400, 0)
+    return mixed.outputs[0]
+
+
+def add_texture(nodes, look, key, location):
+    """The output of a map. The photo's are looked up without filtering: neighbours may lie on different surfaces."""
     texture = nodes.new("ShaderNodeTexImage")
     texture.location = location
-    texture.image = image(f"{key}.exr", "Linear Rec.709" if key == "albedo" else "Non-Color")
-    texture.interpolation, texture.extension = "Closest", "EXTEND"
+    texture.image = image(f"{look['maps']}{key}.exr", "Linear Rec.709" if key == "albedo" else "Non-Color")
+    texture.interpolation, texture.extension = ("Linear", "REPEAT") if look["repeat"] else ("Closest", "EXTEND")
     return texture.outputs["Color"]
 
 
@@ -207,13 +235,14 @@ def add_lamps(scene, facts) -> None:
         scene.collection.objects.link(placed)
 
 
-def set_rendering(scene, samples) -> None:
-    """Cycles as the scene was fitted: light by way of up to three surfaces, a box filter, plain sRGB."""
+def set_rendering(scene, samples, bounces) -> None:
+    """Cycles as our renderer: light by way of up to three surfaces (more with glass), a box filter, plain sRGB."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = samples, False, False
     cycles.pixel_filter_type = "BOX"
-    cycles.diffuse_bounces = cycles.glossy_bounces = 2
+    cycles.diffuse_bounces = cycles.glossy_bounces = bounces
+    cycles.max_bounces = cycles.transmission_bounces = max(12, bounces)
     cycles.sample_clamp_indirect = cycles.blur_glossy = 0
     scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
 

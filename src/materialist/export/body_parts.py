@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from materialist.export.parts import Part
 from materialist.types import Array, Body, Materials, Mesh, Scene, Surface
-
-TEXTURED = ("glb", "mitsuba")
-"""Formats that carry the textures and the glass of bodies."""
 
 
 def body_parts(scene: Scene) -> list[Part]:
@@ -18,21 +13,16 @@ def body_parts(scene: Scene) -> list[Part]:
     return [_part(f"body{k}", body) for k, body in enumerate(scene.bodies)]
 
 
-def plain(part: Part) -> Part:
-    """The part with the means of its maps, for formats that give textures to the depth surface alone."""
-    m = part.materials
-    mean = Materials(
-        m.albedo.mean((0, 1), keepdims=True), m.roughness.mean(keepdims=True), m.metallic.mean(keepdims=True)
-    )
-    return replace(part, materials=mean)
-
-
 def left_out(parts: list[Part], to: str) -> list[str]:
-    """What of bodies a format without their textures does not show."""
+    """What a format does not show of bodies, as phrases."""
     surfaces = [part.surface for part in parts if part.surface is not None]
-    names = ["textures"] * any(not part.constant for part in parts)
-    names += ["glass"] * any(s.transmission > 0 for s in surfaces)
-    return names + ["glow"] * (to == "html" and any(max(s.emission) > 0 for s in surfaces))
+    clear = any(s.transmission > 0 for s in surfaces)
+    if to == "usd":
+        return ["refraction and tint of glass"] * clear
+    if to != "html":
+        return []
+    names = ["textures but for their colours at the vertices"] * any(not part.constant for part in parts)
+    return names + ["glass"] * clear + ["glow"] * any(max(s.emission) > 0 for s in surfaces)
 
 
 def in_photo(scene: Scene) -> int:

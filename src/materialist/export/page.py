@@ -142,14 +142,18 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
 
 
 def _vertices(part: Part) -> Array:
-    """[V] records of one part; a constant part has its colour in them."""
+    """[V] records of one part; in those of a body, or of a constant part, is the colour."""
     mesh = part.mesh
     made = np.zeros(len(mesh.vertices), _VERTEX)
     made["position"] = mesh.vertices
     made["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
     made["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
-    if part.constant:
-        made["colour"] = (*to_bytes(linear_to_srgb(part.materials.albedo[0, 0])), 255)
+    if part.constant or part.surface is not None:
+        albedo = part.materials.albedo  # of a body it repeats
+        height, width = albedo.shape[:2]
+        column, row = np.floor(mesh.uv * (width, height)).astype(int).T
+        made["colour"][:, :3] = to_bytes(linear_to_srgb(albedo[row % height, column % width]))
+        made["colour"][:, 3] = 255
     return made
 
 

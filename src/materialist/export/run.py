@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from materialist.errors import InputError
-from materialist.export.body_parts import TEXTURED, body_parts, left_out, plain
+from materialist.export.body_parts import body_parts, left_out
 from materialist.export.parts import Part, scene_parts
 from materialist.types import Scene
 
@@ -67,13 +67,13 @@ def export(
         max_triangles = PAGE_TRIANGLES
     bodies = body_parts(scene)
     note: tuple[str, ...] = ()
-    if to not in TEXTURED and (names := left_out(bodies, to)):
-        note = (f"{to} shows inserted bodies without {' and '.join(names)}; glb and mitsuba have all of it.",)
+    if names := left_out(bodies, to):
+        note = (f"{to} shows bodies without {' and '.join(names)}; glb, blend and mitsuba have all of it.",)
     if scene.lamps and to == "html":
         note = (*note, f"html has none of the scene's {len(scene.lamps)} lamps; the other formats have.")
     if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
         note = (*note, f"Mitsuba has no {COATED}.")
-    parts = [*scene_parts(scene, max_triangles), *(bodies if to in TEXTURED else map(plain, bodies))]
+    parts = [*scene_parts(scene, max_triangles), *bodies]
     if to != "blend":
         made = _writer(to)(path, scene, parts, force)
         return replace(made, notes=(*made.notes, *note))

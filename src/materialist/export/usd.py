@@ -97,11 +97,15 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     if part.surface is not None and max(part.surface.emission) > 0:
         glow = surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
         glow.Set(tuple(float(c) for c in part.surface.emission))
+    if part.surface is not None and part.surface.transmission > 0:
+        surface.GetInput("ior").Set(float(part.surface.ior))
+        surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(1 - float(part.surface.transmission))
     if part.constant:
         color.Set(tuple(float(c) for c in m.albedo[0, 0]))
         roughness.Set(float(m.roughness[0, 0]))
         metallic.Set(float(m.metallic[0, 0]))
         return material
+    prefix, wrap = ("", "clamp") if part.surface is None else (f"{part.name}_", "repeat")
     reader = UsdShade.Shader.Define(stage, f"{path}/st")
     reader.CreateIdAttr("UsdPrimvarReader_float2")
     reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
@@ -110,13 +114,14 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
         (roughness, "roughness", to_bytes(m.roughness), "raw", "r"),
         (metallic, "metallic", to_bytes(m.metallic), "raw", "r"),
     ):
-        (folder / f"{name}.png").write_bytes(png(pixels))
+        file = f"{prefix}{name}.png"
+        (folder / file).write_bytes(png(pixels))
         texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
         texture.CreateIdAttr("UsdUVTexture")
-        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{name}.png")
+        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{file}")
         texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
         for axis in ("wrapS", "wrapT"):
-            texture.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("clamp")
+            texture.CreateInput(axis, Sdf.ValueTypeNames.Token).Set(wrap)
         st = texture.CreateInput("st", Sdf.ValueTypeNames.Float2)
         st.ConnectToSource(reader.ConnectableAPI(), "result")
         socket.ConnectToSource(texture.ConnectableAPI(), output)
