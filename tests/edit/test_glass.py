@@ -250,3 +250,11 @@ def test_a_ball_alone_before_the_sky():
     scene, number, _ = balls(((0.0, -0.1, -3), 0.4), sky=True)
     with pytest.raises(InputError, match="around the mask is sky"):
         glass(scene, number == 0)
+
+
+def test_the_papers_glass_without_transmission_is_the_photo():
+    scene = rendered_scene()
+    options = {"model": "two-interface", "thickness": "symmetry"}
+    shown = {t: glass(scene, MASK, transmission=t, **options).photo.linear for t in (0.0, 0.5, 1.0)}
+    np.testing.assert_allclose(shown[0.0][MASK], scene.photo.linear[MASK], atol=1e-6)
+    np.testing.assert_allclose(shown[0.5][MASK], (shown[0.0] + shown[1.0])[MASK] / 2, atol=1e-6)

@@ -159,3 +159,22 @@ def test_a_body_looks_as_in_the_plain_rendering(box):
     plain = studio.twins(edited)[1](256, 3)
     inside = body.share > 0.999
     np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)
+
+
+def test_what_stands_where_something_was_removed_or_glows_has_its_own_outline(box):
+    """Only what the photo shows has the photo's outline: its lights, and its glass."""
+    from edit_scenes import block_mask, rendered_scene
+
+    from materialist.edit.background import without
+    from materialist.edit.glass import glass
+    from materialist.edit.portrait import free_bodies
+
+    scene = rendered_scene()
+    mask = block_mask(36, 48)
+    assert free_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
+    gone = without(scene, mask)
+    there = insert(gone, box, (18.0, 20.0), scale=2)
+    assert free_bodies(scene, there) == ["body0"]
+    (body,) = there.bodies
+    lamp = replace(body, surface=replace(body.surface, emission=(5.0, 5.0, 5.0)))
+    assert free_bodies(scene, replace(there, bodies=(lamp,))) == ["body0"]

@@ -143,6 +143,9 @@ def test_envmap_files(tmp_path):
     write_exr(tmp_path / "sky.exr", spot(32))
     np.testing.assert_array_equal(read_envmap(tmp_path / "sky.exr"), spot(32))
     assert read_envmap(tmp_path / "sky.exr", rows=16).shape == (16, 32, 3)
+    film = np.concatenate([spot(32), np.zeros((32, 64, 1), np.float32)], -1)  # as renderers write a world's picture
+    write_exr(tmp_path / "film.exr", film)
+    np.testing.assert_array_equal(read_envmap(tmp_path / "film.exr"), spot(32))
     write_exr(tmp_path / "square.exr", np.ones((32, 32, 3), np.float32))
     with pytest.raises(InputError, match="twice as wide"):
         read_envmap(tmp_path / "square.exr")

@@ -96,3 +96,12 @@ def test_a_lopsided_mask_is_none():
     handle = mask | ((np.hypot(rows - 55, columns - np.flatnonzero(mask[55]).max()) < 14) & (depth >= 0))
     depth = np.where(handle & ~mask, np.median(depth[mask]), depth)
     assert outlined(depth, normal, handle, CAMERA, up=UP) is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_line_of_pixels_is_none():
+    depth, normal, mask, _ = seen_badly(vase())
+    for kept in (np.s_[55:56, :], np.s_[:, 60:61]):
+        line = np.zeros_like(mask)
+        line[kept] = mask[kept]
+        assert line.any() and outlined(np.where(line, depth, 0), normal, line, CAMERA, up=UP) is None

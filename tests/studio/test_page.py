@@ -249,3 +249,21 @@ def test_the_whole_story(page, running, tmp_path):
     download.value.save_as(tmp_path / "a.png")
     picture = np.asarray(Image.open(tmp_path / "a.png"))
     assert picture.shape[:2] == (100, 150)
+
+
+@pytest.mark.slow
+def test_every_tab_opens_without_a_scene(browser, tmp_path):
+    process, address = start(tmp_path / "work")
+    try:
+        page = browser.new_context(viewport={"width": 1280, "height": 1000}).new_page()
+        errors = []
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(address)
+        for name in ("Material", "Light", "Objects", "Take away", "Look", "Open"):
+            page.get_by_role("tab", name=name).click()
+            page.wait_for_timeout(700)
+            assert not page.locator(".toast-wrap .error, .toast-body.error").count(), name
+        assert not errors
+    finally:
+        process.terminate()
+        process.wait(20)

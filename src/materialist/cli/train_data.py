@@ -41,13 +41,16 @@ def data(
     sheet: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="With --sheet: replace PNG when it exists.")] = False,
     device: DeviceOption = Device.auto,
     as_json: Json = False,
 ) -> None:
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
     if sheet is not None:
+        from materialist.io.image import ensure_image_writable
         from materialist.train.data.sheet import write_sheet
 
+        ensure_image_writable(sheet, force=force)
         shown = write_sheet(output, sheet, seed=seed)
         report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return

@@ -27,6 +27,7 @@ SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
 IOR = (1.0, 3.0)
+NAME = "photo glass"
 
 
 def glass(
@@ -77,7 +78,7 @@ def glass(
         surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
         shells = [_shell(scene, removed, part, found, hollow, smooth) for part, found in each]
         shell = joined(shells)
-        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, "glass")
+        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, NAME)
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *_unlike(each, shells, hollow))
     methods = list(dict.fromkeys(found.method for _, found in each))
     what = {
@@ -138,11 +139,14 @@ def _two_interface(
         own |= seen
     depth, solid, normal, back = maps
     picture = two_interface(
-        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap, back=back, **look,
+        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap, back=back,
+        **{**look, "transmission": 1.0},
     )  # fmt: skip
     photo = removed.photo
     if look["transmission"] < 1:
-        picture = picture + (1 - look["transmission"]) * scene.photo.linear * own[..., None]
+        # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.
+        clear = look["transmission"]
+        picture = clear * picture + (1 - clear) * scene.photo.linear * own[..., None]
     linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
     share = np.clip(resized(own.astype(np.float32), native), 0, 1)[..., None]

@@ -90,7 +90,7 @@ class Studio:
         from materialist.edit.portrait import free_bodies, portrait
         from materialist.render.scene import MAX_DEPTH
 
-        names = free_bodies(self.scene, edited, lambda names: self._seen(edited, names))
+        names = free_bodies(self.scene, edited)
         if not names:
             return None
         depth = _path_depth(edited) or MAX_DEPTH

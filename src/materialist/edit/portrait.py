@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.edit import glass, glows
 from materialist.types import Array, Scene
 
 MOST = 1_500_000
@@ -33,24 +34,13 @@ class Portrait:
     """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
-def free_bodies(scene: Scene, edited: Scene, seen) -> list[str]:
-    """Names of the shapes of bodies that `edited` has and `scene` has not, and that stand before the photo's surface.
+def free_bodies(scene: Scene, edited: Scene) -> list[str]:
+    """Names of the shapes of bodies that `edited` has and `scene` has not, and whose outline is not in the photo.
 
-    A body that takes the place of a surface (its depth was changed) belongs to the photo's own silhouette instead.
-    `seen(names)` gives the [H, W] share of pixels that bodies of the edited scene cover.
+    The photo's own lights and what is turned to glass in it have the outline that the photo shows.
     """
-    taken = scene.depth != edited.depth
     new = {f"body{k}": body for k, body in enumerate(edited.bodies) if body not in scene.bodies}
-    # What glows in the photo's own surface has its outline in the photo.
-    names = [name for name, body in new.items() if max(body.surface.emission) <= 0]
-    if not taken.any():
-        return names
-    free = []
-    for name in names:
-        share = seen([name])
-        if not share[taken].sum() > 0.5 * share.sum():
-            free.append(name)
-    return free
+    return [name for name, body in new.items() if not body.name.startswith((glows.NAME, glass.NAME))]
 
 
 def portrait(

@@ -179,6 +179,8 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
     far = float(np.linalg.norm(axis.foot))
     pixel = far / camera.focal
     rows, columns = np.nonzero(field > 0)
+    if not len(rows):  # thinner than a pixel
+        return None
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
     cell = extent / FINE
     place, _ = project(axis.foot[None], camera)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FORMATS = "PNG, JPEG, HEIC, TIFF, WEBP, EXR, HDR or camera RAW"
 
 
-def decode(path: Path) -> Decoded:
+def decode(path: Path, over: float = 1.0) -> Decoded:
     """Read any supported image file. Raises InputError, or SetupError when camera RAW support is not installed."""
     try:
         with path.open("rb") as file:
@@ -36,7 +36,7 @@ def decode(path: Path) -> Decoded:
         if path.suffix.lower() in RAW_SUFFIXES:
             return read_raw(path)
         if head.startswith(b"\x76\x2f\x31\x01"):
-            return _exr(path)
+            return _exr(path, over)
         if head.startswith((b"#?RADIANCE", b"#?RGBE")):
             return _hdr(path)
         if head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")) and _is_float_tiff(path):
@@ -194,7 +194,7 @@ def _float_tiff(path: Path) -> Decoded:
     return Decoded(colour, True, {}, warnings)
 
 
-def _exr(path: Path) -> Decoded:
+def _exr(path: Path, over: float) -> Decoded:
     """OpenEXR; alpha is premultiplied there."""
     import OpenEXR
 
@@ -205,9 +205,9 @@ def _exr(path: Path) -> Decoded:
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
     if pixels.shape[-1] == 4:
-        if np.any(pixels[..., 3] < 1):
+        if over > 0 and np.any(pixels[..., 3] < 1):
             warnings.append("Transparent parts are laid over white.")
-        pixels = pixels[..., :3] + np.clip(1 - pixels[..., 3:], 0, 1)
+        pixels = pixels[..., :3] + over * np.clip(1 - pixels[..., 3:], 0, 1)
     return Decoded(np.ascontiguousarray(pixels), True, {}, warnings)
 
 

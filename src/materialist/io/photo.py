@@ -49,8 +49,11 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings))
 
 
-def decode_photo(file: Path) -> Decoded:
-    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise."""
+def decode_photo(file: Path, over: float = 1.0) -> Decoded:
+    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise.
+
+    over: radiance behind the transparent parts of an EXR; 0 for light, of which a transparent film tells nothing.
+    """
     try:
         folder, there = file.is_dir(), file.exists()
         empty = file.is_file() and file.stat().st_size == 0
@@ -62,7 +65,7 @@ def decode_photo(file: Path) -> Decoded:
         raise InputError(f"There is no picture at {file}.")
     if empty:
         raise InputError(f"{file} is empty (0 bytes); copy it again.")
-    decoded = decode(file)
+    decoded = decode(file, over)
     pixels = decoded.linear
     if decoded.scene_linear:
         broken = ~np.isfinite(pixels).all(-1)

@@ -23,7 +23,7 @@ def guarded(function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
         def steps(*args: Any, **kwargs: Any) -> Iterator[Any]:
             try:
-                yield from function(*args, **kwargs)
+                yield from (_answer(step) for step in function(*args, **kwargs))
             except GeneratorExit:  # the page was closed
                 raise
             except Exception as error:
@@ -34,11 +34,16 @@ def guarded(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
     def once(*args: Any, **kwargs: Any) -> Any:
         try:
-            return function(*args, **kwargs)
+            return _answer(function(*args, **kwargs))
         except Exception as error:
             raise _message(error) from error
 
     return once
+
+
+def _answer(outputs: Any) -> Any:
+    """Gradio takes an empty dict for one value, not for "no component changes"."""
+    return gr.skip() if isinstance(outputs, dict) and not outputs else outputs
 
 
 def _message(error: Exception) -> Exception:
