@@ -235,6 +235,27 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
     assert [notes(1.0, False), notes(4.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
 
 
+def test_the_unit_of_an_hdr_photo_does_not_matter(folder):
+    """Materials are the same at any exposure, and light is in the photo's unit."""
+    from materialist.io.photo import read_photo
+
+    photo = read_photo(folder / "photo.png", size=WIDTH)
+    found = {}
+    for unit in (0.05, 1.0, 8.0):
+        linear = np.float32(unit) * photo.linear
+        hdr = replace(photo, linear=linear, original=linear, hdr=True)
+        found[unit] = invert(**options(folder, photo=hdr))
+    one = found[1.0]
+    assert one.report.metrics["rerender_psnr_path"] > 20
+    for unit, scene in found.items():
+        # Steps of an L1 fit turn on the last digit here and there.
+        assert np.abs(scene.materials.albedo - one.materials.albedo).mean() < 0.002
+        assert np.abs(scene.envmap / unit - one.envmap).mean() < 0.005 * one.envmap.mean()
+        assert scene.report.metrics["rerender_psnr_path"] == pytest.approx(
+            one.report.metrics["rerender_psnr_path"], abs=0.2
+        )
+
+
 def test_a_photo_already_read_takes_the_field_of_view_that_is_given():
     from materialist.pipeline import _read
     from materialist.types import Camera, Photo

@@ -14,7 +14,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.photo import HDR_CLIP
+from materialist.io.photo import HDR_CLIP, exposed, exposure
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
@@ -159,7 +159,9 @@ def _report(
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
         for name in ("albedo", "roughness", "metallic")
     }
-    residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
+    light = np.float32(exposure(picture))  # an HDR photo is looked at as it would be shown
+    again, shown = light * rerender, light * picture.linear
+    residual = np.abs(linear_to_srgb(again) - linear_to_srgb(shown)).max(-1)
     white = HDR_CLIP if picture.hdr else 0.99
     clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings, *told]
@@ -174,8 +176,8 @@ def _report(
     return FitReport(
         stages=stages,
         metrics={
-            "rerender_psnr_path": metrics.psnr(rerender, picture.linear),
-            "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
+            "rerender_psnr_path": metrics.psnr(again, shown),
+            "rerender_ssim_path": metrics.ssim(again, shown),
             **distance,
             "clipped_fraction": clipped,
             "poor_fraction": poor,
@@ -217,7 +219,7 @@ def _seen_by(source, picture: Photo) -> Photo:
 
 
 def _predict(picture: Photo, source, seed: int) -> Prediction:
-    prediction = source.predict(picture, seed=seed)
+    prediction = source.predict(exposed(picture), seed=seed)
     if not (prediction.depth > 0).any():
         raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
     return prediction

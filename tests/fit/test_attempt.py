@@ -44,9 +44,9 @@ def job(
     monkeypatch.setattr(Job, "begin", begin)
     monkeypatch.setattr(Job, "finish", finish)
     monkeypatch.setattr(attempt, "find_ends", lambda *_, **__: found)
-    settings = SimpleNamespace(trust=0.08)
+    settings = SimpleNamespace(trust=0.08, exposed=True)
     rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
-    return Job(SimpleNamespace(linear=PHOTO, camera=Camera(8, 8, 40.0)), *rest), finished
+    return Job(SimpleNamespace(linear=PHOTO, hdr=False, camera=Camera(8, 8, 40.0)), *rest), finished
 
 
 def test_the_pictures_of_this_test_are_as_far_off_as_they_say():

@@ -87,9 +87,10 @@ def test_unknown_names_are_told():
         envmap_field(replace(DEFAULT.light, field="cube"))
 
 
-@pytest.mark.parametrize("name", ["paper", "default"])
-def test_hdr_photos_are_compared_as_log(name):
+@pytest.mark.parametrize(("name", "encoding"), [("paper", "log1p"), ("default", "srgb")])
+def test_hdr_photos_are_compared_as_log_in_the_paper_and_as_seen_in_ours(name, encoding):
     settings = preset(name, hdr=True)
-    assert settings.light.encoding == settings.materials.encoding == "log1p"
+    assert settings.light.encoding == settings.materials.encoding == encoding
     assert not settings.light.clipped and not settings.materials.clipped
+    assert settings.exposed == (name == "default")
     assert preset(name) == {"paper": PAPER, "default": DEFAULT}[name]

@@ -13,7 +13,8 @@ from PIL import Image, ImageCms
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError
 from materialist.io.exr import write_exr
-from materialist.io.photo import read_photo
+from materialist.io.photo import exposed, exposure, read_photo
+from materialist.types import Camera, Photo
 
 
 def picture(height=20, width=30, seed=0):
@@ -83,6 +84,17 @@ def test_exr_is_exact_and_clipped_to_ten(tmp_path):
     np.testing.assert_array_equal(photo.original, values)
     np.testing.assert_array_equal(photo.linear, np.minimum(values, 10))
     assert photo.hdr and any("10" in warning for warning in photo.warnings)
+
+
+def test_exposure_is_of_hdr_photos_only_and_undoes_any_unit():
+    values = np.linspace(0, 1, 3000, dtype=np.float32).reshape(50, 20, 3)
+    camera = Camera(20, 50, 40.0)
+    for unit in (0.02, 1, 9):
+        photo = exposed(Photo(unit * values, camera, unit * values, True))
+        assert np.percentile(photo.linear.max(-1), 97) == pytest.approx(0.9, rel=1e-5)
+        assert exposure(photo) == pytest.approx(1, rel=1e-5)
+    ordinary = Photo(values, camera, values)
+    assert exposure(ordinary) == 1 and exposed(ordinary) is ordinary
 
 
 def test_dim_exr_is_not_called_hdr_and_grey_is_spread(tmp_path):

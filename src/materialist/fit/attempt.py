@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,11 @@ import numpy as np
 from materialist import metrics
 from materialist.fit.ends import find_ends
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
-from materialist.fit.inverse import Fit
+from materialist.fit.inverse import WHITE, Fit
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
 from materialist.geometry.ends import Ends
+from materialist.io.photo import HDR_CLIP, exposed, exposure
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
@@ -97,11 +98,11 @@ class Job:
         del begun  # its cache: the next one is as large
         if completion != AUTO:
             return full, ()
-        before = metrics.psnr(full.rerender, self.picture.linear)
+        before = self._psnr(full)
         if before >= POOR or not (full.doubted and (full.geometry.mesh.face_plane >= 0).any()):
             return full, notes
         bare = self.run("none")
-        after = metrics.psnr(bare.rerender, self.picture.linear)
+        after = self._psnr(bare)
         stages = (*full.stages, *bare.stages)
         if after < before + CLEARLY:
             return replace(full, stages=stages), notes
@@ -118,7 +119,7 @@ class Job:
         stages: list[dict] = []
         self._tick("walls")
         camera, settings = self.picture.camera, self.settings
-        search = partial(find_ends, self.picture.linear, self.prior, camera, settings, tau=self.tau, seed=self.seed)
+        search = partial(find_ends, self._seen.linear, self.prior, camera, settings, tau=self.tau, seed=self.seed)
         found = timed(stages, "walls", search)
         begun = self.begin(FULL, found.ends if found else ())
         begun.stages[:0] = stages
@@ -139,8 +140,9 @@ class Job:
         judge = _judge(renderer)
         engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
         fit = Fit(
-            self.picture, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
+            self._seen, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
+            white=HDR_CLIP * self._exposure if self.picture.hdr else WHITE,
         )  # fmt: skip
         return Begun(completion, tuple(ends), geometry, fit, judge, stages)
 
@@ -157,12 +159,26 @@ class Job:
             timed(stages, "trace", fit.engine.cache.trace)
         state = fit.run()
         materials = fit.materials(state)
-        self.found("light", state.envmap)
+        envmap = state.envmap / np.float32(self._exposure)
+        self.found("light", envmap)
         self.found("materials", materials)
         self._tick("rerender")
         stages += state.stages
-        rerender = timed(stages, "rerender", lambda: begun.judge(materials, state.envmap, self.spp, self.seed + 1))
-        return Attempt(begun.completion, begun.ends, begun.geometry, materials, state.envmap, rerender, tuple(stages))
+        rerender = timed(stages, "rerender", lambda: begun.judge(materials, envmap, self.spp, self.seed + 1))
+        return Attempt(begun.completion, begun.ends, begun.geometry, materials, envmap, rerender, tuple(stages))
+
+    @cached_property
+    def _exposure(self) -> float:
+        """Factor on the photo's radiance, and on the light, under which they are fitted."""
+        return exposure(self.picture) if self.settings.exposed else 1.0
+
+    @cached_property
+    def _seen(self) -> Photo:
+        return exposed(self.picture) if self.settings.exposed else self.picture
+
+    def _psnr(self, attempt: Attempt) -> float:
+        factor = exposure(self.picture)
+        return metrics.psnr(factor * attempt.rerender, factor * self.picture.linear)
 
     def _tick(self, stage: str) -> None:
         if self.progress is not None:
@@ -174,7 +190,7 @@ class Job:
             surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
             return PathEngine(renderer, camera, surface, envmap_height=self.envmap_height, seed=self.seed)
         return TransportEngine(
-            geometry, camera, self.picture.linear, seed=self.seed, light_height=self.settings.light_grid,
+            geometry, camera, self._seen.linear, seed=self.seed, light_height=self.settings.light_grid,
             progress=self.progress,
         )  # fmt: skip
 

@@ -19,7 +19,6 @@ from materialist.fit.losses import residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
-from materialist.io.photo import HDR_CLIP
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 
@@ -62,6 +61,8 @@ class Fit:
     then light, then albedo (paper, Material Editing Settings)."""
     seed: int = 0
     progress: Progress | None = None
+    white: float = WHITE
+    """Value from which a channel of the photo is taken for clipped."""
 
     def run(self) -> FitState:
         """Fit; returns maps and light."""
@@ -120,9 +121,8 @@ class Fit:
         result = fit_light(problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress)
         state.stages.append(result.summary())
         state.envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
-        white = HDR_CLIP if self.photo.hdr else WHITE
         state.envmap = paste_visible_sky(
-            state.envmap, self.photo.linear, self._surface(), self.photo.camera, white=white
+            state.envmap, self.photo.linear, self._surface(), self.photo.camera, white=self.white
         )  # fmt: skip
 
     def _slack_base(self, state: FitState) -> Materials:

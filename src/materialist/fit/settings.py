@@ -84,6 +84,8 @@ class FitSettings:
     below it, leaving the prior grows dearer with the third power. None: no such scaling."""
     light_grid: int = 32
     """Rows of the envmap that the transport engine's light matrix resolves."""
+    exposed: bool = False
+    """Whether an HDR photo is brought to the exposure of an ordinary one first (`io.photo.exposure`)."""
 
 
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
@@ -131,6 +133,7 @@ DEFAULT = FitSettings(
     correction_spp=4,
     trust=0.08,
     light_grid=16,
+    exposed=True,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 
@@ -138,14 +141,19 @@ PRESETS = {"paper": PAPER, "default": DEFAULT}
 
 
 def preset(name: str, *, hdr: bool = False) -> FitSettings:
-    """Settings by name; for HDR photos the loss compares log(1 + x) (paper, Handling HDR Images)."""
+    """Settings by name.
+
+    For HDR photos the paper's loss compares log(1 + x) (paper, Handling HDR Images); ours sees them exposed as a
+    photograph is, whatever unit their radiance is in, and nothing in them is clipped.
+    """
     if name not in PRESETS:
         raise InputError(f"Preset is '{name}'; choose one of {', '.join(PRESETS)}.")
     settings = PRESETS[name]
     if not hdr:
         return settings
+    encoding = settings.light.encoding if settings.exposed else "log1p"
     return replace(
         settings,
-        light=replace(settings.light, encoding="log1p", clipped=False),
-        materials=replace(settings.materials, encoding="log1p", clipped=False),
+        light=replace(settings.light, encoding=encoding, clipped=False),
+        materials=replace(settings.materials, encoding=encoding, clipped=False),
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.io import display
+from materialist.io.photo import exposure
 from materialist.io.relief import relief
 from materialist.metrics import psnr
 from materialist.types import Array, Scene
@@ -62,15 +63,16 @@ def overview(scene: Scene) -> Array:
 def _rows(scene: Scene) -> list[list[_Tile]]:
     """Tiles by row; each row is stretched to the full width, so any photo shape fills the sheet."""
     aspect = float(np.clip(scene.camera.width / scene.camera.height, 0.4, 4))
-    photo, again = linear_to_srgb(scene.photo.linear), linear_to_srgb(scene.rerender)
+    light = np.float32(exposure(scene.photo))
+    photo, again = linear_to_srgb(light * scene.photo.linear), linear_to_srgb(light * scene.rerender)
     materials = scene.materials
-    quality = scene.report.metrics.get("rerender_psnr_path", psnr(scene.photo.linear, scene.rerender))
+    quality = scene.report.metrics.get("rerender_psnr_path", psnr(light * scene.photo.linear, light * scene.rerender))
 
     def tile(title: str, note: str, pixels: Array, shape: float = aspect) -> _Tile:
         return _Tile(title, note, pixels, shape)
 
     pictures = [
-        tile("Photo", "as given", display.to_bytes(photo)),
+        tile("Photo", "as given" if light == 1 else f"exposed x {light:.3g}", display.to_bytes(photo)),
         tile("Re-rendering", f"path traced, {quality:.1f} dB", display.to_bytes(again)),
         tile(
             "Error",
@@ -85,13 +87,13 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
         tile("Normal", "camera frame", display.normals(scene.normal)),
         tile("Depth", _range(scene.depth), _depth(scene.depth)),
     ]
-    light = tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0)
+    world = tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0)
     mesh = scene.geometry.mesh
     shape = [
         tile("Geometry", f"{len(mesh.faces):,} triangles, turned", relief(mesh, scene.camera)),
         tile("Planes", _plane_note(scene.geometry.plane_label), _labels(scene.geometry.plane_label, photo)),
     ]
-    return [[*pictures, *maps], [light, *shape]] if aspect < 0.6 else [pictures, maps, [light, *shape]]
+    return [[*pictures, *maps], [world, *shape]] if aspect < 0.6 else [pictures, maps, [world, *shape]]
 
 
 def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:

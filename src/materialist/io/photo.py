@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ DEFAULT_FOV = 35.0
 """Horizontal field of view, degrees, when nothing better is known (the paper's)."""
 HDR_CLIP = 10.0
 """Upper bound of HDR input (paper, appendix "Handling HDR Images")."""
+BRIGHT = 0.9
+"""Where `exposure` puts the 97th percentile of an HDR photo's brightest channel."""
 
 
 def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None) -> Photo:
@@ -47,6 +50,22 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
     return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings))
+
+
+def exposure(photo: Photo) -> float:
+    """Factor on an HDR photo's radiance that brings it to the exposure of an ordinary photograph; 1 for the others.
+
+    Files of radiance are in any unit. Their 97th percentile comes to BRIGHT.
+    """
+    if not photo.hdr:
+        return 1.0
+    return BRIGHT / max(float(np.percentile(photo.linear.max(-1), 97)), 1e-6)
+
+
+def exposed(photo: Photo) -> Photo:
+    """The photo with its working pixels at that exposure."""
+    factor = exposure(photo)
+    return photo if factor == 1 else replace(photo, linear=photo.linear * np.float32(factor))
 
 
 def decode_photo(file: Path, over: float = 1.0) -> Decoded:

@@ -14,7 +14,7 @@ from materialist.predict import bundled
 from materialist.predict.base import get_predictor
 from materialist.predict.bundled import inference, weights
 from materialist.predict.bundled.network import Architecture, BundledNetwork, encode
-from materialist.predict.bundled.predictor import BundledPredictor, exposed
+from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.types import Camera, Photo
 
 TINY = Architecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
@@ -195,13 +195,6 @@ def test_auto_is_bundled_where_its_weights_are(monkeypatch, file):
     monkeypatch.setattr(module, "WEIGHTS", file)
     assert get_predictor("auto").name.startswith("bundled step 7")
     assert get_predictor(f"bundled:{file}").name.startswith("bundled")
-
-
-def test_hdr_is_exposed_like_a_photo():
-    linear = np.linspace(0, 10, 3000, dtype=np.float32).reshape(50, 20, 3)
-    assert np.percentile(exposed(linear).max(-1), 97) == pytest.approx(0.9, rel=1e-3)
-    dark = linear / 100
-    np.testing.assert_array_equal(exposed(dark), dark)
 
 
 def test_the_same_photo_gives_the_same_maps(file):

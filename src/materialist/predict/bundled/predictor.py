@@ -8,14 +8,12 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
+from materialist.io.photo import exposed
 from materialist.predict.bundled import WEIGHTS, weights
 from materialist.predict.bundled.inference import infer, rays_of
 from materialist.predict.device import on_gpu
 from materialist.predict.weights import sha256
-from materialist.types import Array, Photo, Prediction
-
-BRIGHT = 0.9
-"""Where the 97th percentile of an HDR picture's brightest channel is put: the network saw exposed photographs."""
+from materialist.types import Photo, Prediction
 
 
 class BundledPredictor:
@@ -54,8 +52,7 @@ class BundledPredictor:
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        linear = exposed(photo.linear) if photo.hdr else photo.linear
-        found = infer(self.network, linear, rays_of(photo.camera), device=self.device)
+        found = infer(self.network, exposed(photo).linear, rays_of(photo.camera), device=self.device)
         m = found.materials
         if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
@@ -64,9 +61,3 @@ class BundledPredictor:
         if sky > 0:
             notes.append(f"{sky:.0%} of the picture was taken for sky and has no surface.")
         return Prediction(m, found.normal, found.depth, predictor=self.name, warnings=tuple(notes))
-
-
-def exposed(linear: Array) -> Array:
-    """HDR radiance [H, W, 3] brought to a photograph's exposure: its 97th percentile at BRIGHT, never made brighter."""
-    bright = float(np.percentile(linear.max(-1), 97))
-    return linear * np.float32(min(1.0, BRIGHT / max(bright, 1e-6)))
