@@ -94,6 +94,21 @@ def test_open_plane_under_constant_light_has_the_analytic_diffuse_lobe(open_floo
         np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 1], expected, rtol=2e-3, atol=2e-3)
 
 
+def test_a_small_sun_is_neither_missed_nor_met_twice():
+    """The whole floor sees it through the same directions: an error is that of the picture."""
+    from materialist.edit.relight import with_sun
+
+    cache = TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA)
+    ratio = []
+    for azimuth, elevation in np.random.default_rng(2).uniform((-180, 35), (180, 80), (24, 2)):
+        _, light = with_sun(constant(1.0, 256), azimuth, elevation)
+        d = texel_directions(256, 512)
+        solid = 2 * np.pi / 512 * (np.cos(np.arange(256) / 256 * np.pi) - np.cos(np.arange(1, 257) / 256 * np.pi))
+        truth = (light[..., 0] * np.maximum(d[..., 1], 0) * solid[:, None]).sum() / np.pi
+        ratio.append(cache.gather(light, None).diffuse[:, 0].numpy().mean() / truth)
+    assert np.std(ratio) < 0.12, ratio
+
+
 def test_matte_white_looked_at_from_above_is_a_furnace():
     """D0 + R D1 + R^2 D2 in closed form for wo = n: F_d(wo) = 1 and (h.n)^2 = (1 + cos) / 2."""
     camera = Camera(9, 9, 2.0)

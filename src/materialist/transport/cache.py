@@ -173,7 +173,9 @@ class TransportCache:
         out = []
         for k in range(len(ROUGHNESS_LEVELS) + 1):
             count, alpha = self._count(k), self._alpha(k)
-            env = pyramid.level(np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
+            # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
+            # from the whole picture, or be in all of it twice.
+            env = pyramid.level(4 * np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
             args = (
                 self._hits[k], slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
                 dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha),

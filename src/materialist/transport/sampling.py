@@ -27,7 +27,7 @@ and the predicted normal does not, the slope is an outline that was smeared, and
 
 
 def pixel_shift(height: int, width: int, seed: int) -> Array:
-    """[H, W, 2] float32 rotation of the point set per pixel: stratified over each tile, random between tiles."""
+    """[H, W, 2] float32 rotation of the point set per pixel: stratified over each tile, the same in all tiles."""
     rank = np.random.default_rng(seed).permutation(TILE * TILE).reshape(TILE, TILE)
     rows, cols = np.indices((height, width))
     order = rank[rows % TILE, cols % TILE].astype(np.float64)
