@@ -1,5 +1,7 @@
 """Falling things: they come to rest on the ground, lose energy, and never go through it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -124,6 +126,65 @@ def test_things_rest_on_bodies_that_are_there(box):
     assert len(last.bodies) == 2
     low = float((last.bodies[1].vertices @ UP + 2).min())
     assert low > 0.9 * size or low < 0.02 * size  # on top of it, or it has slid off onto the floor
+
+
+def floating(scene, box, height, **options):
+    """The scene with a box whose lowest point is `height` over the floor."""
+    (body,) = insert(scene, box, (48.0, 50.0), **options).bodies
+    return replace(scene, bodies=(replace(body, vertices=(body.vertices + height * UP).astype(np.float32)),))
+
+
+def test_under_a_table_it_starts_under_the_table(box):
+    scene = floor_scene(96, 72)
+    size = extent(insert(scene, box, (48.0, 50.0)).bodies)
+    film = drop(floating(scene, box, 1.5 * size, scale=3), [box], (48.0, 50.0), frames=24, spin=0)
+    first, last = (frame.bodies[-1].vertices @ UP + 2 for frame in (film[0], film[-1]))
+    assert 0.05 * size < first.min() and first.max() < 1.5 * size
+    assert abs(last.min()) < 0.02 * size
+
+
+def test_what_stands_in_its_way_is_beside_its_start(box):
+    """A place at the foot of something tall: the thing starts next to it, and does not jump out of it."""
+    scene = insert(floor_scene(96, 72), box, (42.0, 50.0), scale=3)
+    tall = extent(scene.bodies)
+    at = (50.0, 50.0)
+    film = drop(scene, [box], at, frames=16, spin=0, height=0.5)
+    moved = [note for note in film[0].report.warnings if "to the side" in note]
+    assert len(moved) == 1 and "box at 50,50" in moved[0]
+    middle = np.array([frame.bodies[-1].vertices.mean(0) for frame in film])
+    assert np.abs(np.diff(middle, axis=0)).max() < 0.1 * tall, "nothing pushes it out"
+    with pytest.raises(InputError, match="no room for box at 48,50"):
+        drop(floating(floor_scene(96, 72), box, 0.01, scale=8), [box], (48.0, 50.0), frames=2)
+
+
+def test_it_spins_about_its_centre_of_mass():
+    """Which falls straight down, wherever the middle of the box around the thing is."""
+    off = np.array([0.15, 0.0, 0.05])
+    (spun,) = zip(*fall([Thing((BOX + off,), np.array([0, 0, 2.0]), np.array([1.0, 5.0, 3.0]))], [], frames=10, fps=25))
+    mass = np.array([pose.centre + pose.turn @ off for pose in spun])
+    np.testing.assert_allclose(mass[:, :2], np.tile(off[:2], (10, 1)), atol=2e-3)
+    np.testing.assert_allclose(mass[:, 2], 2.05 - GRAVITY / 2 * (np.arange(10) / 25) ** 2, atol=2e-3)
+
+
+def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ground = blocks(FLAT, flat=1e-4, depth=0.4)
+    rod = BOX * np.array([1, 0.2, 0.1])
+    spun = lambda turns: fall(  # noqa: E731
+        [Thing((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))], ground, frames=48, fps=24
+    )
+    energy = [poses[0].energy for poses in spun(20)]
+    assert np.isfinite(energy).all() and max(energy) < 1.02 * energy[0]
+    with pytest.raises(InputError, match="smaller spin"):
+        list(spun(1e12))
+    assert not list(tmp_path.iterdir()), "no log of the simulation's"
+
+
+def test_small_things_move_smoothly_too(box):
+    """A frame stands still for less than a thousandth of the thing's size, whatever that is taken for."""
+    film = drop(floor_scene(96, 72), [box], (48.0, 50.0), frames=8, fps=240, spin=0, metres=0.002)
+    height = np.array([float((frame.bodies[0].vertices @ UP).min()) for frame in film])
+    assert (np.diff(height[1:]) < 0).all()
 
 
 def test_several_start_clear_of_each_other(box):

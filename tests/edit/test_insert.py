@@ -48,14 +48,14 @@ def test_a_box_stands_upright_on_the_floor_at_the_click(box):
 
 def test_scale_size_and_turn(box):
     scene = floor_scene(96, 72)
-    (one,), support = put(scene, box, (40.0, 50.0))
-    (two,), _ = put(scene, box, (40.0, 50.0), scale=2)
-    (sized,), _ = put(scene, box, (40.0, 50.0), size=0.5)
+    (one,), support, _ = put(scene, box, (40.0, 50.0))
+    (two,), *_ = put(scene, box, (40.0, 50.0), scale=2)
+    (sized,), *_ = put(scene, box, (40.0, 50.0), size=0.5)
     height = lambda b: np.ptp(b.vertices @ UP)  # noqa: E731
     np.testing.assert_allclose(height(two) / height(one), 2, rtol=1e-3)
     np.testing.assert_allclose(height(sized), 0.5, rtol=1e-3)
-    (one,), support = put(scene, box, (48.0, 50.0))
-    (turned,), _ = put(scene, box, (48.0, 50.0), turn=90)
+    (one,), support, _ = put(scene, box, (48.0, 50.0))
+    (turned,), *_ = put(scene, box, (48.0, 50.0), turn=90)
     wide = lambda b: np.ptp(b.vertices[:, 0])  # noqa: E731
     np.testing.assert_allclose(wide(turned) / wide(one), 0.5, rtol=0.01)  # the box is 1 wide and 0.5 deep
     front = one.normals[np.argmax(one.normals @ -support.point)]
@@ -98,6 +98,12 @@ def test_running_into_the_photo_is_told(box):
     beside = insert(flat_scene(), box, (26.0, 18.0), scale=4)  # grows out of the wall, past the front of the block
     assert any("runs into" in note for note in beside.report.warnings)
     assert not insert(flat_scene(), box, (40.0, 20.0)).report.warnings
+
+
+@pytest.mark.parametrize("turn", [0, 30, 45])
+def test_the_longest_side_is_the_model_s_whichever_way_it_is_turned(box, turn):
+    edited = insert(floor_scene(96, 72), box, (40.0, 50.0), size=0.5, turn=turn)
+    assert edited.provenance["edits"][-1]["size"] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("native", [1, 4])

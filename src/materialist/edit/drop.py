@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.convex import convex_pieces
-from materialist.edit.drop_ground import ground_below
+from materialist.edit.convex import convex_pieces, hull
+from materialist.edit.drop_ground import Surroundings, blocks_of, middle
 from materialist.edit.frames import MAX_FRAMES
-from materialist.edit.insert import extent, moved, put
+from materialist.edit.insert import moved, put, surface_points
 from materialist.edit.material import noted, warned
 from materialist.edit.meshes import Model, read_model, repainted
 from materialist.edit.physics import Pose, Thing, fall, load
@@ -94,7 +94,7 @@ def drop(
     film, last = [], scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
-        if poses is None or moves(poses, frame):
+        if poses is None or moves(poses, frame, metres):
             last, poses = falling.at(frame), frame
         film.append(last)
     return film
@@ -146,16 +146,21 @@ def prepared(
     stood = [put(scene, model, place, scale=release.scale) for model, place in zip(models, places)]
     direction = down(scene, stood[0][1], release.gravity)
     to_up = upright(direction)
-    factor = release.metres / max(extent(bodies) for bodies, _ in stood)
-    starts = _raised(stood, to_up, factor, release.height * release.metres)
+    factor = release.metres / max(longest for *_, longest in stood)
+    around = Surroundings.of(scene, to_up, factor)
+    points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
+    names = [f"{model.name} at {place[0]:g},{place[1]:g}" for model, place in zip(models, places)]
+    shifts, tops, moved_aside = _starts(around, points, release, names)
+    field = around.ground([middle(p) for p in points], tops, release.metres)
+    starts = [(bodies, shift) for (bodies, *_), shift in zip(stood, shifts)]
     things = _things(starts, to_up, factor, release)
-    ground = ground_below(scene, things, to_up, factor, release.metres)
+    ground = [hull(block) for block in blocks_of(field, release.metres)]
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
         **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
         "gravity": [round(float(v), 6) for v in direction],
     }  # fmt: skip
-    notes = tuple(note for model in models for note in model.warnings)
+    notes = (*(note for model in models for note in model.warnings), *moved_aside)
     return Falling(scene, things, ground, starts, to_up, factor, notes, what)
 
 
@@ -204,23 +209,36 @@ def _places(at: Any, count: int) -> list[tuple[float, float]]:
     return places
 
 
-def _raised(
-    stood: list[tuple[tuple[Body, ...], Support]], to_up: Array, factor: float, height: float
-) -> list[tuple[tuple[Body, ...], Array]]:
-    """Each thing and the shift [3] (metres, z up) that lifts it to where it starts, clear of those below it."""
-    result: list[tuple[tuple[Body, ...], Array]] = []
+def _starts(
+    around: Surroundings, points: list[Array], release: Release, names: list[str]
+) -> tuple[list[Array], list[float], list[str]]:
+    """For each thing the shift [3] to where it starts, and the z from which its ground is seen; and notes.
+
+    points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene. Raises InputError where it cannot.
+    """
     boxes: list[tuple[Array, Array]] = []
-    for bodies, _ in stood:
-        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor
-        low, high = points.min(0), points.max(0)
-        lift = height
+    shifts, tops, notes = [], [], []
+    for own, name in zip(points, names):
+        low, high = own.min(0), own.max(0)
+        least = 0.0
         for other_low, other_high in boxes:
             if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
-                lift = max(lift, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
-        shift = np.array([0.0, 0.0, lift])
+                least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
+        lift = max(least, release.height * release.metres)
+        found = around.start(own, lift, least, release.metres)
+        if found is None:
+            raise InputError(
+                f"There is no room for {name}: it would start inside of something; choose another place, or a smaller "
+                "scale."
+            )
+        shift, top = found
+        if shift[:2].any():
+            share = float(np.hypot(*shift[:2])) / release.metres
+            notes.append(f"{name} starts {share:.2g} of its size to the side: something stands in its way.")
         boxes.append((low + shift, high + shift))
-        result.append((bodies, shift))
-    return result
+        shifts.append(shift)
+        tops.append(top)
+    return shifts, tops, notes
 
 
 def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, release: Release) -> list[Thing]:
@@ -253,9 +271,9 @@ def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, 
     return moved(body, turn, move)
 
 
-def moves(before: list[Pose], now: list[Pose]) -> bool:
-    """Whether anything has moved by more than a thousandth of a turn or of METRES."""
+def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
+    """Whether anything has moved by more than a thousandth of a turn or of its size."""
     return any(
-        np.abs(a.centre - b.centre).max() > 1e-3 * METRES or np.abs(a.turn - b.turn).max() > 2e-3
+        np.abs(a.centre - b.centre).max() > 1e-3 * metres or np.abs(a.turn - b.turn).max() > 2e-3
         for a, b in zip(before, now)
     )

@@ -73,7 +73,7 @@ def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
-        if not recent[-1] or (len(recent) > STILL and _still(list(recent))):
+        if not recent[-1] or (len(recent) > STILL and _still(list(recent), falling.what["metres"])):
             return poses, gone, True
     return poses, gone, False
 
@@ -83,5 +83,5 @@ def _in_view(scene: Scene, body: Body) -> bool:
     return bool(((depth > 0) & (place > 0).all(-1) & (place < (scene.camera.width, scene.camera.height)).all(-1)).any())
 
 
-def _still(recent: list[list[Pose]]) -> bool:
-    return all(len(look) == len(recent[-1]) and not moves(look, recent[-1]) for look in recent[:-1])
+def _still(recent: list[list[Pose]], metres: float) -> bool:
+    return all(len(look) == len(recent[-1]) and not moves(look, recent[-1], metres) for look in recent[:-1])

@@ -28,23 +28,24 @@ class Field:
     """[n + 1, n + 1] z of the surface at (x, y) = corner + cell * (column, row); NaN where there is none."""
 
 
-def field(shoot, points: Array, centre: Array, half: float, top: float, size: float) -> Field:
+def field(shoot, points: Array, centre: Array, half: float, top, size: float) -> Field:
     """The surface below z = `top` in a square around `centre` [2].
 
     Args:
-        shoot: shoot(x [n], y [n], top) -> z [n] of what a ray downwards meets first, NaN for nothing.
+        shoot: shoot(x [n], y [n], z [n]) -> z [n] of what a ray downwards meets first, NaN for nothing.
         points: [m, 3] points of the visible surface. Rays along gravity miss what is upright; where such points stand
             out of the field by more than STEEP * size, they raise it.
-        half: half of the square's side. size: longest side of the falling thing.
+        half: half of the square's side. top: top(x [n], y [n]) -> z [n]. size: longest side of the falling thing.
     """
     steps = np.linspace(-half, half, CELLS + 1)
     x, y = np.meshgrid(centre[0] + steps, centre[1] + steps)
-    height = shoot(x.ravel(), y.ravel(), top).reshape(x.shape)
+    height = shoot(x.ravel(), y.ravel(), top(x.ravel(), y.ravel())).reshape(x.shape)
     cell = 2 * half / CELLS
     low = np.nanmin(height) if np.isfinite(height).any() else 0.0
     column = np.round((points[:, 0] - x[0, 0]) / cell).astype(int)
     row = np.round((points[:, 1] - y[0, 0]) / cell).astype(int)
-    inside = (column >= 0) & (column <= CELLS) & (row >= 0) & (row <= CELLS) & (points[:, 2] < top)
+    inside = (column >= 0) & (column <= CELLS) & (row >= 0) & (row <= CELLS)
+    inside &= points[:, 2] < top(points[:, 0], points[:, 1])
     column, row, z = column[inside], row[inside], points[inside, 2]
     upright = z > np.nan_to_num(height[row, column], nan=low - size) + STEEP * size
     np.fmax.at(height, (row[upright], column[upright]), z[upright])
@@ -62,6 +63,20 @@ def blocks(ground: Field, *, flat: float, depth: float) -> list[Array]:
         if len(found) <= BLOCKS:
             break
     return found
+
+
+def tops(ground: Field, found: list[Array]) -> Array:
+    """[n, n, 4] z of the blocks over each cell of the field, at its corners in the order of a block's; NaN: none."""
+    n = ground.height.shape[0] - 1
+    result = np.full((n, n, 4), np.nan)
+    for block in found:
+        (column, row), (right, under) = np.round((block[[0, 3], :2] - ground.corner) / ground.cell).astype(int)
+        steps = np.linspace(0, 1, right - column + 1)
+        a, b, c, d = block[:4, 2]
+        v, u = steps[:, None], steps[None, :]
+        z = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d)  # a plane where it spans several cells
+        result[row:under, column:right] = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]], -1)
+    return result
 
 
 def _split(ground: Field, row: int, column: int, n: int, flat: float, depth: float, found: list[Array]) -> None:

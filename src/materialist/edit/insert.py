@@ -55,7 +55,7 @@ def insert(
             mesh that cannot be used; a number out of its range.
     """
     model = repainted(mesh if isinstance(mesh, Model) else read_model(mesh, up=up), material)
-    placed, support = put(scene, model, at, scale=scale, turn=turn, size=size)
+    placed, support, longest = put(scene, model, at, scale=scale, turn=turn, size=size)
     warnings = [*model.warnings]
     if _crosses(scene, placed, support):
         warnings.append(
@@ -63,7 +63,7 @@ def insert(
         )
     what: dict[str, Any] = {
         "mesh": model.name, "at": [float(v) for v in at], "scale": scale, "turn": turn, "material": material,
-        "size": extent(placed), "triangles": sum(len(body.faces) for body in placed),
+        "size": longest, "triangles": sum(len(body.faces) for body in placed),
     }  # fmt: skip
     return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *warnings), "insert", what)
 
@@ -71,8 +71,11 @@ def insert(
 def put(
     scene: Scene, model: Model, at: tuple[float, float], *, scale: float = 1.0, turn: float = 0.0,
     size: float | None = None,
-) -> tuple[tuple[Body, ...], Support]:  # fmt: skip
-    """The model's parts as they stand in the scene, camera frame, and the plane they stand on; see `insert`."""
+) -> tuple[tuple[Body, ...], Support, float]:  # fmt: skip
+    """The model's parts as they stand in the camera frame, the plane they stand on, and their longest side.
+
+    The side is the model's own, in scene units; see `insert`.
+    """
     for name, amount, high in (("scale", scale, 1e3), ("size", 1.0 if size is None else size, 1e9)):
         if not (np.isfinite(amount) and 0 < amount <= high):
             raise InputError(f"The {name} is {amount:g}; it must be above 0 and at most {high:g}.")
@@ -93,7 +96,7 @@ def put(
             f"{model.name} would reach behind the camera at scale {scale:g}; choose a smaller scale, or a place "
             "further away."
         )
-    return bodies, support
+    return bodies, support, unit * longest
 
 
 def frame(support: Support) -> Array:
@@ -139,7 +142,7 @@ def _crosses(scene: Scene, bodies: tuple[Body, ...], support: Support) -> bool:
     Told by points of their surface just before and just behind it; what stands apart behind an object is hidden by
     more than that.
     """
-    points = np.concatenate([_points(body) for body in bodies])  # [n, 3]
+    points = np.concatenate([surface_points(body) for body in bodies])  # [n, 3]
     above = (points - support.point) @ support.normal
     points = points[above > 0.12 * max(float(above.max()), 1e-12)]
     place, depth = project(points, scene.camera)
@@ -152,7 +155,7 @@ def _crosses(scene: Scene, bodies: tuple[Body, ...], support: Support) -> bool:
     return bool(((before > 0) & (before < band)).sum() > least and ((before < 0) & (before > -band)).sum() > least)
 
 
-def _points(body: Body) -> Array:
+def surface_points(body: Body) -> Array:
     """[n, 3] points evenly over the body's surface, always the same ones."""
     corners = body.vertices[body.faces].astype(np.float64)  # [F, 3, 3]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.errors import SetupError
+from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 STEP = 1e-3
@@ -48,12 +48,17 @@ class Pose:
 def fall(things: list[Thing], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
     """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
 
-    Raises SetupError where mujoco is not installed.
+    Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
     """
     mujoco = load()
+    mujoco.set_mju_user_warning(lambda message: None)  # it would write a file where the command was called
     model = _world(mujoco, things, ground)
     data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
     for k, thing in enumerate(things):
+        body = data.body(f"thing{k}")
+        # It turns about its centre of mass, which stands still; a free joint moves the body's own origin.
+        data.qvel[6 * k : 6 * k + 3] = -np.cross(thing.spin, body.xipos - body.xpos)
         data.qvel[6 * k + 3 : 6 * k + 6] = thing.spin
     mujoco.mj_forward(model, data)
     done = 0
@@ -62,6 +67,8 @@ def fall(things: list[Thing], ground: list[Array], *, frames: int, fps: float) -
         while done < target:
             mujoco.mj_step(model, data)
             done += 1
+        if any(data.warning[kind].number for kind in _diverged(mujoco)):
+            raise InputError("The things fly apart in the simulation; choose a smaller spin, or larger metres.")
         mujoco.mj_forward(model, data)
         mujoco.mj_energyPos(model, data)
         mujoco.mj_energyVel(model, data)
@@ -81,10 +88,18 @@ def load():
     return mujoco
 
 
+def _diverged(mujoco) -> tuple[int, ...]:
+    """The warnings of a state that is no number any more."""
+    kinds = mujoco.mjtWarning
+    return int(kinds.mjWARN_BADQPOS), int(kinds.mjWARN_BADQVEL), int(kinds.mjWARN_BADQACC)
+
+
 def _world(mujoco, things: list[Thing], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.gravity = [0, 0, -GRAVITY]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable for things that spin fast
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
         spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
