@@ -214,7 +214,8 @@ def _starts(
 ) -> tuple[list[Array], list[float], list[str]]:
     """For each thing the shift [3] to where it starts, and the z from which its ground is seen; and notes.
 
-    points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene. Raises InputError where it cannot.
+    points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene.
+    Raises InputError where it cannot.
     """
     boxes: list[tuple[Array, Array]] = []
     shifts, tops, notes = [], [], []
