@@ -170,6 +170,9 @@ def test_mask_is_taken_at_working_size(folder):
         ({"envmap_size": (8, 4)}, "8x4"),
         ({"envmap_size": (16384, 8192)}, "16384x8192"),
         ({"seed": -1}, "-1"),
+        ({"seed": 2**31}, "2147483648"),
+        ({"mask": np.ones((HEIGHT, WIDTH), np.float32)}, "mask > 0.5"),
+        ({"engine": "path"}, "path engine"),
         ({"mask": np.ones((3, 3), bool)}, r"\(3, 3\).*\(18, 24\)"),
         ({"mask": np.zeros((HEIGHT, WIDTH), bool)}, "empty"),
         ({"completion": "walls"}, "walls"),
@@ -254,6 +257,16 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder):
         assert scene.report.metrics["rerender_psnr_path"] == pytest.approx(
             one.report.metrics["rerender_psnr_path"], abs=0.2
         )
+
+
+def test_depth_in_large_units_is_warned_about(folder, tmp_path):
+    """Of which the scene is only a few thousandths deep."""
+    from materialist.io.exr import read_exr, write_exr
+
+    for path in folder.glob("*.exr"):
+        write_exr(tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1))
+    told = [invert(**options(folder, predictor=f"maps:{maps}")).report.warnings for maps in (folder, tmp_path)]
+    assert [any("smaller unit" in note for note in notes) for notes in told] == [False, True]
 
 
 def test_a_photo_already_read_takes_the_field_of_view_that_is_given():

@@ -24,6 +24,8 @@ FINAL_SPP = 42
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
+SMALL = 0.05
+"""Least median depth for which the path tracer's offsets are small."""
 
 
 def invert(
@@ -104,9 +106,14 @@ def invert(
     from materialist.fit.attempt import AUTO, FULL, Job
     from materialist.fit.settings import preset as named
 
+    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
+    if engine == "path" and (settings.corrections or settings.materials.other_metallic is not None):
+        raise InputError(
+            "The path engine fits as the paper does; give it settings with corrections=0 and other_metallic=None."
+        )
     spp = overrides.get("spp", FINAL_SPP)
     job = Job(
-        picture, prior, overrides.get("settings") or named(preset, hdr=picture.hdr), engine, envmap_size[1], tau, mask,
+        picture, prior, settings, engine, envmap_size[1], tau, mask,
         strategy, seed, device, spp, progress, found,
     )  # fmt: skip
     # The paper's schedule is followed once, however well it does.
@@ -222,6 +229,13 @@ def _predict(picture: Photo, source, seed: int) -> Prediction:
     prediction = source.predict(exposed(picture), seed=seed)
     if not (prediction.depth > 0).any():
         raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
+    middle = float(np.median(prediction.depth[prediction.depth > 0]))
+    if middle < SMALL:
+        note = (
+            f"Depth is {middle:.3g} in the median. Rays start about 0.0001 off a surface, which thins out its shadows; "
+            f"give depth in a smaller unit, so that the median is {SMALL:g} or more."
+        )
+        prediction = replace(prediction, warnings=(*prediction.warnings, note))
     return prediction
 
 
@@ -239,8 +253,8 @@ def _check(engine: str, strategy: str, completion: str, envmap_size: tuple[int, 
         raise InputError(
             f"Envmap size is {width}x{height}; the width must be twice the height, and the height 8 to 4096."
         )
-    if seed < 0:
-        raise InputError(f"Seed is {seed}; give 0 or more.")
+    if not 0 <= seed < 2**31:
+        raise InputError(f"Seed is {seed}; give 0 to {2**31 - 1}.")
 
 
 def _check_mask(mask: Array | None, picture: Photo) -> None:
@@ -250,6 +264,8 @@ def _check_mask(mask: Array | None, picture: Photo) -> None:
         raise InputError(
             f"Mask is {mask.shape}, the photo at working size is {picture.linear.shape[:2]} (rows, columns)."
         )
+    if mask.dtype != bool:
+        raise InputError(f"Mask holds {mask.dtype}; give truth values, for example mask > 0.5.")
     if not mask.any():
         raise InputError("The mask is empty; mark at least one pixel.")
 

@@ -72,6 +72,7 @@ def test_unknown_benchmarks_and_options_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [({"scenes": "abc"}, "--scenes is 'abc'; give a whole number"), ({"scenes": 2.5}, "--scenes is 2.5"),
+     ({"scenes": 0}, "--scenes is 0; give at least 1"), ({"seed": -1}, "--seed is -1; give at least 0"),
      ({"photographic": 3}, "--photographic is 3; give true or false")],
 )  # fmt: skip
 def test_options_of_another_kind_are_refused(tmp_path, options, words):

@@ -88,6 +88,11 @@ def test_what_is_no_data_set(tmp_path):
     with pytest.raises(InputError, match="needs the IIW data set"):
         bench.run("whdr", output=tmp_path / "report")
     cv2.imwrite(str(tmp_path / "1.png"), np.arange(4800).reshape(40, 40, 3).astype(np.uint8))
+    (tmp_path / "1.json").write_text(
+        '{"intrinsic_points": [{"id": 1}], "intrinsic_comparisons": [{"point1": 1, "point2": 7}]}'
+    )
+    with pytest.raises(InputError, match="point 7, which is not in the file"):
+        bench.run("whdr", data=tmp_path, output=tmp_path / "report1", predictor="classical")
     (tmp_path / "1.json").write_text("[]")
     with pytest.raises(InputError, match="IIW's layout"):
         bench.run("whdr", data=tmp_path, output=tmp_path / "report2", predictor="classical")

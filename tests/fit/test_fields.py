@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from materialist import metrics
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.fit.fields import (
     EnvmapMLP,
@@ -98,6 +99,14 @@ def test_resizing_keeps_the_shape_and_the_mean(height):
     assert resized.shape == (height, 2 * height, 3)
     torch.testing.assert_close(resized.mean((0, 1)), envmap.mean((0, 1)), rtol=0.01, atol=0.01)
     assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(envmap.max())
+
+
+@pytest.mark.parametrize("height", [24, 27, 32, 50])
+def test_enlarging_moves_nothing(height):
+    """By any ratio: as the metric's own, in another library."""
+    envmap = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(1))
+    expected = metrics.resample_envmap(envmap.numpy(), height)
+    np.testing.assert_allclose(resize_envmap(envmap, height).numpy(), expected, atol=1e-3)
 
 
 def test_enlarging_wraps_in_azimuth():

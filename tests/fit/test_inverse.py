@@ -262,6 +262,11 @@ def test_visible_sky_is_pasted_where_it_is_seen():
     np.testing.assert_allclose(pasted[ahead & (d[..., 0] > 0.03)], 3.0)  # clipped: at least 1, and 3 is more
     np.testing.assert_allclose(pasted[(d[..., 1] < -0.03) | (d[..., 2] > 0)], 3.0)
     assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera) is envmap
+    # What a texel shows is the mean of its pixels, not one of them.
+    fine = Camera(320, 320, 60.0)
+    noisy = np.random.default_rng(0).uniform(0.2, 0.6, (320, 320, 3)).astype(np.float32)
+    mean = paste_visible_sky(envmap, noisy, np.kron(surface, np.ones((10, 10))) > 0, fine)
+    assert np.abs(mean[ahead] - 0.4).max() < 0.08
     # An HDR photo measures up to its own white.
     measured = paste_visible_sky(envmap, 1.5 * photo, surface, camera, white=10.0)
     np.testing.assert_allclose(measured[ahead & (d[..., 0] > 0.03)], 1.5)

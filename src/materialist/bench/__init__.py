@@ -53,5 +53,8 @@ def _check(option: str, value: Any, usual: Any) -> None:
         raise InputError(f"--{option} is {value!r}; give true or false.")
     if isinstance(usual, int) and not isinstance(usual, bool) and not (number and value == int(value)):
         raise InputError(f"--{option} is {value!r}; give a whole number.")
+    least = 0 if option == "seed" or usual == 0 else 1
+    if isinstance(usual, int) and not isinstance(usual, bool) and value < least:
+        raise InputError(f"--{option} is {value}; give at least {least}.")
     if isinstance(usual, float) and not number:
         raise InputError(f"--{option} is {value!r}; give a number.")

@@ -113,8 +113,11 @@ def _read(path: Path) -> dict[str, Any]:
     """The judgements in a file; raises InputError when they are not in IIW's layout."""
     try:
         content = json.loads(path.read_text("utf-8"))
-        for name in ("intrinsic_points", "intrinsic_comparisons"):
-            content[name]
+        known = {point["id"] for point in content["intrinsic_points"]}
+        for comparison in content["intrinsic_comparisons"]:
+            for name in ("point1", "point2"):
+                if comparison[name] not in known:
+                    raise InputError(f"{path}: a comparison is of point {comparison[name]}, which is not in the file.")
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} does not hold judgements in IIW's layout ({error}).") from error
     return content

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json, Seed, output_option
+from materialist.cli.options import Device, DeviceOption, Force, Json, Seed, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
 
@@ -32,6 +32,7 @@ def bench(
     seed: Seed = 0,
     device: DeviceOption = Device.auto,
     as_json: Json = False,
+    force: Force = False,
 ) -> None:
     """Run a benchmark. Its own options follow the name, as --scenes 10 or scenes=10."""
     options = parse_extra(context.args)
@@ -39,7 +40,7 @@ def bench(
         raise InputError(f"There is no data folder at {data}.")
     from materialist import bench as benchmarks
 
-    benchmarks.run(name, data=data, output=output, seed=seed, device=device.value, **options)  # type: ignore[attr-defined]
+    benchmarks.run(name, data=data, output=output, seed=seed, device=device.value, force=force, **options)  # type: ignore[attr-defined]
     report_success("bench", as_json, [f"Look at {output}"], name=name, report=str(output))
 
 

@@ -127,11 +127,11 @@ CheckpointSeconds = Annotated[float, typer.Option(help="Seconds between checkpoi
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """An envmap size such as 512x256 as (width, height). Raises InputError unless it is 2:1 and at least 8x4."""
+    """An envmap size such as 512x256 as (width, height). Raises InputError unless it is 2:1 and at least 16x8."""
     match = re.fullmatch(r"(\d+)\s*[xX×]\s*(\d+)", text.strip())
     if match is None:
         raise InputError(f"The envmap size must look like 512x256, not {text!r}.")
     width, height = int(match[1]), int(match[2])
-    if width != 2 * height or not 4 <= height <= 4096:
-        raise InputError(f"The envmap must be twice as wide as high, from 8x4 to 8192x4096, not {width}x{height}.")
+    if width != 2 * height or not 8 <= height <= 4096:
+        raise InputError(f"The envmap must be twice as wide as high, from 16x8 to 8192x4096, not {width}x{height}.")
     return width, height

@@ -101,13 +101,12 @@ def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
     image = envmap.permute(2, 0, 1)[None]
     if height < h:
         return functional.interpolate(image, (height, 2 * height), mode="area")[0].permute(1, 2, 0)
-    pad = 1
-    image = functional.pad(functional.pad(image, (pad, pad, 0, 0), mode="circular"), (0, 0, pad, pad), mode="replicate")
-    scale = height // h if height % h == 0 else height / h
-    size = (round((h + 2 * pad) * scale), round((2 * h + 2 * pad) * scale))
-    image = functional.interpolate(image, size, mode="bilinear")
-    top, left = round(pad * scale), round(pad * scale)
-    return image[0, :, top : top + height, left : left + 2 * height].permute(1, 2, 0)
+    image = functional.pad(functional.pad(image, (1, 1, 0, 0), mode="circular"), (0, 0, 1, 1), mode="replicate")
+    # Centres of the new texels on the padded map, in [-1, 1].
+    y = (2 * ((torch.arange(height) + 0.5) * h / height + 1) / (h + 2) - 1).to(image)
+    x = (2 * ((torch.arange(2 * height) + 0.5) * h / height + 1) / (2 * h + 2) - 1).to(image)
+    places = torch.stack(torch.meshgrid(y, x, indexing="ij")[::-1], -1)[None]
+    return functional.grid_sample(image, places, mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
 
 
 class MaterialMLP(nn.Module):

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import torch
 
+from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
@@ -245,7 +246,8 @@ def paste_visible_sky(
 ) -> Array:  # fmt: skip
     """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
 
-    Photo pixels from `white` on, which are clipped, only raise a texel. surface: [H, W] bool.
+    That is the mean of the pixels in a texel, or the pixel at its centre where texels are smaller. Photo pixels from
+    `white` on, which are clipped, only raise a texel. surface: [H, W] bool.
     """
     if surface.all():
         return envmap
@@ -257,8 +259,16 @@ def paste_visible_sky(
     inside = np.isfinite(depth) & (col >= 0) & (col < camera.width) & (row >= 0) & (row < camera.height)
     r, c = np.where(inside, row, 0).astype(int), np.where(inside, col, 0).astype(int)
     seen = (inside & ~surface[r, c])[..., None]
-    value = photo[r, c]
-    value = np.where(value >= white, np.maximum(value, envmap), value)
+    raised = lambda pixels, texels: np.where(pixels >= white, np.maximum(pixels, texels), pixels)  # noqa: E731
+    # The pixels of the sky, each in the texel that it looks through.
+    rays = pixel_rays(camera)[~surface].astype(np.float64)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    column = ((np.arctan2(rays[:, 0], -rays[:, 2]) / (2 * np.pi) + 0.5) * w).astype(int) % w
+    texel = np.minimum((np.arccos(np.clip(rays[:, 1], -1, 1)) / np.pi * h).astype(int), h - 1) * w + column
+    count = np.bincount(texel, minlength=h * w).reshape(h, w, 1)
+    pixels = raised(photo[~surface], envmap.reshape(-1, 3)[texel])
+    total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(h, w, 3)
+    value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
     return np.where(seen, value, envmap).astype(np.float32)
 
 
