@@ -111,6 +111,28 @@ def test_relight_by_map_lamp_and_frames(run, folder):
     assert sorted(p.name for p in (folder / "turn").iterdir()) == ["0000.png", "0001.png"]
 
 
+def test_a_film_holds_one_relit_scene_at_a_time(run, folder, monkeypatch):
+    """Each has an environment map of its own, and a film thousands of frames."""
+    import weakref
+
+    from materialist.edit import frames
+
+    alive, most, make = [], [], frames.relight
+
+    def relit(*arguments, **options):
+        scene = make(*arguments, **options)
+        alive.append(weakref.ref(scene))
+        most.append(sum(one() is not None for one in alive))
+        return scene
+
+    monkeypatch.setattr(frames, "relight", relit)
+    code, _, err = run(
+        "relight", folder / "a.scene", "--rotate", 90, "--frames", 6, "--spp", 2, "--no-denoise", "-o", folder / "film"
+    )
+    assert code == 0, err
+    assert len(most) == 6 and max(most) <= 3
+
+
 def test_an_edit_that_nobody_sees_is_told(run, folder):
     edit = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--spp", 4, "-o", folder / "o.png", "--force"]
     assert "nothing of the edit is to be seen" in run(*edit, "--roughness", "+0")[1]
@@ -175,6 +197,7 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         ([*RELIGHT, "--lamp", "1,2,3,99999,1"], "99999"),
         ([*RELIGHT, "--rotate", "9", "--frames", "4"], ".mp4"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "1", "-o", "OUT"], "frames is 1"),
+        (["relight", "SCENE", "--rotate", "9", "-o", "out.mp4"], "--frames 48"),
         ([*RELIGHT, "--rotate", "9", "--gain", "2"], "--gain says nothing without --envmap"),
         ([*RELIGHT, "--rotate", "9", "--sun-power", "2"], "--sun-power says nothing without --sun"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--full-render", "--spp", "0", "-o", "OUT"], "--spp"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -79,6 +80,8 @@ def relight(
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
     if frames is None:
+        if output.suffix.lower() == ".mp4":
+            raise InputError(f"{output} is a video; say of how many frames with --frames, for example --frames 48.")
         check_before(output, save, spp, force, device=device.value, full_render=full_render)
         if len(suns) > 1:
             raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
@@ -115,10 +118,19 @@ def _video(
     from materialist.edit.frames import moving_light, write_frames
 
     start = time.monotonic()
-    scenes = list(moving_light(scene, count, **moving))
+    last = scene
+
+    def relit() -> Iterator[Any]:
+        """One scene at a time: each has an environment map of its own."""
+        nonlocal last
+        for frame in moving_light(scene, count, **moving):
+            last = frame
+            yield frame
+
     with StageProgress(quiet=as_json) as progress:
-        write_frames(output, pictures(scene, scenes, progress=progress, **shared), fps=fps, force=force)
-    warnings = [note for note in scenes[-1].report.warnings if note not in scene.report.warnings]
+        taken = pictures(scene, relit(), progress=progress, count=count, **shared)
+        write_frames(output, taken, fps=fps, force=force)
+    warnings = [note for note in last.report.warnings if note not in scene.report.warnings]
     report_success(
         "relight", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
         frames=count, fps=fps, warnings=warnings, seconds=time.monotonic() - start,

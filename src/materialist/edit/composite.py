@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -72,14 +72,18 @@ def composite(
 
 
 def pictures(
-    scene: Scene, edits: Sequence[Scene], *, spp: int = 64, seed: int = 0, full_render: bool = False,
-    denoise: bool = True, device: str = "auto", progress=None,
+    scene: Scene, edits: Iterable[Scene], *, spp: int = 64, seed: int = 0, full_render: bool = False,
+    denoise: bool = True, device: str = "auto", progress=None, count: int | None = None,
 ) -> Iterator[Array]:  # fmt: skip
-    """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once."""
+    """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
+
+    count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
+    """
     tick = progress or (lambda *_: None)
+    total = len(edits) if isinstance(edits, Sequence) else count or 0
     studio, lights = Studio(scene, device=device), None
     for k, edited in enumerate(edits):
-        tick("frames", k, len(edits))
+        tick("frames", k, total)
         if edited.provenance.get(KEY) != lights:  # frames of one film share their lights, and so their base picture
             studio, lights = Studio(explained(scene, edited), device=device), edited.provenance.get(KEY)
         if full_render:
@@ -87,7 +91,7 @@ def pictures(
         else:
             layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
             yield into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
-    tick("frames", len(edits), len(edits))
+    tick("frames", total, total)
 
 
 def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:

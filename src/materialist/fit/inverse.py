@@ -259,7 +259,10 @@ def paste_visible_sky(
     inside = np.isfinite(depth) & (col >= 0) & (col < camera.width) & (row >= 0) & (row < camera.height)
     r, c = np.where(inside, row, 0).astype(int), np.where(inside, col, 0).astype(int)
     seen = (inside & ~surface[r, c])[..., None]
-    raised = lambda pixels, texels: np.where(pixels >= white, np.maximum(pixels, texels), pixels)  # noqa: E731
+
+    def raised(pixels: Array, texels: Array) -> Array:
+        return np.where(pixels >= white, np.maximum(pixels, texels), pixels)
+
     # The pixels of the sky, each in the texel that it looks through.
     rays = pixel_rays(camera)[~surface].astype(np.float64)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
