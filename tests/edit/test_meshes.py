@@ -145,6 +145,27 @@ def test_a_map_of_an_mtl_that_cannot_be_had_is_told(tmp_path, monkeypatch, key, 
     np.testing.assert_allclose(model.parts[0].surface.albedo, [[[1, 0, 0]]])
 
 
+def test_what_an_mtl_says_beyond_its_colours(tmp_path):
+    """Glow is taken, options before a texture's name are not part of it, and what is not shown is told."""
+    from PIL import Image
+
+    Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path / "c.png")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (tmp_path / "m.obj").write_text(f"mtllib m.mtl\nusemtl a\n{corners}f 1/1 2/2 3/3\n")
+
+    def read(lines):
+        (tmp_path / "m.mtl").write_text(f"newmtl a\nKd 1 0 0\n{lines}\n")
+        return read_model(tmp_path / "m.obj")
+
+    assert read("Ke 2 1 0").parts[0].surface.emission == (2.0, 1.0, 0.0)
+    scaled = read("map_Kd -s 2 2 1 c.png")
+    np.testing.assert_allclose(scaled.parts[0].surface.albedo, 1.0)
+    assert ["such as -s" in note for note in scaled.warnings] == [True]
+    for lines, words in (("d 0.4", "transparency"), ("Tr 0.3", "transparency"), ("map_Bump -bm 0.5 c.png", "bump")):
+        assert [words in note for note in read(lines).warnings] == [True], lines
+    assert not read("d 1\nTr 0\nKe 0 0 0").warnings
+
+
 def test_a_damaged_texture_is_told(tmp_path):
     path = textured_obj(tmp_path)
     good = (tmp_path / "quad.png").read_bytes()

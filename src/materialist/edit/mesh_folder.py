@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from pathlib import Path
 from urllib.parse import unquote
@@ -13,6 +14,10 @@ MAX_FACES = 2_000_000
 """Triangles of a file that is still read."""
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp")
+
+
+OPTIONS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*$")
+"""A texture of an .mtl with options before its name."""
 
 
 class MeshFolder:
@@ -28,6 +33,8 @@ class MeshFolder:
         self.refused: list[str] = []
         self.missing: list[str] = []
         self.damaged = 0
+        self.left_out: set[str] = set()
+        """What of its materials is not shown, in words."""
 
     def get(self, name: str) -> bytes:
         """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing one."""
@@ -42,6 +49,9 @@ class MeshFolder:
             self.missing.append(name)
             raise
         self.damaged += path.suffix.lower() in PICTURES and not _is_picture(data)
+        if path.suffix.lower() == ".mtl" and OPTIONS.search(data):
+            self.left_out.add("the options of its textures, such as -s")
+            return OPTIONS.sub(rb"\1\2", data)  # trimesh takes them for a part of the name
         return data
 
     def _inside(self, name: str) -> Path | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,13 @@ from materialist.types import Array, Surface
 
 GREY = 0.5
 """Albedo and roughness where a file says nothing."""
+OPAQUE = "its transparency (taken as opaque)"
+LEFT_OUT = {
+    "its bump or normal map": ("bump", "map_bump", "norm", "map_norm", "disp", "map_disp"),
+    "its glowing texture": ("map_ke",),
+    OPAQUE: ("map_d",),
+}
+"""Entries of an .mtl that are not shown, in words."""
 MAX_TEXTURE = 4096
 """Pixels along the longer side of a texture; larger ones are shrunk."""
 
@@ -64,7 +72,8 @@ def _from_gltf(material: Any, folder: Any, factor: Any) -> Surface:
 def _from_mtl(material: Any, folder: Any) -> Surface:
     """Kd (linear) times map_Kd; Pr, Pm and their maps where the file has them, else the width of the highlight Ns.
 
-    A Phong exponent n is about as wide as GGX with alpha^2 = 2 / (n + 2), and roughness = sqrt(alpha).
+    Ke is its glow; 1 is the photo's white. A Phong exponent n is about as wide as GGX with alpha^2 = 2 / (n + 2), and
+    roughness = sqrt(alpha).
     """
     said = {str(k).lower(): v for k, v in (getattr(material, "kwargs", None) or {}).items()}
     colour = _pixels(getattr(material, "image", None), folder)
@@ -79,7 +88,13 @@ def _from_mtl(material: Any, folder: Any) -> Surface:
     shiny = GREY if not exponent else (2 / (max(exponent, 0.0) + 2)) ** 0.25
     roughness = _map(said.get("map_pr"), folder, _number(said.get("pr"), shiny))
     metallic = _map(said.get("map_pm"), folder, _number(said.get("pm"), 0.0))
-    return _clipped(albedo, roughness, metallic)
+    for what, keys in LEFT_OUT.items():
+        folder.left_out |= {what} if any(key in said for key in keys) else set()
+    if _number(said.get("d"), 1.0) < 1 or _number(said.get("tr"), 0.0) > 0:
+        folder.left_out.add(OPAQUE)
+    glow = [max(_number([v], 0.0), 0.0) for v in np.ravel(said.get("ke", []))[:3]]
+    surface = _clipped(albedo, roughness, metallic)
+    return replace(surface, emission=tuple(glow)) if len(glow) == 3 else surface
 
 
 def _map(reference: Any, folder: Any, otherwise: Any) -> Array:

@@ -163,7 +163,11 @@ class _Reader:
 
     def left_out(self) -> list[str]:
         """What of the file is not shown, in words."""
-        return mesh_gltf.left_out(self.materials) + ["the colours of its vertices"] * bool(self.unpainted)
+        return (
+            mesh_gltf.left_out(self.materials)
+            + sorted(self.folder.left_out)
+            + ["the colours of its vertices"] * bool(self.unpainted)
+        )
 
     def pieces(self, scene: Any) -> Iterator[Body]:
         """The meshes of trimesh's scene, each where its node puts it."""
