@@ -93,6 +93,9 @@ def test_apply_replays_the_list(run, folder):
     )
     assert code == 0, err
     assert [e["kind"] for e in json.loads(shown.splitlines()[-1])["edits"]] == ["material", "light"]
+    (folder / "one.yaml").write_text("- relight: {ambient: 0.9}\n- relight: {ambient: 0.5, skip: true}\n")
+    shown = run("apply", folder / "a.scene", folder / "one.yaml", "--spp", 4, "-o", folder / "one.exr")[1]
+    assert "1 edit applied, 1 skipped." in shown
 
 
 def test_relight_by_map_lamp_and_frames(run, folder):

@@ -76,6 +76,7 @@ def test_click_box_and_sun(folder):
         ("- relight: {sun: [1, 2, 3]}", "sun"),
         ("- relight: {lamps: [[1, 2, 3]]}", "lamp"),
         ("- relight: now", "no options"),
+        ("- remove: {mask: block.png, seed: -2}", "The seed is -2"),
         ("- relight: {}", "changes nothing"),
         ("- relight: {gain: 3, ambient: 0.5}", "gain says nothing without envmap"),
         ("- relight: {rotate: 3, sun_power: 2}", "sun_power says nothing without sun"),
@@ -87,12 +88,28 @@ def test_what_is_wrong_is_named(folder, text, words):
     assert words in str(error.value)
 
 
+def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
+    """That of the step, else that of all steps."""
+    import materialist.edit.recipe as recipe
+
+    asked = []
+    monkeypatch.setattr(recipe, "without", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "glass", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "settle", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    (folder / "edits.yaml").write_text(
+        "- remove: {mask: block.png}\n- remove: {mask: block.png, seed: 4}\n- glass: {mask: block.png}\n"
+        "- drop: {mesh: a.ply, at: [1, 2]}\n- drop: {mesh: a.ply, at: [1, 2], seed: 0}\n"
+    )
+    apply(SCENE, read_recipe(folder / "edits.yaml"), seed=9)
+    assert asked == [9, 4, 9, 9, 0]
+
+
 def test_tints_are_spelled_as_on_the_command_line(folder):
     one, other = (
         glass_arguments(SCENE, read_step(folder, f"- glass: {{mask: block.png, hollow: yes, tint: {tint}}}"))[1]
         for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
     )
-    assert one["hollow"] is True and other == {"hollow": True, "tint": pytest.approx(one["tint"], abs=1e-6)}
+    assert one["hollow"] is True and other == {"hollow": True, "seed": 0, "tint": pytest.approx(one["tint"], abs=1e-6)}
     assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1]["hollow"] == "open"
 
 

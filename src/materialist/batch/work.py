@@ -105,11 +105,11 @@ def _edited(job: Job, scene: Scene, tick: Tick) -> tuple[Array, list[str]]:
 
     assert job.edits is not None
     tick("edit", 0, 1)
+    seed, device = job.options.get("seed", 0), job.options.get("device", "auto")
     try:
-        edited = apply(scene, edits_for(job.edits, job.name))
+        edited = apply(scene, edits_for(job.edits, job.name), seed=seed, device=device)
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
-    seed, device = job.options.get("seed", 0), job.options.get("device", "auto")
     picture = composite(scene, edited, spp=job.spp, seed=seed, device=device, progress=tick)
     write_composite(job.picture, picture, scene.photo, force=True)
     return picture, [note for note in edited.report.warnings if note not in scene.report.warnings]

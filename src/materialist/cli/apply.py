@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -49,8 +49,16 @@ def apply(
     check_before(output, save, spp, force, device=device.value, full_render=full_render)
     steps = read_recipe(edits)
     loaded = load_scene(scene)
-    edited = replay(loaded, steps)
+    edited = replay(loaded, steps, seed=seed, device=device.value)
     write_result(
         "apply", loaded, edited, output, save=save, spp=spp, seed=seed, denoise=denoise, full_render=full_render,
-        device=device.value, as_json=as_json, force=force, lines=[f"{len(steps)} edits applied."],
+        device=device.value, as_json=as_json, force=force, lines=[_count(steps)],
     )  # fmt: skip
+
+
+def _count(steps: list[Any]) -> str:
+    """How many edits were applied, and how many not."""
+    skipped = sum(step.skipped for step in steps)
+    done = len(steps) - skipped
+    told = f"{done} edit{'s' * (done != 1)} applied"
+    return f"{told}, {skipped} skipped." if skipped else f"{told}."

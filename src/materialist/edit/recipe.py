@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ MATERIAL = (
 LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps")
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
 DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
-REMOVE = ("background", "inpaint", "shadow", "grow")
+REMOVE = ("background", "inpaint", "shadow", "grow", "seed")
 GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
 KINDS = {
     "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "drop": DROP, "glass": (*REGION, *GLASS),
@@ -48,6 +48,9 @@ class Step:
     """As in the file: texts, lists of texts, lists of lists."""
     folder: Path = Path(".")
     """What file names in it are relative to."""
+    seed: int = field(default=0, compare=False)
+    """Where the step names none of its own."""
+    device: str = field(default="auto", compare=False)
 
     @property
     def skipped(self) -> bool:
@@ -119,14 +122,17 @@ def _plain(value: Any) -> Any:
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
-def apply(scene: Scene, steps: list[Step]) -> Scene:
-    """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before."""
+def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto") -> Scene:
+    """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
+
+    `seed` is that of the steps that name none, where chance has a part in them.
+    """
     edited = scene
     for number, step in enumerate(steps, 1):
         if step.skipped:
             continue
         try:
-            edited = _MAKERS[step.kind](scene, edited, step)
+            edited = _MAKERS[step.kind](scene, edited, replace(step, seed=seed, device=device))
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
@@ -197,13 +203,17 @@ def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
     } | _thing(step)
     if "gravity" in given:
         options["gravity"] = _numbers(given["gravity"], 3, "gravity")
-    if "seed" in given:
-        seed = _number(given["seed"], "seed")
-        if not (0 <= seed < 2**32 and seed == int(seed)):
-            raise InputError(f"The seed is {given['seed']}; give a whole number from 0 to {2**32 - 1}.")
-        options["seed"] = int(seed)
+    options["seed"] = _seed(step)
     places = [_numbers(one, 2, "at") for one in _list_of(given["at"])]
     return settle(edited, _files(step, "mesh"), places, **options)
+
+
+def _seed(step: Step) -> int:
+    """The step's own seed, or that of all."""
+    seed = _number(step.options.get("seed", step.seed), "seed")
+    if not (0 <= seed < 2**31 and seed == int(seed)):
+        raise InputError(f"The seed is {step.options['seed']}; give a whole number from 0 to {2**31 - 1}.")
+    return int(seed)
 
 
 def _thing(step: Step) -> dict[str, Any]:
@@ -224,7 +234,9 @@ def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
 def _removal(step: Step) -> dict[str, Any]:
     """What a removal and glass share."""
     given = step.options
-    options: dict[str, Any] = {"grow": _number(given["grow"], "grow")} if "grow" in given else {}
+    options: dict[str, Any] = {"seed": _seed(step)}
+    if "grow" in given:
+        options["grow"] = _number(given["grow"], "grow")
     if "shadow" in given:
         options["shadow"] = told_shadow(given["shadow"])
     if "background" in given:
@@ -232,7 +244,7 @@ def _removal(step: Step) -> dict[str, Any]:
     if "inpaint" in given:
         from materialist.edit.inpaint import inpainter
 
-        options["inpaint"] = inpainter(str(given["inpaint"]))
+        options["inpaint"] = inpainter(str(given["inpaint"]), seed=options["seed"], device=step.device)
     return options
 
 
