@@ -101,6 +101,12 @@ def test_masks(tmp_path):
     cv2.imwrite(str(tmp_path / "e.png"), mask * 0)
     with pytest.raises(InputError, match="empty"):
         read_mask(tmp_path / "e.png", (40, 60))
+    cv2.imwrite(str(tmp_path / "red.png"), mask[..., None] * np.uint8([0, 0, 1]))
+    np.testing.assert_array_equal(read_mask(tmp_path / "red.png", (40, 60)), mask > 0)
+    photo = np.random.default_rng(0).integers(40, 200, (40, 60, 3)).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "photo.png"), photo)
+    with pytest.raises(InputError, match="a colour picture, not a mask"):
+        read_mask(tmp_path / "photo.png", (40, 60))
 
 
 @pytest.mark.parametrize("shape", [(40, 40), (60, 24), (96, 12), (24, 60), (12, 96)])

@@ -120,3 +120,10 @@ def test_normals_that_will_be_derived_need_no_depth_of_their_own(photo, other, t
     assert np.allclose(mixed.materials.albedo, theirs["albedo"], atol=1e-6)
     assert np.allclose(mixed.normal, normals_from_depth(theirs["depth"], photo.camera, radius=2), atol=1e-6)
     assert mixed.sources["normal"] == f"derived from the depth of {spec}"
+
+
+def test_the_built_in_predictor_warns_of_its_own_maps_only(photo, other):
+    (note,) = get_predictor(other[0], roughness="classical").predict(photo).warnings
+    assert "roughness" in note and "geometry" not in note and "albedo" not in note
+    (note,) = get_predictor(other[0], depth="classical").predict(photo).warnings
+    assert "geometry" in note and "neutral" not in note

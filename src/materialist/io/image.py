@@ -12,6 +12,9 @@ from materialist.errors import InputError, OutputError
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
+COLOURED = 0.2
+"""Share of coloured pixels, neither black nor bright, from which a picture is a photo and no mask."""
+
 
 def write_png(path: str | Path, linear: Array) -> None:
     """Write linear RGB [H, W, 3] (or grey [H, W]), clipped to [0, 1], as an 8-bit sRGB PNG."""
@@ -107,11 +110,13 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
     """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside.
 
     The file may have the working size `shape`, or the photo's `native` (H0, W0), or any size of that aspect ratio;
-    it is area-averaged to `shape`. Raises InputError for another aspect ratio or an empty mask.
+    it is area-averaged to `shape`. Raises InputError for another aspect ratio, an empty mask, or a colour photo.
     """
     import cv2
 
     mask = read_map(path)
+    if mask.ndim == 3 and ((np.ptp(mask, axis=-1) > 0.05) & (np.abs(mask.max(-1) - 0.5) < 0.4)).mean() > COLOURED:
+        raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")
     mask = mask.max(-1) if mask.ndim == 3 else mask
     if mask.shape != shape:
         sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
