@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
+from materialist.camera import project
 from materialist.edit.composite import FLOOR, composite, developed, into_photo, pictures
 from materialist.edit.layers import Layers, difference, significance
 from materialist.edit.lights import Studio
@@ -111,6 +112,21 @@ def test_difference_is_zero_where_no_path_differs():
     np.testing.assert_array_equal(layers.reached, changed)
     np.testing.assert_array_equal(layers.edited[~changed], layers.base[~changed])
     np.testing.assert_allclose((layers.edited - layers.base)[changed], 1, atol=1e-6)
+
+
+def test_a_lamp_in_the_picture_is_a_disc_at_native_size():
+    """However bright it is: no pixel around it holds a share of its radiance."""
+    scene = rendered_scene(native=4)
+    lit = relight(scene, lamps=[lamp(scene, 36, 18, 2.0, 6500, 0.3)])
+    (one,) = lit.lamps
+    out = composite(scene, lit, spp=8)
+    place, _ = project(np.array([one.position]), scene.camera)
+    radius = 4 * one.radius / 2.0 * scene.camera.focal  # pixels; it is small, and 2 away
+    y, x = np.mgrid[: out.shape[0], : out.shape[1]] + 0.5
+    away = np.hypot(x - 4 * place[0, 0], y - 4 * place[0, 1])
+    assert radius > 3 and one.radiance[1] > 20
+    assert (out[away < radius - 1] > 1).all() and (out[(away > radius + 1.5)] < 1.5).all()
+    assert ((out[..., 1] > 0.99) & (away < 3 * radius)).sum() < 1.4 * np.pi * radius**2
 
 
 def test_both_sides_use_the_same_tracer_under_a_lamp():

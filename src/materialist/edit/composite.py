@@ -119,7 +119,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     """
     out = photo.original.copy()
     if not layers.reached.any():
-        return _in_front(out, layers.portrait)
+        return _in_front(out, layers.portrait, photo.hdr)
     stack = np.concatenate((_other_light if layers.relit else _same_light)(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample = GuidedUpsample(photo.linear, photo.original)
@@ -133,15 +133,20 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
         held = out[rows] if photo.hdr or layers.relit else _unclipped(out[rows], reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows] = np.where((change != 0).any(-1, keepdims=True), moved, out[rows])
-    return _in_front(out, layers.portrait)
+    return _in_front(out, layers.portrait, photo.hdr)
 
 
-def _in_front(picture: Array, portrait: Portrait | None) -> Array:
-    """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share."""
+def _in_front(picture: Array, portrait: Portrait | None, hdr: bool) -> Array:
+    """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share.
+
+    At the rim of what is brighter than an ordinary photo's white, white is mixed in, as a photo's pixels would be
+    enlarged: a few hundredths of a lamp's radiance would fill a pixel, and its outline would be ragged.
+    """
     if portrait is None:
         return picture
     share = portrait.share[..., None]
-    return np.where(share > 0, share * portrait.picture + (1 - share) * picture, picture).astype(np.float32)
+    own = portrait.picture if hdr else np.where(share < 1, np.minimum(portrait.picture, 1), portrait.picture)
+    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
 
 
 def onto_working(photo: Photo, layers: Layers) -> Array:

@@ -55,7 +55,7 @@ def render_layers(
     begun = studio.begun(edited) if sparing and spp >= FEWEST and not is_relit(scene, edited) else None
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
-    if scene.bodies != edited.bodies:
+    if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps):
         alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
         covered = anything = studio.covered(edited)
         if alone is not None:

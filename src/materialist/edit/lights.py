@@ -74,23 +74,24 @@ class Studio:
         return target.render(spp=-(-spp // PATHS_PER_RAY), seed=seed)
 
     def covered(self, edited: Scene) -> Array:
-        """[H, W] bool: pixels in which a body is seen, at least in part, that the other of the two scenes lacks."""
+        """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""
         seen = np.zeros(self.scene.depth.shape, bool)
         for scene, other in ((self.scene, edited), (edited, self.scene)):
             own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
+            own += _new_lamps(other, scene)
             if own:
                 seen |= self._seen(scene, own) > 0
         return seen
 
     def portrait(self, edited: Scene, *, spp: int, seed: int, clean: bool):
-        """The bodies that are new in `edited` at native size (`portrait.Portrait`), None where there are none to see.
+        """The bodies and lamps that are new in `edited` at native size (`portrait.Portrait`), None for none in sight.
 
         Bodies that take the place of a surface of the photo are left to the photo's own outlines.
         """
         from materialist.edit.portrait import free_bodies, portrait
         from materialist.render.scene import MAX_DEPTH
 
-        names = free_bodies(self.scene, edited)
+        names = free_bodies(self.scene, edited) + _new_lamps(self.scene, edited)
         if not names:
             return None
         depth = _path_depth(edited) or MAX_DEPTH
@@ -145,6 +146,11 @@ class Studio:
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target
+
+
+def _new_lamps(scene: Scene, edited: Scene) -> list[str]:
+    """Names of the shapes of lamps that `edited` has and `scene` has not."""
+    return [f"lamp{k}" for k, lamp in enumerate(edited.lamps) if lamp not in scene.lamps]
 
 
 def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from materialist.edit import glass, glows
-from materialist.types import Array, Scene
+from materialist.edit.mesh_material import constant
+from materialist.types import Array, Body, Scene
 
 MOST = 1_500_000
 """Pixels of a portrait that are traced; a larger one is traced smaller and enlarged."""
@@ -20,6 +21,11 @@ MARGIN = 4
 """Native pixels around the bodies that the denoiser sees."""
 CONTACT = 0.05
 """What hides a body from nearer than this share of its extent is the ground it stands on, not a thing before it."""
+
+
+NOWHERE = np.zeros((0, 3), np.float32)
+LAMP = Body(NOWHERE, NOWHERE.astype(np.int32), NOWHERE, NOWHERE[:, :2], constant(1.0, 1.0, 0.0), "lamp")
+"""What stands for a lamp where its albedo is asked for."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,7 @@ def portrait(
     camera, native = scene.camera, scene.photo.original.shape[:2]
     working = (camera.height, camera.width)
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+    bodies |= {f"lamp{k}": LAMP for k in range(len(edited.lamps))}
     chosen = {name: bodies[name] for name in names}
     small = trace.look(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1]))
     if not small.share.any():
@@ -76,7 +83,15 @@ def portrait(
     rows, columns = slice(*box[:2]), slice(*box[2:])
     share[rows, columns] = _behind_things(sight, alone, scene, box)
     whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
-    return Portrait(small.share, share, whole)
+    bright = any(max(bodies[name].surface.emission) > 1 or name.startswith("lamp") for name in names)
+    return Portrait(_around(small.share) if bright else small.share, share, whole)
+
+
+def _around(share: Array) -> Array:
+    """Its largest value within a pixel: a corner of what glows, too small to be looked up, outshines its pixel."""
+    import cv2
+
+    return np.asarray(cv2.dilate(share, np.ones((3, 3), np.uint8)))
 
 
 def _box(share: Array, native: tuple[int, int]) -> tuple[int, int, int, int]:
