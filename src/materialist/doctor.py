@@ -31,11 +31,19 @@ sys.stdout.write(" ".join(names))
 """Loads the CPU variant and runs one kernel: the step that a wrong LLVM does not survive."""
 
 _EXTRAS = {
-    "rawpy": "camera RAW photos",
-    "pyoidn": "denoised pictures",
-    "transformers": "hub predictors",
-    "diffusers": "Marigold predictor",
+    "rawpy": ("raw", "camera RAW photos"),
+    "pyoidn": ("denoise", "denoised pictures"),
+    "gradio": ("studio", "the studio"),
+    "mujoco": ("physics", "things that fall"),
+    "coacd": ("physics", "their convex parts"),
+    "imageio-ffmpeg": ("video", "films"),
+    "usd-core": ("usd", "export to USD"),
+    "fsspec": ("batch", "batches of photos behind URLs"),
+    "ray": ("ray", "batches on a cluster"),
+    "transformers": ("hub", "hub predictors"),
+    "diffusers": ("hub", "Marigold predictor"),
 }
+"""Package -> the extra of ours that installs it, and what it is for."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ def examine() -> list[Finding]:
         llvm,
         _renderer(path),
         _cuda(),
-        *(_extra(name, purpose) for name, purpose in _EXTRAS.items()),
+        *(_extra(name, *what) for name, what in _EXTRAS.items()),
         _weights(),
         _memory(),
         _disk(),
@@ -135,11 +143,11 @@ def _cuda() -> Finding:
     return Finding("GPU (CUDA)", "ok", child.stdout.strip().splitlines()[0])
 
 
-def _extra(name: str, purpose: str) -> Finding:
+def _extra(name: str, extra: str, purpose: str) -> Finding:
     try:
         return Finding(name, "ok", f"{version(name)} ({purpose})")
     except PackageNotFoundError:
-        return Finding(name, "missing", f"optional: {purpose}", _pip(name))
+        return Finding(name, "missing", f"optional: {purpose}", _pip(f"'materialist[{extra}]'"))
 
 
 def _weights() -> Finding:

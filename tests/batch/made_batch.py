@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 from made_pipeline import scene_of
+from made_scene import make_mesh
 from PIL import Image
 
 from materialist.errors import InputError, SetupError
-from materialist.types import Photo, Scene
+from materialist.types import Geometry, Photo, Scene
 
 TESTS = Path(__file__).resolve().parents[1]
 HELPERS = os.pathsep.join(str(TESTS / folder) for folder in ("batch", "cli", "io"))
@@ -27,6 +28,15 @@ def made_up(photo: Photo, **options) -> Scene:
     albedo = np.clip(photo.linear * np.float32(0.5 + 0.1 * options["seed"]), 0, 1).astype(np.float32)
     options["progress"]("light", 1, 1)
     return replace(scene, materials=replace(scene.materials, albedo=albedo))
+
+
+def even(photo: Photo, **options) -> Scene:
+    """The same before a flat wall that faces the camera, on which things can come to rest."""
+    scene = made_up(photo, **options)
+    depth, normal = np.full_like(scene.depth, 3), np.zeros_like(scene.normal)
+    normal[..., 2] = 1
+    geometry = Geometry(make_mesh(depth, normal, scene.camera), np.full_like(scene.geometry.plane_label, -1))
+    return replace(scene, depth=depth, normal=normal, geometry=geometry)
 
 
 def moody(photo: Photo, **options) -> Scene:

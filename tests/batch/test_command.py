@@ -4,15 +4,16 @@ import csv
 import functools
 import json
 import re
+import shlex
 
 import pytest
 from made_batch import photos
 
 import materialist.batch.run as batch_run
-from materialist.batch.outcome import Outcome, Row
+from materialist.batch.outcome import Outcome, Row, Status
 from materialist.batch.page import PER_PAGE, write_pages
 from materialist.cli import app
-from materialist.cli.batch import _note, _span
+from materialist.cli.batch import BatchProgress, _note, _span
 from materialist.cli.outcome import run_to_exit_code
 
 
@@ -50,6 +51,31 @@ def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):
     assert "impossible=&lt;b&gt;" in page and "impossible=<b>" not in page
 
 
+def _stopped(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        ((), ()),
+        (("--apply", "my edits.yaml", "--size", "96", "--device", "cpu"), ()),
+        (("--fov", "auto", "--force"), ("--fov", "auto")),  # as given, though it is the default
+        (("--seed", "3", "--resume", "--force"), ("--seed", "3", "--force")),
+    ],
+)
+def test_ctrl_c_says_how_to_go_on_with_the_same_options(run, monkeypatch, options, kept):
+    monkeypatch.setattr(batch_run, "batch", _stopped)
+    code, out, err = run("batch", "my photos", "-o", "runs", *options)
+    assert code == 130 and not out and "nothing was written" not in err
+    words = shlex.split(err.split("Go on with: ")[1])
+    assert words == ["materialist", "batch", "my photos", "-o", "runs", *(kept or options), "--resume"]
+    code, out, err = run("batch", "my photos", "-o", "runs", *options, "--json")
+    assert code == 130 and len(out.splitlines()) == 1
+    said = json.loads(out)
+    assert not said["ok"] and said["exit_code"] == 130 and "--json --resume" in said["message"].replace(" --force", "")
+
+
 def test_the_page_asks_nobody_for_anything(run, tmp_path):
     source, runs = photos(tmp_path / "in", "a"), tmp_path / "runs"
     run("batch", source, "-o", runs, "--workers", 1, "--device", "cpu", "--json")
@@ -78,8 +104,15 @@ def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
     assert row["id"] == "'=1+1.png" and row["name"] == "'@x"
 
 
-def test_progress_says_the_rate_and_the_time_left():
-    from materialist.batch.outcome import Status
+def test_what_went_wrong_is_said_above_the_bars(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with BatchProgress() as progress:
+        progress(Status(2, 0, 0, 0.0, None, news="b lacks a mask", urgent=True))
+        progress(Status(2, 1, 0, 0.0, None, news="failed.png: done"))
+    said = capsys.readouterr().err
+    assert "b lacks a mask" in said and "failed.png" not in said
 
+
+def test_progress_says_the_rate_and_the_time_left():
     assert _note(Status(10, 3, 1, 0.05, 6000.0)) == "1 failed, 3.0 a minute, 100 min left"
     assert (_span(40), _span(600), _span(36000)) == ("40 s", "10 min", "10.0 h")

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from made_batch import photos
 
-from materialist.batch.edits import edits_for, edits_key
+from materialist.batch.edits import edits_for, edits_key, missing_files
 from materialist.batch.run import batch
+from materialist.edit.recipe import read_recipe
+from materialist.errors import InputError
 from materialist.io.package import load_scene
 
 TEXT = "- drop: {mesh: ['{name}.ply', ball.ply], at: [3, 4]}\n- edit: {mask: 'm/{name}.png', hue: 20}\n"
@@ -33,10 +36,45 @@ def test_the_key_changes_with_a_mesh_and_with_nothing_else(recipe):
     assert edits_key(recipe, "a", 8) != key
 
 
+def test_files_that_are_missing_are_found_step_by_step(recipe):
+    steps, folder = read_recipe(recipe), recipe.parent
+    assert missing_files(steps, "a") == [f"{folder}/m/a.png"]
+    assert missing_files(steps, "c") == [f"{folder}/c.ply", f"{folder}/m/c.png"]
+    recipe.write_text(
+        "- glass: {click: [3, 4], thickness: network}\n- glass: {click: [3, 4], thickness: d.exr}\n"
+        "- edit: {mask: none.png, hue: 3, skip: true}\n- relight: {envmap: sky.exr}\n"
+    )
+    assert missing_files(read_recipe(recipe), "a") == [f"{folder}/d.exr", f"{folder}/sky.exr"]
+
+
+@pytest.mark.parametrize(
+    "text", ["- edit: {mask: none.png, hue: 20}\n", "- drop: {mesh: [ball.ply, no.ply], at: [1, 2]}\n"]
+)
+def test_a_file_that_every_photo_lacks_is_found_before_anything_is_written(recipe, text):
+    recipe.write_text(text)
+    source = photos(recipe.parent / "photos", "one", "two")
+    with pytest.raises(InputError, match=r"no file .*/(none.png|no.ply), which .*edits.yaml names"):
+        batch(source, recipe.parent / "runs", apply=recipe, function="made_batch:made_up", workers=1, device="cpu")
+    assert not (recipe.parent / "runs").exists()
+
+
+def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
+    recipe.write_text("- edit: {mask: 'm/{name}.png', hue: 20}\n")
+    source, runs, said = photos(recipe.parent / "photos", "one", "two"), recipe.parent / "runs", []
+    options = {"apply": recipe, "function": "made_batch:made_up", "workers": 1, "device": "cpu", "spp": 2}
+    with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*--resume"):
+        batch(source, runs, **options)
+    assert not list(runs.glob("*.scene"))
+    (recipe.parent / "m").mkdir()
+    (recipe.parent / "m/one.png").write_bytes(b"no picture")
+    outcome = batch(source, runs, resume=True, progress=said.append, **options)
+    assert said[0].urgent and said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
+    assert "m/two.png for two.png" in said[0].news and outcome.count("failed") == 2 and (runs / "two.scene").is_dir()
+
+
 def test_a_drop_is_applied_to_every_photo(tmp_path):
     pytest.importorskip("mujoco")
     pytest.importorskip("mitsuba")
-    from made_batch import photos
     from made_meshes import box_file
 
     box_file(tmp_path / "box.ply")
@@ -46,7 +84,7 @@ def test_a_drop_is_applied_to_every_photo(tmp_path):
     photos(tmp_path / "photos", "one")
     runs = tmp_path / "runs"
     outcome = batch(
-        tmp_path / "photos", runs, apply=tmp_path / "edits.yaml", spp=4, function="made_batch:made_up",
+        tmp_path / "photos", runs, apply=tmp_path / "edits.yaml", spp=4, function="made_batch:even",
         workers=1, device="cpu", size=24, seed=1,
     )  # fmt: skip
     (row,) = outcome.rows

@@ -35,6 +35,25 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
     assert found["https://host/x.jpg"] == "https://me:secret@host/x.jpg?signature=1"
 
 
+def test_a_comment_may_stand_behind_a_name(tmp_path):
+    photos(tmp_path, "a", "c#1", "d #2")
+    listing = tmp_path / "list.txt"
+    listing.write_text(
+        "a.png # the kitchen\nb.png\t#none\nc#1.png  ## twice\nd #2.png\n # alone\n#\nhttps://h/x.jpg#y\n"
+    )
+    assert ids(listing) == ["a.png", "b.png", "c#1.png", "d #2.png", "https://h/x.jpg#y"]
+
+
+@pytest.mark.parametrize("runs", ["in", "in/", "link"])
+def test_results_have_a_folder_of_their_own(tmp_path, monkeypatch, runs):
+    photos(tmp_path / "in", "a")
+    (tmp_path / "link").symlink_to(tmp_path / "in")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"RUNS cannot be (in|link), the folder of the photos; .* (in|link)/runs"):
+        list_photos("in", runs=runs)
+    assert ids("in", "in/runs") == ["a.png"]
+
+
 @pytest.mark.parametrize(
     ("make", "said"), [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")]
 )

@@ -1,7 +1,10 @@
 """The examination: it never raises, and every failing line has the command that mends it."""
 
 import json
+import re
 import subprocess
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +12,8 @@ from materialist import doctor
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.doctor import Finding
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_wrong_llvm_is_found_in_a_child_and_survived(monkeypatch):
@@ -37,7 +42,27 @@ def test_a_probe_that_hangs_is_survived(monkeypatch):
 def test_missing_packages_name_their_command():
     finding = doctor._package("no-such-package-here")
     assert finding.state == "broken" and finding.remedy.endswith("pip install no-such-package-here")
-    assert doctor._extra("no-such-package-here", "nothing").state == "missing"
+
+
+def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    packages = {
+        re.match(r"[\w-]+", entry)[0]: extra
+        for extra, entries in extras.items()
+        for entry in entries
+        if extra not in ("app", "dev")
+    }
+
+    def nothing(name):
+        raise doctor.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, "version", nothing)
+    found = {name: doctor._extra(name, *what) for name, what in doctor._EXTRAS.items()}
+    assert set(found) == set(packages), "every package of an extra is looked for, and no other"
+    for name, finding in found.items():
+        assert finding.state == "missing" and finding.remedy.endswith(
+            f" -m pip install 'materialist[{packages[name]}]'"
+        )
 
 
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("missing", 0), ("broken", 2)])

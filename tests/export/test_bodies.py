@@ -179,7 +179,7 @@ def test_lamps_leave_for_gltf_usd_and_blender(tmp_path):
     facts = json.loads((done.path / "scene.json").read_text())
     assert facts["lamps"] == [{"position": [0.9, 0.3, -2.6], "power": [6.0, 4.5, 3.0], "radius": 0.12}]
     assert not any("none of the scene" in note for note in done.notes)
-    assert any("none of the scene's 1 lamps" in note for note in export(scene, tmp_path / "a.html").notes)
+    assert any("none of the scene's 1 lamp" in note for note in export(scene, tmp_path / "a.html").notes)
 
 
 def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):

@@ -47,7 +47,7 @@ def test_options_of_blender_go_with_blender(tmp_path):
 
 def test_lamps_that_a_format_lacks_are_told(tmp_path):
     lit = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (3.0, 2.0, 1.0), 0.05),))
-    assert any("none of the scene's 1 lamps" in note for note in mt.export(lit, tmp_path / "a.html").notes)
+    assert any("none of the scene's 1 lamp" in note for note in mt.export(lit, tmp_path / "a.html").notes)
     assert not any("none of the scene" in note for note in mt.export(lit, tmp_path / "b", to="mitsuba").notes)
 
 

@@ -11,12 +11,20 @@ import numpy as np
 import pytest
 from made_scene import make_scene
 
+from materialist import __version__
 from materialist.errors import OutputError, SceneError
 from materialist.io import package, target
 from materialist.io.package import load_scene, save_scene
 from materialist.io.ply import read_ply, write_ply
 from materialist.io.target import ensure_writable
 from materialist.types import Body, Surface
+
+
+@pytest.fixture
+def scene():
+    """One that was saved before: its provenance has the version of the tool."""
+    made = make_scene()
+    return replace(made, provenance={"tool_version": __version__, **made.provenance})
 
 
 def assert_same(a, b, where="scene"):
@@ -107,7 +115,21 @@ def test_provenance_of_numpy_numbers_and_infinite_metrics(scene, tmp_path):
     save_scene(scene, tmp_path / "a.scene")
     loaded = load_scene(tmp_path / "a.scene")
     assert np.isnan(loaded.report.metrics["psnr"]) and loaded.report.metrics["n"] == 0.5
-    assert loaded.provenance == {"sizes": [3, str(tmp_path)]}
+    assert loaded.provenance == {"tool_version": __version__, "sizes": [3, str(tmp_path)]}
+
+
+def test_the_version_that_made_a_scene_stays_with_it(scene, tmp_path):
+    save_scene(replace(scene, provenance={"seed": 3}), tmp_path / "a.scene")
+    file = tmp_path / "a.scene/scene.json"
+    meta = json.loads(file.read_text())
+    assert meta["provenance"] == {"tool_version": __version__, "seed": 3}
+    meta["provenance"]["tool_version"] = "0.0.9"
+    file.write_text(json.dumps(meta))
+    save_scene(load_scene(tmp_path / "a.scene"), tmp_path / "b.scene")
+    assert json.loads((tmp_path / "b.scene/scene.json").read_text())["provenance"]["tool_version"] == "0.0.9"
+    del meta["provenance"]["tool_version"]
+    file.write_text(json.dumps(meta))
+    assert load_scene(tmp_path / "a.scene").provenance == {"seed": 3}
 
 
 def test_an_existing_scene_is_kept_without_force_and_replaced_with_it(scene, tmp_path):
@@ -232,7 +254,7 @@ def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
     with pytest.raises(SceneError, match="mv "):
         load_scene(place)
     save_scene(replace(scene, provenance={}), place, force=True)
-    assert load_scene(place).provenance == {} and os.listdir(tmp_path) == ["a.scene"]
+    assert load_scene(place).provenance == {"tool_version": __version__} and os.listdir(tmp_path) == ["a.scene"]
 
 
 def test_a_running_neighbour_is_left_alone(scene, tmp_path):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -108,3 +109,33 @@ def test_what_kept_the_renderer_from_loading_is_the_first_cause():
         said = variant.unloaded(error)
     assert "libatomic.so.1 is missing" in said and "apt-get install -y libatomic1" in said
     assert "pip install --force-reinstall" in variant.unloaded(ImportError("no module named mitsuba"))
+
+
+@pytest.mark.parametrize("hidden", ["cause", "context"])
+def test_ctrl_c_while_the_renderer_loads_is_no_fault_of_it(monkeypatch, hidden):
+    class Loader:
+        """In the place of Mitsuba: an extension that turns a Ctrl-C into an error of its own."""
+
+        @staticmethod
+        def find_spec(name, *_):
+            if name != "mitsuba":
+                return None
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as stop:
+                if hidden == "cause":
+                    raise ImportError("mitsuba_ext did not load") from stop
+                raise NameError("name 'mitsuba_ext' is not defined")  # noqa: B904 - as Dr.Jit does it
+
+    monkeypatch.delitem(sys.modules, "mitsuba", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Loader, *sys.meta_path])
+    with pytest.raises(KeyboardInterrupt):
+        setup("cpu")
+
+
+def test_ctrl_c_while_the_variant_starts_is_no_fault_of_it():
+    def interrupted(_):
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    with pytest.raises(KeyboardInterrupt):
+        variant._start(SimpleNamespace(set_variant=interrupted), "cpu")

@@ -1,17 +1,22 @@
 """A page's session, on a small scene with a real preview."""
 
+import subprocess
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from studio_scenes import block, click, room
 
-from materialist.edit.recipe import apply, read_recipe
+from materialist.edit.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.context import light_values, material_values
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
+from materialist.studio.stack import Stack
 from materialist.studio.tab_light import place_lamp
 from materialist.studio.tab_object import LIBRARY, library_file, shape
 from materialist.studio.tab_take import commands
+from materialist.studio.work import Project
 
 
 def test_an_edit_from_click_to_recipe(session):
@@ -174,6 +179,61 @@ def test_reopened_where_it_was_left(hub, session):
     assert other.live is None and session.live is not None
     with pytest.raises(InputError, match="Open a photo"):
         other.material("hue", "1")
+
+
+USUAL = {
+    "predictor": "bundled step 9 sha256:01", "engine": "transport", "preset": "default", "size": 512, "tau": 6.0,
+    "strategy": "default", "seed": 0, "fov": 35.0, "fov_source": "default",
+}  # fmt: skip
+
+
+@pytest.fixture
+def typed(tmp_path):
+    """What a shell calls `materialist` with when the page's commands are pasted, one list of words a call."""
+    folder = tmp_path / "my photos" / "photo-001"
+    (folder / "edits-me").mkdir(parents=True)
+
+    def run(made, *, steps=(), there=True, photo=True):
+        if there:
+            (folder / "photo.scene").mkdir(exist_ok=True)
+        project = Project(folder, "Jug", "me", folder / "photo.scene", folder / "original.jpg" if photo else None)
+        page = SimpleNamespace(project=project, desk=folder / "edits-me", stack=Stack(steps))
+        page.scene = SimpleNamespace(provenance=made)
+        program = 'materialist() { pwd -P; printf "%s\\n" "$@" .; }\nset -e\n'
+        done = subprocess.run(["bash", "-c", program + commands(page)], capture_output=True, text=True, check=True)
+        calls = [call.strip("\n").split("\n") for call in done.stdout.split("\n.\n") if call.strip()]
+        assert all(call[0] == str(folder.resolve()) for call in calls)
+        return [call[1:] for call in calls]
+
+    return run
+
+
+def test_the_commands_do_not_take_the_photo_apart_twice(typed):
+    assert [call[0] for call in typed(USUAL)] == ["render", "export"]
+    scene = typed(USUAL, photo=False)[0][1]
+    assert scene.startswith("/") and scene.endswith("my photos/photo-001/photo.scene")
+
+
+def test_edits_are_in_what_the_commands_export(typed):
+    apply, export = typed(USUAL, steps=(Step("relight", {"rotate": "5"}),))
+    assert apply[:3] == ["apply", "photo.scene", "edits-me/edits.yaml"] and apply[-2:] == ["--save", "edited.scene"]
+    assert export[:2] == ["export", "edited.scene"]
+    off = Step("relight", {"rotate": "5", "skip": "true"})
+    assert typed(USUAL, steps=(off,))[1][:2] == ["export", "photo.scene"]
+
+
+@pytest.mark.parametrize(
+    ("made", "options"),
+    [
+        ({}, []),
+        ({"predictor": "matnet vitb matnet.pth sha256:01"}, ["--predictor", "matnet"]),
+        ({"predictor": "classical", "size": 384}, ["--predictor", "classical", "--size", "384"]),
+        ({"fov": 61.25, "fov_source": "option", "seed": 3}, ["--fov", "61.25", "--seed", "3"]),
+        ({"fov": 61.25, "fov_source": "exif"}, []),
+    ],
+)
+def test_the_commands_have_the_options_of_the_inversion(typed, made, options):
+    assert typed({**USUAL, **made}, there=False)[0] == ["invert", "original.jpg", "-o", "photo.scene", *options]
 
 
 def test_edits_that_cannot_be_read_are_left_as_they_are(hub, session):

@@ -35,6 +35,32 @@ def test_a_resized_crop_stays_on_the_plane(sample):
         _on_plane(augment.resized(augment.window(sample, 24, 8, 24, 24), size, size), made_samples.NORMAL, 0.06)
 
 
+@pytest.mark.parametrize("size", [22, 34, 96])
+def test_colours_at_the_sky_are_those_of_the_surface(sample, size):
+    """Next to the sky, which has no albedo, a surface of one paint keeps it; the picture itself is mixed."""
+    surface = sample.mask[..., None] > 0
+    painted = replace(sample, albedo=np.where(surface, np.float32([0.6, 0.4, 0.2]), 0),
+                      metallic=sample.mask * np.float32(0.8))  # fmt: skip
+    scaled = augment.resized(painted, size, size)
+    here = scaled.mask > 0
+    assert 0.2 < here.mean() < 0.95
+    np.testing.assert_allclose(scaled.albedo[here], np.broadcast_to([0.6, 0.4, 0.2], (here.sum(), 3)), atol=1e-5)
+    np.testing.assert_allclose(scaled.roughness[here], 0.4, atol=1e-5)
+    np.testing.assert_allclose(scaled.metallic[here], 0.8, atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [(96, 128), (24, 32), (30, 100)])
+def test_rays_of_a_resized_picture_are_those_of_its_camera(sample, size):
+    height, width = size
+    x = ((np.arange(width) + 0.5) / width * 2 - 1) * np.tan(np.radians(25))
+    y = (1 - (np.arange(height) + 0.5) / height * 2) * np.tan(np.radians(25)) * 48 / 64
+    rays = augment.resized(sample, height, width).rays
+    np.testing.assert_allclose(rays[..., 0], np.broadcast_to(x, size), atol=1e-6)
+    np.testing.assert_allclose(rays[..., 1], np.broadcast_to(y[:, None], size), atol=1e-6)
+    mirrored = augment.resized(augment.flip(sample), height, width)
+    np.testing.assert_allclose(mirrored.rays[:, ::-1] * [-1, 1], rays, atol=1e-6)
+
+
 def test_flips_mirror_the_geometry(sample):
     mirrored = augment.flip(sample)
     _on_plane(mirrored, made_samples.NORMAL * [-1, 1, 1], 2e-3)

@@ -21,7 +21,7 @@ from materialist.train.export import export_run
 from materialist.train.recipes import recipe
 from materialist.train.samples import SampleFolder
 from materialist.train.tasks import BundledTask, relative_log_depth
-from materialist.train.trainer import CURVE, SCORES
+from materialist.train.trainer import CURVE, SCORES, Habits
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +117,32 @@ def test_the_averaged_weights_are_exported_and_predict(run, tmp_path):
     assert moved > 0, "an average is not the last step"
     with pytest.raises(OutputError, match="exists"):
         export_run(folder, file)
+
+
+def test_an_export_to_no_folder_is_refused(run, tmp_path):
+    (tmp_path / "file").write_text("")
+    for place in ("file", "nowhere"):
+        with pytest.raises(OutputError, match="cannot be written"):
+            export_run(run[0], tmp_path / place / "w.safetensors")
+
+
+def test_figures_of_samples_trained_on_are_said_to_be(run, tmp_path):
+    """Four samples are too few to keep any aside, forty are enough."""
+    folder, notes = run
+    assert any("of samples trained on" in note for note in notes)
+    assert checkpoint.read_lines(folder / SCORES)[-1]["of"] == "samples trained on"
+    enough, told = made_samples.write_set(tmp_path / "set", stream.KEPT_ASIDE), []
+    trainer = made_runs.trainer(enough, tmp_path / "run", steps=1, samples=2, notes=told)
+    assert trainer.scored_on == ""
+    trainer.run()
+    assert trainer.scored_on == "samples kept aside" and not any("trained on" in note for note in told)
+    assert checkpoint.read_lines(tmp_path / "run" / SCORES)[-1]["of"] == "samples kept aside"
+
+
+@pytest.mark.parametrize("habit", ["workers", "score_samples"])
+def test_habits_that_cannot_be(habit):
+    with pytest.raises(InputError, match=f"--{habit.replace('_', '-')} is -1; give 0 or more"):
+        Habits(**{habit: -1})
 
 
 def test_checkpoints_are_whole_or_refused(tmp_path):
@@ -243,4 +269,4 @@ def test_crops_grow_with_the_run(data, tmp_path):
 
     trainer._step = noted
     trainer.run()
-    assert sides[:3] == [32] * 3 and sides[-1] == 64
+    assert sides == [32] * 3 + [64] * 3, "in the middle of a pass of two steps"

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from materialist.batch.packages import file_hash
 from materialist.edit.recipe import Step, read_recipe
+from materialist.edit.thickness import METHODS
 
 FILES = ("mask", "texture", "envmap", "mesh", "background", "thickness")
 """Options of a step that name a file, or a list of files; `{name}` in them stands for the photo's name."""
@@ -29,6 +31,19 @@ def edits_key(path: str | Path, name: str, spp: int) -> str:
         }
         described.append([step.kind, step.options, files])
     return hashlib.sha256(json.dumps([described, spp], sort_keys=True).encode()).hexdigest()
+
+
+def missing_files(steps: list[Step], name: str) -> list[str]:
+    """Files that steps as `read_recipe` gives them need for a photo and that are not there."""
+    found = []
+    for step in steps:
+        if step.skipped:
+            continue
+        options = _named(step.options, name)
+        given = [(key, file) for key in FILES if key in options for file in _list(options[key])]
+        files = [f for key, f in given if isinstance(f, str) and not (key == "thickness" and f in METHODS)]
+        found += [str(step.folder / file) for file in files if not os.path.isfile(step.folder / file)]
+    return found
 
 
 def _named(options: dict, name: str) -> dict:

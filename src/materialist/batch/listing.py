@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,8 +35,9 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
     """The photos of SOURCE, sorted by name, each once.
 
     SOURCE is a folder (searched with its subfolders; hidden files, scene packages and the results of batches are
-    passed over), a text file with a photo or URL on each line (relative to the file; # begins a comment), a single
-    photo, or a URL of a folder, a pattern or a photo that fsspec can read. RUNS is passed over in any case.
+    passed over), a text file with a photo or URL on each line (relative to the file; # begins a comment, behind a name
+    only after a space), a single photo, or a URL of a folder, a pattern or a photo that fsspec can read. RUNS is passed
+    over in any case.
 
     Raises InputError where there is nothing to do, SetupError where a URL needs a library that is not installed.
     """
@@ -58,6 +60,8 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
 def _of_folder(folder: Path, runs: Path) -> list[Listed]:
     found = []
     own = os.path.realpath(runs)
+    if os.path.realpath(folder) == own:
+        raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
     try:
         for place, below, files in os.walk(folder, onerror=_raise):
             if MARKER in files or LEDGER in files or os.path.realpath(place) == own:
@@ -87,8 +91,14 @@ def _of_list(file: Path) -> list[Listed]:
         lines = file.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
-    entries = [line.strip() for line in lines]
-    return [_named(entry, file.parent) for entry in entries if entry and not entry.startswith("#")]
+    entries = [_entry(line.strip(), file.parent) for line in lines]
+    return [_named(entry, file.parent) for entry in entries if entry]
+
+
+def _entry(line: str, folder: Path) -> str:
+    """A line without its comment. A photo whose name goes on after " #" is one all the same."""
+    name = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].rstrip()
+    return line if name and name != line and os.path.isfile(folder / line) else name
 
 
 def _named(entry: str, folder: Path) -> Listed:

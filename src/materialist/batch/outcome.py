@@ -73,4 +73,6 @@ class Status:
     running: dict[str, str] = field(default_factory=dict)
     """Name -> stage, of photos at work."""
     news: str | None = None
-    """A line about the photo that has just ended."""
+    """A line to show; most are about a photo that has just ended."""
+    urgent: bool = False
+    """Whether the line is about something that went wrong."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist import __version__, errors
+from materialist.batch.edits import missing_files
 from materialist.batch.job import INVERSION, Job
 from materialist.batch.ledger import Ledger, open_ledger
 from materialist.batch.listing import Listed, list_photos
@@ -19,6 +20,7 @@ from materialist.batch.page import write_pages
 from materialist.batch.plan import check_options, fingerprint, plan
 from materialist.batch.remote import is_url
 from materialist.batch.summary import write_summary
+from materialist.edit.recipe import read_recipe
 from materialist.errors import InputError
 
 TRIES = 3
@@ -86,6 +88,8 @@ def batch(
     try:
         jobs, finished = plan(photos, ledger, Path(runs), asked, edits=recipe, spp=spp, function=function)
         run = _Run(Path(runs), photos, ledger, jobs, finished, progress or (lambda _: None), start, asked)
+        if recipe is not None and (notice := _lacking(recipe, jobs, none_done=not finished)):
+            run.tell(notice, urgent=True)
         if jobs:
             run.work(_pool(ray, workers, len(jobs), device, size))
         return run.outcome()
@@ -106,11 +110,26 @@ def _pool(ray: str | None, workers: int | None, jobs: int, device: str, size: in
 
 
 def _check_edits(recipe: Path, spp: int) -> None:
-    from materialist.edit.recipe import read_recipe
-
+    """Refuse, before any photo is touched, what would fail every photo. Raises InputError."""
     if not 2 <= spp <= 1_000_000:
         raise InputError(f"spp is a number of paths from 2 to 1000000, not {spp}.")
-    read_recipe(recipe)
+    missing = [file for file in missing_files(read_recipe(recipe), "{name}") if "{name}" not in file]
+    if missing:
+        raise InputError(f"There is no file {missing[0]}, which {recipe} names; put it there, or change the edits.")
+
+
+def _lacking(recipe: Path, jobs: list[Job], *, none_done: bool) -> str | None:
+    """What to say of photos whose edits name a file that is missing. Raises InputError where all photos are such."""
+    steps = read_recipe(recipe)
+    found = [(job, missing[0]) for job in jobs if (missing := missing_files(steps, job.name))]
+    if not found:
+        return None
+    job, file = found[0]
+    if none_done and len(found) == len(jobs):
+        raise InputError(f"No photo has the files that {recipe} names (there is no {file} for {job.id}); put them "
+                         "there, and add --resume.")  # fmt: skip
+    return (f"{len(found)} of {len(jobs)} photos lack a file that {recipe} names (there is no {file} for {job.id}); "
+            "they get a scene, but no edited photo unless it is there by then.")  # fmt: skip
 
 
 class _Run:
@@ -137,7 +156,7 @@ class _Run:
             while self._waiting or self._stages:
                 while self._waiting and pool.free() > 0:
                     self._begin(pool, self._waiting.popleft())
-                self._tell(None)
+                self.tell(None)
                 for news in pool.wait(1.0):
                     self._hear(news)
                 if time.monotonic() - self._written > max(REFRESH, SHARE * self._writing):
@@ -180,7 +199,7 @@ class _Run:
         stage = self._stages.pop(job.id, None)
         if news.kind == LOST and self._tries[job.id] < TRIES:
             self._waiting.appendleft(job)
-            self._tell(f"{job.id}: {facts['reason']} It is begun again.")
+            self.tell(f"{job.id}: {facts['reason']} It is begun again.")
             return
         if news.kind == FAILED:
             _stop_if_for_all(facts)
@@ -194,14 +213,15 @@ class _Run:
         self._ledger.append(kind, id=job.id, name=job.name, attempts=self._tries[job.id], **{**known, **facts})
         self._through += 1
         self._failed += kind == FAILED
-        self._tell(_line(job, kind, facts))
+        self.tell(_line(job, kind, facts), urgent=kind == FAILED)
 
-    def _tell(self, news: str | None) -> None:
+    def tell(self, news: str | None, urgent: bool = False) -> None:
+        """Say how it stands, and what has happened."""
         total, over = len(self._photos), len(self._kept) + self._through
         rate = self._through / max(time.monotonic() - self._worked, 1e-9)
         left = (total - over) / rate if rate else None
         running = {self._names[id]: stage for id, stage in self._stages.items()}
-        self._watch(Status(total, over - self._failed, self._failed, rate, left, running, news))
+        self._watch(Status(total, over - self._failed, self._failed, rate, left, running, news, urgent))
 
     def _row(self, photo: Listed) -> Row:
         entry = self._ledger.last.get(photo.id, {})

@@ -96,6 +96,9 @@ def run(
         add(data, "", limit)
         settings |= lost(data, split)
     if count:
+        from materialist.train.data.produce import CONTENT
+
+        settings["procedural content"] = CONTENT["heldout"]
         with tempfile.TemporaryDirectory() as place:
             add(held_out(Path(place) / "set", count, size, seed, meshes, envmaps, device), ", procedural", 0)
     rows = _with_pooled(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from types import TracebackType
@@ -11,6 +12,7 @@ import typer
 
 from materialist.cli.options import Device, DeviceOption, FieldOfView, Json, Seed, WorkingSize, output_option
 from materialist.cli.outcome import INTERRUPTED, report_success
+from materialist.errors import MaterialistError
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -23,7 +25,14 @@ def register(app: typer.Typer) -> None:
     app.command("batch")(batch)
 
 
+class Interrupted(MaterialistError):
+    """Ctrl-C, with how to go on."""
+
+    exit_code = INTERRUPTED
+
+
 def batch(
+    context: typer.Context,
     source: Annotated[
         str,
         typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
@@ -59,13 +68,25 @@ def batch(
                 predictor=predictor, size=size, fov=fov, seed=seed, device=device.value, spp=spp, progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
-        message = f"Interrupted; what is done stays. Go on with: materialist batch {source} -o {output} --resume"
-        typer.echo(message, err=True)
-        report_success("batch", as_json, [], ok=False, error="Interrupted", message=message, exit_code=INTERRUPTED)
-        raise typer.Exit(INTERRUPTED) from None
+        raise Interrupted(f"Interrupted; what is done stays. Go on with: {_again(context)}") from None
     _report(outcome, output, as_json)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
+
+
+def _again(context: typer.Context) -> str:
+    """The command line that goes on: as it was given, with --resume."""
+    given = context.params
+    words = ["materialist", "batch", str(given["source"])]
+    for option in context.command.params:
+        name = str(option.name)
+        source = context.get_parameter_source(name)
+        told = source is not None and source.name == "COMMANDLINE"
+        if name == "force":  # what was begun anew is there to go on with; under --resume it allows other options
+            told = told and given["resume"]
+        if told and name not in ("source", "resume"):
+            words += [option.opts[0]] if given[name] is True else [option.opts[0], str(given[name])]
+    return shlex.join([*words, "--resume"])
 
 
 def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
@@ -120,7 +141,7 @@ class BatchProgress:
             typer.echo(f"[{over}/{status.total}] {status.news}", err=True)
         if self._bars is None or self._all is None:
             return
-        if status.news and "failed" in status.news:
+        if status.news and status.urgent:
             self._bars.console.print(status.news, markup=False, highlight=False)
         over = status.done + status.failed
         self._bars.update(self._all, completed=over, total=status.total, note=f"{over}/{status.total}  {_note(status)}")

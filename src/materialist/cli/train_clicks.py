@@ -43,16 +43,18 @@ def clicks(
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
     from materialist.cli.progress import StageProgress
+    from materialist.train import checkpoint
     from materialist.train.budget import Budget
     from materialist.train.clicks.trainer import Recipe, Trainer
     from materialist.train.clicks.views import produce
 
     budget = Budget(steps=steps, minutes=40 if steps is None and minutes is None else minutes)
+    recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
+    checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
     with StageProgress(quiet=as_json) as progress:
         produce(data, output / "views", progress)
         trainer = Trainer(
-            output, output / "views", budget=budget,
-            recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16), seed=seed, every=every, resume=resume, init=init,
+            output, output / "views", budget=budget, recipe=recipe, seed=seed, every=every, resume=resume, init=init,
             note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
         )  # fmt: skip
         figures = trainer.run(progress)

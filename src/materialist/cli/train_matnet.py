@@ -86,7 +86,10 @@ def matnet(
         processes.leave()
     if processes.first:
         lines = [f"{output}: step {trainer.clock.step}.", f"Look at {output / 'sheet.png'}"]
-        report_success("train matnet", as_json, lines, run=str(output), step=trainer.clock.step, **figures)
+        if trainer.scored_on:
+            lines.insert(1, f"The figures are of {trainer.scored_on}.")
+        facts = {"run": str(output), "step": trainer.clock.step, "scored_on": trainer.scored_on or None}
+        report_success("train matnet", as_json, lines, **facts, **figures)
 
 
 def export(

@@ -53,19 +53,22 @@ def refraction(
     folder = data or output / "views"
     train, aside = folder / "train", folder / "heldout"
     plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
+    if not data_only:
+        from materialist.train import checkpoint
+        from materialist.train.budget import Budget
+        from materialist.train.refraction.trainer import Recipe, Trainer
+
+        budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
+        recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
+        checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
     with StageProgress(quiet=as_json) as progress:
         seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
         if data_only:
             lines = [f"{shapes} x {views} views in {train} ({seconds:.0f} s)"]
             report_success("train refraction", as_json, lines, data=str(folder), seconds=seconds)
             return
-        from materialist.train.budget import Budget
-        from materialist.train.refraction.trainer import Recipe, Trainer
-
-        budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
         trainer = Trainer(
-            output, train, aside, budget=budget, recipe=Recipe(batch=batch, rate=rate, bfloat16=bfloat16),
-            seed=seed, every=every, resume=resume,
+            output, train, aside, budget=budget, recipe=recipe, seed=seed, every=every, resume=resume,
             note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
         )  # fmt: skip
         figures = trainer.run(progress)

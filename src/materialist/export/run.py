@@ -70,7 +70,8 @@ def export(
     if names := left_out(bodies, to):
         note = (f"{to} shows bodies without {' and '.join(names)}; glb, blend and mitsuba have all of it.",)
     if scene.lamps and to == "html":
-        note = (*note, f"html has none of the scene's {len(scene.lamps)} lamps; the other formats have.")
+        count = len(scene.lamps)
+        note = (*note, f"html has none of the scene's {count} lamp{'s' * (count != 1)}; the other formats have.")
     if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
         note = (*note, f"Mitsuba has no {COATED}.")
     parts = [*scene_parts(scene, max_triangles), *bodies]

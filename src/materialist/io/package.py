@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist import __version__
 from materialist.errors import MaterialistError, OutputError, SceneError
 from materialist.io.bodies import read_bodies, write_bodies
 from materialist.io.exr import read_exr, write_exr
@@ -126,7 +127,7 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "warnings": list(scene.prior.warnings),
             "sources": scene.prior.sources,
         },
-        "provenance": scene.provenance,
+        "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
         **({"lamps": [asdict(lamp) for lamp in scene.lamps]} if scene.lamps else {}),
     }
 

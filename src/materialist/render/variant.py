@@ -137,6 +137,20 @@ def unloaded(error: BaseException) -> str:
     return f"the library {match[1]} is missing; install it with: sudo apt-get install -y {package_of(match[1])}"
 
 
+def _stop_if_interrupted(error: BaseException) -> None:
+    """Raise KeyboardInterrupt where a Ctrl-C is among the causes: an extension that loads turns it into its own."""
+    waiting: list[BaseException | None] = [error]
+    seen: set[int] = set()
+    while waiting:
+        cause = waiting.pop()
+        if cause is None or id(cause) in seen:
+            continue
+        if isinstance(cause, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        seen.add(id(cause))
+        waiting += [cause.__cause__, cause.__context__]
+
+
 def package_of(library: str) -> str:
     """Debian's package of a shared library: libatomic.so.1 is in libatomic1."""
     return library.replace(".so.", "").replace(".so", "").lower()
@@ -178,6 +192,7 @@ def setup(device: str = "auto"):
     try:
         import mitsuba as mi
     except (ImportError, NameError) as error:  # Dr.Jit hides a loader's error behind a NameError
+        _stop_if_interrupted(error)
         raise SetupError(f"Mitsuba does not start: {unloaded(error)}") from error
 
     current = mi.variant()
@@ -219,6 +234,7 @@ def _start(mi, device: str) -> None:
     try:
         mi.set_variant(_VARIANTS[device])
     except ImportError as error:
+        _stop_if_interrupted(error)
         raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}).") from error
     if device == "cpu":
         _limit_threads()

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import shutil
 import zipfile
+from inspect import signature
 from pathlib import Path
+from shlex import join, quote
 from typing import Any
 
 import gradio as gr
 
 from materialist.errors import InputError
+from materialist.pipeline import invert
 from materialist.studio.context import Context
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
 from materialist.studio.session import EDITS, Session
 from materialist.studio.showing import Final
+from materialist.studio.tab_open import PREDICTORS
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -141,24 +145,33 @@ def _pack_edits(session: Session, file: Path) -> None:
 
 
 def commands(session: Session) -> str:
-    """What to type for the same result."""
+    """What to type for the same result. The photo is taken apart again only where its scene is not there any more."""
     project = session.project
     assert project is not None
-    made = session.scene.provenance
-    lines = [f"cd {_quoted(project.folder)}"]
+    lines, scene = [f"cd {quote(str(project.folder))}"], quote(str(project.scene))
     if project.photo is not None:
-        options = "".join(f" --{k} {made[k]}" for k in ("size", "seed") if k in made)
-        lines.append(f"materialist invert {project.photo.name} -o {project.scene.name}{options}")
-    scene = project.scene.name if project.photo is not None else _quoted(project.scene)
+        scene = project.scene.name
+        words = ["materialist", "invert", project.photo.name, "-o", scene, *_options(session.scene.provenance)]
+        lines.append(f"test -e {scene} || {join(words)}")
     if session.stack.active:
-        lines.append(f"materialist apply {scene} {session.desk.name}/{EDITS} -o out.png")
+        lines.append(f"materialist apply {scene} {session.desk.name}/{EDITS} -o out.png --save edited.scene")
+        scene = "edited.scene"
     else:
         lines.append(f"materialist render {scene} -o out.png")
     lines.append(f"materialist export {scene} --to glb -o out.glb")
     return "\n".join(lines)
 
 
-def _quoted(path: Path) -> str:
-    import shlex
-
-    return shlex.quote(str(path))
+def _options(made: dict[str, Any]) -> list[str]:
+    """The options of an inversion that were not the usual ones, as `invert` takes them."""
+    usual = signature(invert).parameters
+    found: list[str] = []
+    predictor = str(made.get("predictor", "")).split(" ")[0]  # behind it are the weights
+    if predictor in {name for _, name in PREDICTORS}:
+        found += ["--predictor", predictor]
+    if made.get("fov_source") == "option":
+        found += ["--fov", f"{made['fov']:.12g}"]
+    for name in ("engine", "preset", "size", "tau", "strategy", "seed"):
+        if name in made and made[name] != usual[name].default:
+            found += [f"--{name}", str(made[name])]
+    return found

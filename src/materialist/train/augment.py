@@ -49,19 +49,38 @@ def window(sample: Sample, top: int, left: int, height: int, width: int) -> Samp
 
 
 def resized(sample: Sample, height: int, width: int) -> Sample:
-    """The sample at height x width pixels: colours are averaged, geometry is taken from the nearest pixel."""
+    """The sample at height x width pixels: colours are averaged, geometry is taken from the nearest pixel.
+
+    Albedo, roughness and metallic are averaged over what has a surface: the sky has none to mix in.
+    """
     if sample.depth.shape == (height, width):
         return sample
-    smaller = height < sample.depth.shape[0]
-    smooth = cv2.INTER_AREA if smaller else cv2.INTER_LINEAR
+    smooth = cv2.INTER_AREA if height < sample.depth.shape[0] else cv2.INTER_LINEAR
+    scaled = lambda array, method: np.asarray(cv2.resize(array, (width, height), interpolation=method))  # noqa: E731
+    share = scaled(sample.mask, smooth)
 
     def work(array: Array, name: str) -> Array:
-        method = cv2.INTER_NEAREST_EXACT if name in ("normal", "depth", "mask") else smooth
         if name == "rays":
-            method = cv2.INTER_LINEAR
-        return cv2.resize(array, (width, height), interpolation=method)
+            return _rays_between(array, height, width)
+        if name in ("normal", "depth", "mask"):
+            return scaled(array, cv2.INTER_NEAREST_EXACT)
+        if name in ("albedo", "roughness", "metallic"):
+            deep = (..., None) if array.ndim == 3 else ...
+            return scaled(array * sample.mask[deep], smooth) / np.maximum(share, 1e-6)[deep]
+        return scaled(array, smooth)
 
     return _each(sample, work)
+
+
+def _rays_between(rays: Array, height: int, width: int) -> Array:
+    """The rays [H, W, 2] of a picture at height x width pixels: x is even along rows and y along columns, so that they
+    go on to pixels that are nearer to the border than the first and the last were."""
+    rows, columns = rays.shape[:2]
+    x, y = rays[0, :, 0].astype(np.float64), rays[:, 0, 1].astype(np.float64)
+    across = ((np.arange(width) + 0.5) * columns / width - 0.5) / max(columns - 1, 1)
+    down = ((np.arange(height) + 0.5) * rows / height - 0.5) / max(rows - 1, 1)
+    places = np.broadcast_arrays(x[0] + (x[-1] - x[0]) * across[None], (y[0] + (y[-1] - y[0]) * down)[:, None])
+    return np.stack(places, -1).astype(np.float32)
 
 
 def flip(sample: Sample) -> Sample:

@@ -13,20 +13,20 @@ from materialist.predict.matnet.predictor import FORMAT
 from materialist.predict.own_weights import write
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint
-from materialist.train.trainer import SCORES
+from materialist.train.trainer import KIND, SCORES
 
 
 def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any]:
-    """Write the weights of a run as float16 .safetensors, of a bundled one the averaged ones.
+    """Write the weights of a run of `train matnet` as float16 .safetensors, of a bundled one the averaged ones.
 
     Returns step, minutes, megabytes, hash. Raises WeightsError without a checkpoint, InputError for another kind of
-    file, OutputError when `output` exists.
+    file or of run, OutputError when `output` exists.
     """
     if output.suffix != ".safetensors":
         raise InputError(f"The weights are a .safetensors file, not {output.name}.")
     if output.exists() and not force:
         raise OutputError(f"{output} exists; choose another name, or add --force to replace it.")
-    state = checkpoint.load(run)
+    state = checkpoint.load(run, kind=KIND)
     tensors = state["averaged" if state["recipe"]["ema"] else "network"]
     scores = checkpoint.read_lines(run / SCORES)
     facts = {
@@ -37,6 +37,8 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "data": state["data"],
         "scores": scores[-1] if scores else {},
     }
+    from safetensors import SafetensorError
+
     try:
         if state["recipe"]["task"] == "paper":
             write(output, tensors, {"format": FORMAT, "facts": json.dumps(facts)})
@@ -44,8 +46,8 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
             network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
             network.load_state_dict(tensors)
             save(output, network, facts)
-    except OSError as error:
-        raise OutputError(f"The weights cannot be written to {output}: {error.strerror or error}.") from error
+    except (OSError, SafetensorError) as error:  # the writer has its own for a folder that is not there
+        raise OutputError(f"The weights cannot be written to {output}: {error}.") from error
     return {
         "step": state["step"],
         "minutes": facts["minutes"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -102,14 +103,26 @@ class SampleFolder:
 
 def read_sample(path: Path) -> Sample:
     """The sample in an .npz file; raises InputError naming the file when it is damaged or lacks an array."""
+    arrays = read_arrays(path)
+    try:
+        return _decode(arrays)
+    except (IndexError, ValueError) as error:
+        raise InputError(f"The arrays of {path} do not fit together ({error}); make it again.") from error
+    except KeyError as error:
+        raise InputError(f"{path} has no array {error}; make the data set again.") from error
+
+
+def read_arrays(path: Path, *names: str) -> dict[str, Array]:
+    """The named arrays of an .npz, or all; raises InputError naming the file when it is damaged or lacks one."""
     try:
         with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        return _decode(arrays)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"The sample {path} cannot be read ({error}); delete it and make it again.") from error
-    except KeyError as error:
-        raise InputError(f"The sample {path} has no array {error}; make the data set again.") from error
+            absent = [name for name in names if name not in stored.files]
+            arrays = {name: stored[name] for name in names or stored.files if name not in absent}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(f"{path} cannot be read ({error}); delete it and make it again.") from error
+    if absent:
+        raise InputError(f"{path} has no array {absent[0]!r}; delete it and make it again.")
+    return arrays
 
 
 def _decode(arrays: dict[str, Array]) -> Sample:

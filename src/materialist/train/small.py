@@ -8,17 +8,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
 
 CURVE = "curve.jsonl"
-"""Mean losses every REPORT_STEPS steps."""
+"""Mean losses of the steps since the last line, every REPORT_STEPS steps."""
 SCORES = "scores.jsonl"
 """Figures on what is kept aside, at every checkpoint."""
 WEIGHTS = "weights.safetensors"
@@ -46,11 +46,16 @@ class Recipe:
 class Run(ABC):
     """One run in one folder; `run` trains, keeps a checkpoint, and leaves the averaged weights as float16."""
 
+    kind: ClassVar[str]
+    """What checkpoints call such a run: the name of its command."""
+
     def __init__(
         self, folder: Path, network: Callable[[], nn.Module], recipe: Recipe, *, budget: Budget, seed: int = 0,
         every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
     ):  # fmt: skip
-        """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off."""
+        """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off, InputError when it is
+        of another network."""
+        state = checkpoint.begun(folder, self.kind, resume=resume)
         self.folder, self.recipe, self.note, self.seed, self.every = folder, recipe, note, seed, every
         torch.manual_seed(seed)
         self.network: Any = network()
@@ -60,18 +65,9 @@ class Run(ABC):
             learnt, recipe.rate, (0.9, 0.98), weight_decay=recipe.weight_decay, fused=True
         )
         self.clock, self.epoch = Clock(budget), 0
-        exists = (folder / checkpoint.NAME).is_file()
-        if exists and not resume:
-            raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")
-        folder.mkdir(parents=True, exist_ok=True)
-        if exists:
-            state = checkpoint.load(folder)
-            self.network.load_state_dict(state["network"])
-            self.averaged.load_state_dict(state["averaged"])
-            self.optimizer.load_state_dict(state["optimizer"])
-            for group in self.optimizer.param_groups:
-                group["fused"] = True
-            self.epoch, self.clock = state["epoch"], Clock(budget, step=state["step"], seconds=state["seconds"])
+        checkpoint.make(folder)
+        if state is not None:
+            self._restore(state, budget)
 
     @abstractmethod
     def batches(self) -> Iterator[dict[str, Tensor]]:
@@ -92,18 +88,20 @@ class Run(ABC):
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
         """Train until the budget is spent; returns the last figures."""
         total: dict[str, float] = {}
+        count = 0
         since = saved = time.monotonic()
         scoring = 0.0  # seconds that do not count for the speed of training
         for batch in self.batches():
             for name, value in self._step(batch).items():
                 total[name] = total.get(name, 0.0) + value
+            count += 1
             if self.clock.step % REPORT_STEPS == 0:
-                speed = REPORT_STEPS * self.recipe.batch / max(time.monotonic() - since - scoring, 1e-6)
+                speed = count * self.recipe.batch / max(time.monotonic() - since - scoring, 1e-6)
                 line = {"step": self.clock.step, "seconds": self.clock.seconds, "per_second": speed}
-                line |= {k: v / REPORT_STEPS for k, v in total.items()}
+                line |= {k: v / count for k, v in total.items()}
                 checkpoint.append_line(self.folder / CURVE, {k: float(f"{v:.5g}") for k, v in line.items()})
                 progress("train", round(1000 * self.clock.progress), 1000)
-                total, since, scoring = {}, time.monotonic(), 0.0
+                total, count, since, scoring = {}, 0, time.monotonic(), 0.0
             if self.clock.done:
                 break
             if time.monotonic() - saved > self.every:
@@ -117,7 +115,7 @@ class Run(ABC):
         """Write the checkpoint, the scores of the averaged weights, and these as float16."""
         figures = self.figures()
         state = {
-            "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
+            "kind": self.kind, "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
             "optimizer": self.optimizer.state_dict(), "step": self.clock.step, "epoch": self.epoch,
             "seconds": self.clock.seconds,
         }  # fmt: skip
@@ -130,6 +128,20 @@ class Run(ABC):
         self.write(self.folder / WEIGHTS, facts)
         self.note(f"step {self.clock.step}  " + "  ".join(f"{k} {v:.3f}" for k, v in figures.items()))
         return figures
+
+    def _restore(self, state: dict[str, Any], budget: Budget) -> None:
+        """Go on from a checkpoint."""
+        try:
+            self.network.load_state_dict(state["network"])
+            self.averaged.load_state_dict(state["averaged"])
+            self.optimizer.load_state_dict(state["optimizer"])
+        except (RuntimeError, ValueError) as error:
+            raise InputError(
+                f"{self.folder} holds a run of another network than that of `train {self.kind}`; choose another folder."
+            ) from error
+        for group in self.optimizer.param_groups:
+            group["fused"] = True
+        self.epoch, self.clock = state["epoch"], Clock(budget, step=state["step"], seconds=state["seconds"])
 
     def _step(self, batch: dict[str, Tensor]) -> dict[str, float]:
         recipe = self.recipe

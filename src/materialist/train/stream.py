@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Iterator
+from collections.abc import Generator
 
 import cv2
 import numpy as np
@@ -49,7 +49,7 @@ class _Variants(Dataset):
 def epoch(
     source: Source, task: Task, *, number: int, size: int, batch: int, seed: int, rank: int = 0, world: int = 1,
     workers: int = 1,
-) -> Iterator[dict[str, torch.Tensor]]:  # fmt: skip
+) -> Generator[dict[str, torch.Tensor], None, None]:  # fmt: skip
     """Batches of one pass over all samples that are not kept aside, in a random order.
 
     The order and the variants depend on (seed, number) alone, for any number of workers; of `world` processes each
@@ -78,6 +78,11 @@ def trained_on(count: int) -> list[int]:
     if count < KEPT_ASIDE:
         return list(range(count))
     return [k for k in range(count) if k % KEPT_ASIDE != KEPT_ASIDE - 1]
+
+
+def none_aside(source: Source) -> bool:
+    """Whether `kept_aside` has to take samples that are trained on."""
+    return len(source) < KEPT_ASIDE and getattr(source, "validation", lambda: None)() is None
 
 
 def kept_aside(source: Source, most: int) -> list[Sample]:

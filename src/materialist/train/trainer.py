@@ -15,7 +15,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
 from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
 from materialist.train.launch import Processes
@@ -23,11 +23,14 @@ from materialist.train.recipes import Recipe
 from materialist.train.samples import Source
 from materialist.train.tasks import Batch, Task
 
+KIND = "matnet"
+"""What checkpoints call such a run."""
 CURVE = "curve.jsonl"
 """Mean of the losses every REPORT_STEPS steps, one JSON object a line."""
 SCORES = "scores.jsonl"
-"""Figures on the samples kept aside, at every checkpoint."""
+"""Figures on the samples kept aside, at every checkpoint; `of` says so, or that there were too few to keep any."""
 REPORT_STEPS = 20
+KEPT_ASIDE, TRAINED_ON = "samples kept aside", "samples trained on"
 
 Note = Callable[[str], None]
 
@@ -43,9 +46,17 @@ class Habits:
     """Processes that load and augment, for each training process."""
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        for option, number in (("workers", self.workers), ("score-samples", self.score_samples)):
+            if number < 0:
+                raise InputError(f"--{option} is {number}; give 0 or more.")
+
 
 class Trainer:
     """One run in one folder."""
+
+    scored_on = ""
+    """What the last figures are of: KEPT_ASIDE or TRAINED_ON."""
 
     def __init__(
         self, recipe: Recipe, task: Task, source: Source, folder: Path, *, budget: Budget, habits: Habits | None = None,
@@ -55,6 +66,7 @@ class Trainer:
         self.recipe, self.task, self.source, self.folder = recipe, task, source, folder
         self.habits, self.processes, self.note = habits or Habits(), processes or Processes(), note
         self.device = self.processes.device
+        state = checkpoint.begun(folder, KIND, resume=resume, device=self.device)
         torch.manual_seed(self.habits.seed)
         self.network = task.network(recipe).to(self.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
@@ -62,12 +74,9 @@ class Trainer:
         self.optimizer = torch.optim.AdamW(_groups(learnt, recipe.weight_decay), lr=recipe.rate, betas=recipe.betas)
         self.epoch = 0
         self.clock = Clock(budget)
-        exists = (folder / checkpoint.NAME).is_file()
-        if exists and not resume:
-            raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")
-        folder.mkdir(parents=True, exist_ok=True)
-        if exists:
-            self._restore(checkpoint.load(folder, self.device), budget)
+        checkpoint.make(folder)
+        if state is not None:
+            self._restore(state, budget)
         self.wrapped = self.processes.wrap(self.network)
         for text in (*task.notes, *getattr(source, "notes", list)()):
             self.note(text)
@@ -103,6 +112,7 @@ class Trainer:
     def save(self) -> None:
         """Write the checkpoint."""
         state = {
+            "kind": KIND,
             "recipe": self.recipe.as_dict(),
             "network": self.network.state_dict(),
             "averaged": self.averaged.state_dict(),
@@ -116,7 +126,10 @@ class Trainer:
         checkpoint.save(self.folder, state)
 
     def score(self) -> dict[str, float]:
-        """Score the averaged weights on samples kept aside; writes a line of SCORES and sheet.png."""
+        """Score the averaged weights on samples kept aside; writes a line of SCORES and sheet.png.
+
+        Of a set that is too small to keep any aside, samples that it learns from are scored, and that is told.
+        """
         if not self.habits.score_samples:
             return {}
         from materialist.train.sheets import score_and_draw
@@ -125,21 +138,29 @@ class Trainer:
         network = self.averaged if self.recipe.ema else self.network.eval()
         figures = score_and_draw(self.task, network, samples, self.folder / "sheet.png")
         self.network.train()
-        line = {"step": self.clock.step, "seconds": round(self.clock.seconds, 1), **figures}
+        self.scored_on = TRAINED_ON if stream.none_aside(self.source) else KEPT_ASIDE
+        line = {"step": self.clock.step, "seconds": round(self.clock.seconds, 1), "of": self.scored_on, **figures}
         checkpoint.append_line(self.folder / SCORES, {k: _rounded(v) for k, v in line.items()})
         names = ("albedo_psnr", "roughness_psnr_pooled", "metallic_psnr_pooled", "normal_angle", "depth_si_log_rmse")
-        self.note("  ".join(f"{n} {figures[n]:.3g}" for n in names if n in figures))
+        told = "  ".join(f"{n} {figures[n]:.3g}" for n in names if n in figures)
+        few = f"  (of samples trained on: none is kept aside of fewer than {stream.KEPT_ASIDE})"
+        self.note(told + (few if self.scored_on == TRAINED_ON else ""))
         return figures
 
     def _batches(self) -> Iterator[Batch]:
-        """Epoch after epoch, without end."""
+        """Epoch after epoch, without end; one is cut short when larger crops are due."""
         while True:
             self.epoch += 1
-            yield from stream.epoch(
-                self.source, self.task, number=self.epoch, size=self.recipe.size_at(self.clock.progress),
-                batch=self.recipe.batch, seed=self.habits.seed, rank=self.processes.rank, world=self.processes.world,
-                workers=self.habits.workers,
+            size = self.recipe.size_at(self.clock.progress)
+            batches = stream.epoch(
+                self.source, self.task, number=self.epoch, size=size, batch=self.recipe.batch, seed=self.habits.seed,
+                rank=self.processes.rank, world=self.processes.world, workers=self.habits.workers,
             )  # fmt: skip
+            for batch in batches:
+                yield batch
+                if self.recipe.size_at(self.clock.progress) != size:
+                    break
+            batches.close()
 
     def _step(self, batch: Batch) -> dict[str, float]:
         """One step of the optimizer; returns the terms of the loss."""

@@ -1,12 +1,18 @@
 """The training of ClickNet, on pictures of two things."""
 
+import os
+import shutil
+
 import numpy as np
 import pytest
 import torch
+from typer.testing import CliRunner
 
+from materialist.cli import app
 from materialist.errors import InputError, OutputError
 from materialist.predict.clicks import weights
 from materialist.predict.clicks.features import CHANNELS
+from materialist.train import checkpoint
 from materialist.train.budget import Budget
 from materialist.train.clicks import views
 from materialist.train.clicks.trainer import Recipe, Trainer
@@ -128,6 +134,59 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     before = (tmp_path / "views" / "0000000.npz").stat().st_mtime_ns
     views.produce(data, tmp_path / "views")
     assert (tmp_path / "views" / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
+    shutil.copytree(data, tmp_path / "elsewhere")
+    assert views.produce(tmp_path / "elsewhere", tmp_path / "views") == 2, "a set may move"
+    (tmp_path / "views" / views.SOURCE).unlink()
+    views.produce(data, tmp_path / "views")
+    assert (tmp_path / "views" / views.SOURCE).is_file(), "what was made before this was noted is known by its things"
+
+
+def test_views_of_another_set_are_refused(tmp_path):
+    from materialist.train.data.produce import options_for, produce
+
+    sets = tmp_path / "first", tmp_path / "second"
+    for seed, data in enumerate(sets):
+        produce(data, options_for(size=32, seed=seed, spp=1, device="cpu"), count=1)
+    run = tmp_path / "run" / "views"
+    views.produce(sets[0], run)
+    before = (run / "0000000.npz").read_bytes()
+    with pytest.raises(InputError, match=r"views holds views of another data set than .*second"):
+        views.produce(sets[1], run)
+    (run / views.SOURCE).unlink()
+    with pytest.raises(InputError, match="another data set"):
+        views.produce(sets[1], run)
+    assert (run / "0000000.npz").read_bytes() == before
+
+
+def test_a_set_without_a_description_is_known_by_its_first_sample(tmp_path):
+    from made_samples import write_set
+
+    for seed in (1, 2):
+        data = write_set(tmp_path / f"set{seed}", count=1, fov=40.0 + seed)
+        for path in (data / "samples").iterdir():
+            with np.load(path) as arrays:
+                np.savez(path, **arrays, thing=np.ones(arrays["depth"].shape, np.int16))
+    assert views.produce(tmp_path / "set1", tmp_path / "views") == views.produce(tmp_path / "set1", tmp_path / "views")
+    with pytest.raises(InputError, match="another data set"):
+        views.produce(tmp_path / "set2", tmp_path / "views")
+
+
+def test_a_damaged_view_is_named(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "views")
+    os.truncate(tmp_path / "views" / "0000001.npz", 500)
+    with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
+        views.load(tmp_path / "views")
+
+
+def test_the_command_refuses_before_it_makes_views(tmp_path):
+    from made_samples import write_set
+
+    (tmp_path / "run").mkdir()
+    checkpoint.save(tmp_path / "run", {"kind": "matnet"})
+    command = ["train", "clicks", "-o", tmp_path / "run", "--data", write_set(tmp_path / "set", 1), "--resume"]
+    with pytest.raises(InputError, match="holds a run of `train matnet`"):
+        CliRunner().invoke(app, [str(word) for word in command], catch_exceptions=False)
+    assert not (tmp_path / "run" / "views").exists()
 
 
 def test_a_set_without_things_says_so(tmp_path):

@@ -1,6 +1,8 @@
 """The data set on disk: contract, determinism, stops and refusals."""
 
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,10 +14,10 @@ import numpy as np
 import pytest
 
 from materialist.color import srgb_to_linear
-from materialist.errors import InputError
-from materialist.train.data import heldout
+from materialist.errors import InputError, OutputError
+from materialist.train.data import heldout, things
 from materialist.train.data.produce import options_for, produce, read_description, sample_path
-from materialist.train.data.sample import make_sample, make_world
+from materialist.train.data.sample import ATTEMPTS, make_sample, make_world
 from materialist.train.data.sheet import write_sheet
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
@@ -137,6 +139,29 @@ def test_resuming_with_other_options_is_refused(made):
         produce(made, options_for(size=SIZE, seed=12, spp=4, device="cpu"), count=6, resume=True)
 
 
+@pytest.mark.parametrize(("split", "before"), [("train", 2), ("heldout", 1)])
+def test_a_set_of_older_content_is_not_gone_on_with(tmp_path, split, before):
+    options = options_for(size=SIZE, seed=11, spp=1, device="cpu", split=split)
+    produce(tmp_path / "set", options, count=1)
+    file = tmp_path / "set" / "dataset.json"
+    told = json.loads(file.read_text())
+    file.write_text(json.dumps({**told, "content": before}))
+    with pytest.raises(InputError, match=f"content {before}, not {before + 1}; name another"):
+        produce(tmp_path / "set", options, count=2, resume=True)
+    file.write_text(json.dumps(told))
+    assert produce(tmp_path / "set", options, count=1, resume=True).existing == 1
+
+
+def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
+    options = options_for(size=SIZE, seed=11, spp=1, device="cpu", only="table")
+    worlds = [make_world(np.random.default_rng([11, 3, k]), options) for k in range(ATTEMPTS)]
+    views = [np.float32(world.view.fov) for world in worlds]
+    train, aside = make_sample(3, options), make_sample(3, replace(options, split="heldout"))
+    assert train["fov"] in views, "training samples are what they have always been"
+    assert aside["fov"] not in views
+    assert not np.array_equal(train["thing"], aside["thing"])
+
+
 def test_the_description(made):
     found = read_description(made)
     assert (found["format"], found["size"], found["seed"], found["split"]) == (1, SIZE, 11, "train")
@@ -166,6 +191,36 @@ def test_a_folder_without_meshes_is_refused(tmp_path):
         options_for(meshes=tmp_path)
 
 
+CORNERS = "0 0 0\n1 0 0\n0 1 0\n"
+HEADER = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "no mesh", HEADER, HEADER + FACES + "0 0 0\n", HEADER + FACES + CORNERS + "3 0 1 9\n",
+     HEADER + FACES + 3 * "0 0 0\n" + "3 0 1 2\n"],
+    ids=["empty", "text", "header alone", "cut off", "corner that is not there", "point"],
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
+    assert len(things.mesh(tmp_path / "meshes" / "chair.ply").faces) == 1
+    (tmp_path / "meshes" / "vase.ply").write_text(text)
+    options = options_for(size=SIZE, device="cpu", meshes=tmp_path / "meshes")
+    with pytest.raises(InputError, match=r"vase\.ply .*; mend it"):
+        produce(tmp_path / "set", options, count=1)
+    assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.parametrize("place", ["file", "file/set"])
+def test_a_file_is_no_folder_for_a_set(tmp_path, place, options):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot be written"):
+        produce(tmp_path / place, options, count=1)
+
+
 def test_the_splits_share_no_file(tmp_path):
     for name in (*sorted(heldout.MESHES), "teapot", "vase"):
         (tmp_path / f"{name}.ply").touch()
@@ -188,6 +243,10 @@ def test_the_sheet(made, tmp_path):
     assert (tmp_path / "sheet.png").stat().st_size > 5000
     with pytest.raises(InputError, match="no samples"):
         write_sheet(tmp_path, tmp_path / "none.png")
+    shutil.copytree(made, tmp_path / "copy")
+    os.truncate(sample_path(tmp_path / "copy", 2), 900)
+    with pytest.raises(InputError, match=r"0000002\.npz cannot be read"):
+        write_sheet(tmp_path / "copy", tmp_path / "none.png")
 
 
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):

@@ -1,6 +1,8 @@
 """The trainer of RefractionNet, on two shapes."""
 
 import json
+import os
+import shutil
 
 import numpy as np
 import pytest
@@ -92,6 +94,13 @@ def test_a_mirrored_view_is_a_view_of_the_mirrored_shape(views):
     for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
                                 ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
         np.testing.assert_array_equal(flipped[name][0, channel].numpy(), sign * full[name][0, channel, :, ::-1])
+
+
+def test_a_damaged_file_of_views_is_named(views, tmp_path):
+    shutil.copytree(views, tmp_path / "views")
+    os.truncate(tmp_path / "views" / "00001.npz", 500)
+    with pytest.raises(InputError, match=r"00001\.npz cannot be read .*; delete it"):
+        lessons.load(tmp_path / "views")
 
 
 def test_bad_recipes_are_refused():

@@ -60,6 +60,7 @@ def _begun(init: Path | None) -> ClickNet:
 class Trainer(small.Run):
     """One run in one folder."""
 
+    kind = "clicks"
     recipe: Recipe
 
     def __init__(

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
 from materialist.predict.clicks.features import features
-from materialist.train.samples import SampleFolder, read_sample, write_arrays
+from materialist.predict.weights import sha256
+from materialist.train.data.produce import identity
+from materialist.train.samples import SampleFolder, read_arrays, read_sample, write_arrays
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
+SOURCE = "views.json"
+"""Of which data set the views beside it are."""
 FEWEST = 60
 """Pixels of a view below which a thing is not clicked on."""
 DEEP = 2.5
@@ -50,27 +56,22 @@ class View:
 def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> int:
     """Make the views that FOLDER lacks, by the bundled network; returns how many are there.
 
-    Raises InputError for a data set without things (made before they were kept), OutputError for a bad FOLDER.
+    Raises InputError for a data set without things (made before they were kept) and for a FOLDER with views of another
+    set, OutputError for one that cannot be written.
     """
     from materialist.predict.bundled.predictor import BundledPredictor
     from materialist.train.data.photographic import photographic
     from materialist.types import Camera, Photo
 
-    source, predictor = SampleFolder(data), BundledPredictor()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+    source = SampleFolder(data)
+    _claim(folder, source)
+    predictor = BundledPredictor()
     for number, path in enumerate(source.paths):
         target = folder / path.name
         if not target.exists():
-            with np.load(path) as arrays:
-                if "thing" not in arrays:
-                    raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
-                thing, angle = arrays["thing"], float(arrays["fov"])
-            rng = np.random.default_rng([int(path.stem), 4])
+            thing, rng = _things(path), np.random.default_rng([int(path.stem), 4])
             linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
-            camera = Camera(linear.shape[1], linear.shape[0], angle)
+            camera = Camera(linear.shape[1], linear.shape[0], float(read_arrays(path, "fov")["fov"]))
             found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
             made = {
                 "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": thing,
@@ -81,13 +82,55 @@ def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> i
     return len(source.paths)
 
 
+def _claim(folder: Path, source: SampleFolder) -> None:
+    """Note in the folder of which set its views are. Raises InputError where they are of another one."""
+    said, file = _identity(source), folder / SOURCE
+    views, noted = sorted(folder.glob("[0-9]*.npz")), _noted(file)
+    if views and (not _of(views[0], source) if noted is None else noted != said):
+        raise InputError(f"{folder} holds views of another data set than {source.folder}; name another folder.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        partial = file.with_suffix(".part")
+        partial.write_text(json.dumps(said, indent=1) + "\n", "utf-8")
+        partial.replace(file)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+
+
+def _identity(source: SampleFolder) -> dict[str, Any]:
+    """What tells the set from others: what decided how it was made, or its first sample where that is not known."""
+    try:
+        return identity(source.folder)
+    except InputError:
+        return {"first": sha256(source.paths[0])}
+
+
+def _noted(file: Path) -> Any:
+    """What a folder says of its set; None where it says nothing."""
+    try:
+        return json.loads(file.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _of(view: Path, source: SampleFolder) -> bool:
+    """Whether a view shows the things of the set's sample of that name."""
+    path = source.folder / "samples" / view.name
+    return path.is_file() and np.array_equal(read_arrays(view, "thing")["thing"], _things(path))
+
+
+def _things(path: Path) -> Array:
+    """What is one thing in a sample. Raises InputError where it does not say."""
+    arrays = read_arrays(path)
+    if "thing" not in arrays:
+        raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
+    return arrays["thing"]
+
+
 def load(folder: Path) -> list[View]:
-    """All views of a folder, in the order of their names."""
-    views = []
-    for path in sorted(folder.glob("[0-9]*.npz")):
-        with np.load(path) as arrays:
-            views.append(View(*(arrays[name] for name in ("rgb", "normal", "depth", "thing"))))
-    return views
+    """All views of a folder, in the order of their names. Raises InputError for one that is damaged."""
+    names = ("rgb", "normal", "depth", "thing")
+    return [View(**read_arrays(path, *names)) for path in sorted(folder.glob("[0-9]*.npz"))]
 
 
 def lesson(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:

@@ -13,12 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError, OutputError
-from materialist.train.data import heldout
+from materialist.train.data import heldout, things
 from materialist.train.data.sample import KINDS, Options, make_sample
 
 FORMAT = 1
-CONTENT = 2
-"""Counts the changes of what sample i of a training set shows; held-out sets have stayed the same."""
+CONTENT = {"train": 3, "heldout": 2}
+"""Counts the changes of what sample i of a set of each split holds."""
+_IDENTITY = ("size", "seed", "split", "options", "content")
+"""What of a set's description decides what its samples hold."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -58,12 +60,15 @@ def produce(
     Sample i depends on the options and i alone. Each is written under a temporary name and then renamed.
 
     Raises:
-        InputError: bad numbers, a folder that holds something and no `resume`, or one begun with other options.
+        InputError: bad numbers, a mesh that is damaged, a folder that holds something and no `resume`, or one begun
+            with other options.
         OutputError: the folder cannot be written.
     """
     folder = Path(folder)
     if count < 1 or workers < 1:
         raise InputError(f"count is {count} and workers is {workers}; give at least 1 of each.")
+    for path in options.meshes:  # a damaged one must not end a long run
+        things.mesh(path)
     _open(folder, options, resume)
     missing = [k for k in range(count) if not sample_path(folder, k).exists()]
     start, done = time.monotonic(), 0
@@ -112,7 +117,7 @@ def _open(folder: Path, options: Options, resume: bool) -> None:
     """Create the folder and its description, or check that it is the same set."""
     described = _description(options)
     file = folder / "dataset.json"
-    if folder.exists() and any(folder.iterdir()):
+    if folder.is_dir() and any(folder.iterdir()):
         if not resume:
             raise InputError(
                 f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
@@ -135,7 +140,7 @@ def _description(options: Options) -> dict:
 
     return {
         "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split,
-        "content": CONTENT if options.split == "train" else 1,
+        "content": CONTENT[options.split],
         "options": {"spp": options.spp, "meshes": [p.stem for p in options.meshes],
                     "envmaps": [p.stem for p in options.envmaps]} | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
@@ -154,10 +159,18 @@ def read_description(folder: str | Path) -> dict:
     return found
 
 
+def identity(folder: str | Path) -> dict:
+    """What tells the samples of one set from those of another, whatever their number and place; see `_description`.
+
+    Raises InputError as `read_description` does.
+    """
+    found = {"content": 1, **read_description(folder)}
+    return {name: found.get(name) for name in _IDENTITY}
+
+
 def _same(old: dict, new: dict, folder: Path) -> None:
     old = {"content": 1, **old}
-    for name in ("size", "seed", "split", "options", "content"):
+    for name in _IDENTITY:
         if old.get(name) != new[name]:
-            raise InputError(
-                f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; resume with that or name another."
-            )
+            remedy = "resume with that or name another" if name != "content" else "name another, samples have changed"
+            raise InputError(f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; {remedy}.")

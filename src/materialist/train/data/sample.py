@@ -28,6 +28,8 @@ _KINDS: tuple[tuple[str, Callable[..., World], float, float], ...] = (
 """Name, maker, share of a training set, share of a held-out one: that prefers captured meshes and light, and stays as
 it was, so that scores remain comparable."""
 KINDS = tuple(name for name, *_ in _KINDS)
+_KEY: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
+"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def make_sample(index: int, options: Options) -> dict[str, Array]:
     Raises SetupError where Mitsuba or the denoiser is missing.
     """
     for attempt in range(ATTEMPTS):
-        rng = np.random.default_rng([options.seed, index, attempt])
+        rng = np.random.default_rng([options.seed, index, attempt, *_KEY[options.split]])
         world = make_world(rng, options)
         probe, tracer = _look(world, rng, options)
         if attempt == ATTEMPTS - 1 or worth_seeing(probe):
@@ -93,8 +95,11 @@ def worth_seeing(probe: dict[str, Array]) -> bool:
 def _developed(world: World, probe, tracer, rng: np.random.Generator, options: Options) -> dict[str, Array]:
     """Render, denoise, expose, quantise."""
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
-    guides = {"albedo": probe["albedo"].mean(2), "normal": probe["normal"].mean(2)}
-    image, shading = denoise(noisy, **guides), denoise(white, **guides)
+    normal = probe["normal"].mean(2)
+    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal)
+    # The shading is of white surfaces: a guide of their texture would print it into the shading.
+    covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
+    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal)
     labels = labels_of(probe)
     gain = exposure(image, rng) * balance(shading, rng)
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731

@@ -8,6 +8,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
+from materialist.train.samples import read_arrays
 from materialist.types import Array
 
 COLUMNS = ("image", "albedo", "roughness", "metallic", "normal", "depth", "shading")
@@ -26,7 +27,7 @@ def write_sheet(folder: str | Path, path: str | Path, *, count: int = 24, seed: 
         raise InputError(f"{folder} holds no samples; make some: materialist train data -o {folder}.")
     rng = np.random.default_rng(seed)
     chosen = sorted(rng.permutation(len(files))[:count])
-    strips = [strip(dict(np.load(files[k]))) for k in chosen]
+    strips = [strip(read_arrays(files[k], *COLUMNS, "mask")) for k in chosen]
     if len(strips) % 2:
         strips.append(np.zeros_like(strips[0]))
     rows = [np.concatenate([a, np.zeros_like(a[:, :8]), b], 1) for a, b in zip(strips[::2], strips[1::2])]

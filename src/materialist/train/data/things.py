@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from materialist.bench import shapes
 from materialist.bench.shapes import Solid
+from materialist.errors import InputError
 from materialist.train.data import materials as m
 from materialist.train.data import solids as s
 from materialist.train.data.world import Part
@@ -33,7 +34,7 @@ def one_thing(parts: Parts) -> Parts:
 
 def captured(rng: np.random.Generator, size: float, meshes: tuple[Path, ...]) -> Parts:
     """A mesh from a file in any material, its longest side `size`."""
-    solid = _load(meshes[rng.integers(len(meshes))])
+    solid = mesh(meshes[rng.integers(len(meshes))])
     solid = replace(solid, uv=solid.uv * [np.pi * 0.6, 1])
     tip = rng.choice([0, 0, 0, np.pi / 2, -np.pi / 2]) if rng.random() < 0.3 else 0.0
     placed = s.grounded(s.moved(solid, tip=tip, scale=size))
@@ -41,11 +42,19 @@ def captured(rng: np.random.Generator, size: float, meshes: tuple[Path, ...]) ->
 
 
 @lru_cache(maxsize=40)
-def _load(path: Path) -> Solid:
+def mesh(path: Path) -> Solid:
+    """The mesh in a .ply file; see `shapes.load`. Raises InputError when it is damaged or has no faces."""
     from materialist.render.variant import setup
 
     setup()
-    return shapes.load(path)
+    try:
+        solid = shapes.load(path)
+        usable = len(solid.faces) > 0 and bool(np.isfinite(solid.vertices).all())
+    except (RuntimeError, LookupError, ValueError) as error:
+        raise InputError(f"The mesh {path} cannot be read; mend it, or take it out of the folder.") from error
+    if not usable:
+        raise InputError(f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder.")
+    return solid
 
 
 def _box(rng, size):

@@ -14,7 +14,7 @@ from materialist.errors import InputError, OutputError
 from materialist.train.refraction.glassware import SPLITS, shape
 from materialist.train.refraction.paths import Tracer
 from materialist.train.refraction.view import lesson
-from materialist.train.samples import write_arrays
+from materialist.train.samples import read_arrays, write_arrays
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
@@ -76,14 +76,11 @@ def count(folder: Path) -> int:
 
 
 def load(folder: Path) -> dict[str, Array]:
-    """All views of a set, as `views` has them. Raises InputError when FOLDER holds no set."""
+    """All views of a set, as `views` has them. Raises InputError when FOLDER holds no set, or a damaged file."""
     files = sorted(folder.glob("[0-9]*.npz"))
     if not files or not (folder / DESCRIPTION).is_file():
         raise InputError(f"{folder} holds no views to learn from; make some: materialist train refraction --data-only.")
-    parts = []
-    for file in files:
-        with np.load(file) as arrays:
-            parts.append({name: arrays[name] for name in ("maps", "target", "hollow")})
+    parts = [read_arrays(file, "maps", "target", "hollow") for file in files]
     return {name: np.concatenate([p[name] for p in parts]) for name in ("maps", "target", "hollow")}
 
 

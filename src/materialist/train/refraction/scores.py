@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench import shapes
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
+from materialist.train.data.things import mesh
 from materialist.train.refraction.glassware import Shape, centred
 from materialist.train.refraction.paths import Tracer
 from materialist.train.refraction.view import lesson
@@ -79,15 +79,12 @@ def errors(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, Arr
 
 def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str, Array]]:
     """Views of every .ply mesh below a folder, by the mesh's name: upright, exact maps. Raises InputError."""
-    from materialist.render.variant import setup
-
-    setup()
     files = sorted(folder.rglob("*.ply"))
     if not files:
         raise InputError(f"{folder} holds no .ply meshes; give a folder that does.")
     found: dict[str, dict[str, Array]] = {}
     for file in files:
-        shape = Shape(centred(shapes.load(file)), False, file.stem, True)
+        shape = Shape(centred(mesh(file)), False, file.stem, True)
         tracer, rng = Tracer(shape.solid), np.random.default_rng([seed, len(found)])
         lessons = [lesson(shape, tracer, rng, exact=True) for _ in range(views)]
         found[file.stem] = {

@@ -50,6 +50,7 @@ class Recipe(small.Recipe):
 class Trainer(small.Run):
     """One run in one folder."""
 
+    kind = "refraction"
     recipe: Recipe
 
     def __init__(
