@@ -12,6 +12,8 @@ from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 REPLACE, ADD, REMOVE = "new", "add", "remove"
+WHOLE = 0.7
+"""Share of what is selected from which an object in it is all of it."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,17 @@ class Selection:
         return mask if mask.any() else None
 
     def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
-        """With the object at a pixel: alone, added, or (where it is selected already) taken away."""
+        """With the object at a pixel: alone, added, or (where it is selected already) taken away.
+
+        Taking away leaves the rest of a larger region: a click on the spoon in a selected cup takes away the spoon.
+        """
         row, column = int(y), int(x)
         mask = self.mask
         inside = mask is not None and 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column]
+        if mode == REMOVE and inside:
+            found = select(scene, click=(x, y), method=method)
+            if (found & mask).sum() < WHOLE * mask.sum():
+                return self._without(found)
         if inside or mode == REMOVE:
             return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
         found = select(scene, click=(x, y), method=method)
