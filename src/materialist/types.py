@@ -140,6 +140,13 @@ class Surface:
     """Colour of white light after a way in and a way out, linear, in [0, 1]."""
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Radiance that it gives off to the outside by itself, linear, >= 0."""
+    glass_roughness: float | None = None
+    """Perceptual roughness of the dielectric interface; None: the mean of `roughness`."""
+
+    @property
+    def interface_roughness(self) -> float:
+        """That of the dielectric interface, in [0, 1]."""
+        return float(self.roughness.mean()) if self.glass_roughness is None else self.glass_roughness
 
 
 @dataclass(frozen=True, eq=False)

@@ -258,3 +258,11 @@ def test_the_papers_glass_without_transmission_is_the_photo():
     shown = {t: glass(scene, MASK, transmission=t, **options).photo.linear for t in (0.0, 0.5, 1.0)}
     np.testing.assert_allclose(shown[0.0][MASK], scene.photo.linear[MASK], atol=1e-6)
     np.testing.assert_allclose(shown[0.5][MASK], (shown[0.0] + shown[1.0])[MASK] / 2, atol=1e-6)
+
+
+def test_what_is_left_of_the_object_keeps_its_own_roughness():
+    scene = flat_scene()
+    (film,) = glass(scene, MASK, transmission=0.8, thickness="symmetry").bodies
+    assert film.surface.roughness is scene.materials.roughness and film.surface.interface_roughness == 0
+    (clear,) = glass(scene, MASK, roughness=0.3, thickness="symmetry").bodies
+    assert clear.surface.interface_roughness == pytest.approx(0.3)

@@ -198,6 +198,13 @@ def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
     assert caught(older, "c") == ["body0", "body1"]
 
 
+def test_glass_and_its_film_share_one_roughness_where_a_format_has_one():
+    coated = replace(CHECKS, roughness=np.full((1, 1), 0.8, np.float32), transmission=0.75, glass_roughness=0.0)
+    (part,) = body_parts.body_parts(with_bodies(coated))
+    np.testing.assert_allclose(part.materials.roughness, 0.8)
+    np.testing.assert_allclose(body_parts.one_roughness(part).roughness, 0.2, atol=1e-6)
+
+
 def test_maps_of_several_sizes_are_brought_to_one():
     surface = Surface(CHECKS.albedo, np.linspace(0, 1, 4, dtype=np.float32).reshape(4, 1), CHECKS.metallic)
     (part,) = body_parts.body_parts(with_bodies(surface))

@@ -49,7 +49,8 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path):
     numbers = lambda *shape: rng.random(shape, np.float32)  # noqa: E731
     surface = Surface(numbers(2, 3, 3), numbers(2, 3), numbers(1, 1), 0.9, 1.4, (0.5, 0.6, 1.0))
     body = Body(numbers(4, 3), np.int32([[0, 1, 2], [0, 2, 3]]), numbers(4, 3), numbers(4, 2), surface, "a jug")
-    full = replace(scene, bodies=(body, replace(body, name="another")))
+    coated = replace(body, name="another", surface=replace(body.surface, glass_roughness=0.25))
+    full = replace(scene, bodies=(body, coated))
     save_scene(full, tmp_path / "a.scene")
     assert_same(load_scene(tmp_path / "a.scene"), full)
     (tmp_path / "a.scene/bodies/1.albedo.exr").unlink()

@@ -112,12 +112,13 @@ def glass_surface(
 ) -> Surface:
     """The material: glass, and (1 - T) of what the object was; values as for `glass`."""
     clear = transmission >= 1
-    shape = (1, 1) if clear else scene.depth.shape
     albedo = np.ones((1, 1, 3), np.float32) if clear else scene.materials.albedo
     metallic = np.zeros((1, 1), np.float32) if clear else scene.materials.metallic
-    rough = np.full(shape, roughness, np.float32)
+    rough = np.full((1, 1), roughness, np.float32) if clear else scene.materials.roughness
     r, g, b = (float(c) for c in tint)
-    return Surface(albedo, rough, metallic, float(transmission), float(ior), (r, g, b))
+    return Surface(
+        albedo, rough, metallic, float(transmission), float(ior), (r, g, b), glass_roughness=float(roughness)
+    )  # fmt: skip
 
 
 def _two_interface(

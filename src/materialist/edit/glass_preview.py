@@ -126,7 +126,7 @@ class GlassPreview:
         """The ray tracer's scene with the body of that glass: made once for each kind of glass."""
         from materialist.render.bodies import SMOOTH
 
-        rough = float(surface.roughness.mean())
+        rough = surface.interface_roughness
         coated = surface.transmission < 1
         kind = "coated" if coated else ("smooth" if rough < SMOOTH else "rough")
         if coated or kind not in self._targets:

@@ -103,7 +103,7 @@ def _look(part: Part) -> dict:
     if surface is not None and is_glowing(surface):
         look["emission"] = [float(c) for c in surface.emission]
     if surface is not None and is_transparent(surface):
-        roughness = float(surface.roughness.mean())
+        roughness = surface.interface_roughness
         look["glass"] = {
             "share": float(surface.transmission), "ior": max(float(surface.ior), 1.0001),
             "roughness": 0.0 if roughness < SMOOTH else roughness,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from materialist.export.parts import Part
@@ -50,3 +52,13 @@ def _one_size(surface: Surface) -> Materials:
         return np.ascontiguousarray(values[np.ix_(rows, columns)])
 
     return Materials(*(grown(values) for values in maps))
+
+
+def one_roughness(part: Part) -> Materials:
+    """The part's maps for formats in which glass and the opaque share have one roughness: their mean, by share."""
+    surface = part.surface
+    if surface is None or surface.transmission == 0:
+        return part.materials
+    share = np.float32(surface.transmission)
+    mixed = (1 - share) * part.materials.roughness + share * np.float32(surface.interface_roughness)
+    return replace(part.materials, roughness=mixed.astype(np.float32))

@@ -16,6 +16,7 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import OutputError
+from materialist.export.body_parts import one_roughness
 from materialist.export.parts import Part
 from materialist.export.textures import base_color, metallic_roughness, png
 from materialist.types import Array, Camera, Lamp, Scene, Surface
@@ -119,14 +120,15 @@ class _Document:
 
     def _material(self, part: Part) -> int:
         pbr: dict = {}
+        m = one_roughness(part)
         if part.constant:
-            pbr["baseColorFactor"] = [*(float(c) for c in part.materials.albedo[0, 0]), 1.0]
-            pbr["roughnessFactor"] = float(part.materials.roughness[0, 0])
-            pbr["metallicFactor"] = float(part.materials.metallic[0, 0])
+            pbr["baseColorFactor"] = [*(float(c) for c in m.albedo[0, 0]), 1.0]
+            pbr["roughnessFactor"] = float(m.roughness[0, 0])
+            pbr["metallicFactor"] = float(m.metallic[0, 0])
         else:
             sampler = 0 if part.surface is None else 1
-            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(part.materials), sampler)}
-            packed = metallic_roughness(part.materials)
+            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(m), sampler)}
+            packed = metallic_roughness(m)
             pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
         material: dict = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
         if part.surface is not None and max(part.surface.emission) > 0:

@@ -104,7 +104,7 @@ def _opaque(folder: Path, bsdf: ET.Element, part: Part) -> None:
 
 def _glass(parent: ET.Element, surface: Surface) -> None:
     """As `render.bodies` has it: each interface the root of the tint, smooth below the least roughness."""
-    roughness = float(surface.roughness.mean())
+    roughness = surface.interface_roughness
     bsdf = _node(parent, "bsdf", "dielectric" if roughness < SMOOTH else "roughdielectric")
     _value(bsdf, "float", "int_ior", repr(max(float(surface.ior), 1.0001)))
     _value(bsdf, "float", "ext_ior", "1.0")

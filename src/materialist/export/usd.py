@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import SetupError
+from materialist.export.body_parts import one_roughness
 from materialist.export.parts import Part
 from materialist.export.run import Exported
 from materialist.export.target import whole_files, whole_folder
@@ -90,7 +91,7 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     surface.CreateIdAttr("UsdPreviewSurface")
     surface.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.5)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
-    m = part.materials
+    m = one_roughness(part)
     color = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     roughness = surface.CreateInput("roughness", Sdf.ValueTypeNames.Float)
     metallic = surface.CreateInput("metallic", Sdf.ValueTypeNames.Float)

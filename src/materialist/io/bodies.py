@@ -30,6 +30,7 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
             {
                 "name": body.name, "transmission": surface.transmission, "ior": surface.ior,
                 "tint": list(surface.tint), "emission": list(surface.emission),
+                "glass_roughness": surface.glass_roughness,
             }
         )  # fmt: skip
     return entries
@@ -50,6 +51,6 @@ def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
         raise SceneError(f"{error} Save the scene again.") from error
     surface = Surface(
         albedo, roughness, metallic, float(entry["transmission"]), float(entry["ior"]), tuple(entry["tint"]),
-        tuple(entry.get("emission", (0.0, 0.0, 0.0))),
+        tuple(entry.get("emission", (0.0, 0.0, 0.0))), entry.get("glass_roughness"),
     )  # fmt: skip
     return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))

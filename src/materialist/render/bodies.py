@@ -48,7 +48,7 @@ def body_bsdf(mi, surface: Surface) -> dict:
 
 
 def _dielectric(surface: Surface) -> dict:
-    roughness = float(surface.roughness.mean())
+    roughness = surface.interface_roughness
     tint = [float(np.sqrt(c)) for c in surface.tint]
     ior = max(float(surface.ior), 1.0001)  # Mitsuba takes no interface between equal media
     glass = {

@@ -39,7 +39,7 @@ class Selection:
         row, column = int(y), int(x)
         mask = self.mask
         inside = mask is not None and 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column]
-        if mode == REMOVE and inside:
+        if mode == REMOVE and inside and mask is not None:
             found = select(scene, click=(x, y), method=method)
             if (found & mask).sum() < WHOLE * mask.sum():
                 return self._without(found)
