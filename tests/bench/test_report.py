@@ -67,12 +67,15 @@ def test_unknown_benchmarks_and_options_are_refused(tmp_path):
         bench.run("light", output=tmp_path / "out", colour=3)
     with pytest.raises(InputError, match=r"no method 'magic'.*paper path"):
         bench.run("light", output=tmp_path / "out", methods="default,magic")
+    with pytest.raises(InputError, match="scenes is 0"):
+        bench.run("light", output=tmp_path / "out", scenes=0)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [({"scenes": "abc"}, "--scenes is 'abc'; give a whole number"), ({"scenes": 2.5}, "--scenes is 2.5"),
-     ({"scenes": 0}, "--scenes is 0; give at least 1"), ({"seed": -1}, "--seed is -1; give at least 0"),
+     ({"scenes": -1}, "--scenes is -1; give at least 0"), ({"size": 0}, "--size is 0; give at least 1"),
+     ({"seed": -1}, "--seed is -1; give at least 0"),
      ({"photographic": 3}, "--photographic is 3; give true or false")],
 )  # fmt: skip
 def test_options_of_another_kind_are_refused(tmp_path, options, words):

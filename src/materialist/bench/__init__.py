@@ -24,6 +24,10 @@ BENCHMARKS = (
 )
 
 
+AT_LEAST_ONE = ("spp", "truth_spp", "reference", "size", "views", "lights", "runs")
+"""Options of which 0 means nothing; 0 of others leaves a part of the benchmark out."""
+
+
 def run(name: str, *, output: str | Path, data: str | Path | None = None, force: bool = False, **options: Any) -> Path:
     """Run benchmark `name` and write report.json, report.md and plot.png into the folder `output`.
 
@@ -53,7 +57,7 @@ def _check(option: str, value: Any, usual: Any) -> None:
         raise InputError(f"--{option} is {value!r}; give true or false.")
     if isinstance(usual, int) and not isinstance(usual, bool) and not (number and value == int(value)):
         raise InputError(f"--{option} is {value!r}; give a whole number.")
-    least = 0 if option == "seed" or usual == 0 else 1
+    least = 1 if option in AT_LEAST_ONE else 0
     if isinstance(usual, int) and not isinstance(usual, bool) and value < least:
         raise InputError(f"--{option} is {value}; give at least {least}.")
     if isinstance(usual, float) and not number:

@@ -112,6 +112,8 @@ def run(
     are relit. `spp` are the samples a pixel of all pictures that are compared. The report is written after every row.
     """
     chosen = _methods(methods)
+    if scenes < 1:
+        raise InputError(f"scenes is {scenes}; give at least 1.")
     from rich.console import Console
     from rich.progress import track
 
