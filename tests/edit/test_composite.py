@@ -127,6 +127,8 @@ def test_a_lamp_in_the_picture_is_a_disc_at_native_size():
     assert radius > 3 and one.radiance[1] > 20
     assert (out[away < radius - 1] > 1).all() and (out[(away > radius + 1.5)] < 1.5).all()
     assert ((out[..., 1] > 0.99) & (away < 3 * radius)).sum() < 1.4 * np.pi * radius**2
+    ring = (away > radius) & (away < radius + 8)
+    assert (out[ring] > 1.05 * scene.photo.original[ring]).all(), "it is lit up to the lamp's rim"
 
 
 def test_both_sides_use_the_same_tracer_under_a_lamp():

@@ -161,6 +161,8 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     scaled = read("map_Kd -s 2 2 1 c.png")
     np.testing.assert_allclose(scaled.parts[0].surface.albedo, 1.0)
     assert ["such as -s" in note for note in scaled.warnings] == [True]
+    assert read("map_Kd -s 2 2 1 c.png\r").parts[0].surface.albedo.mean() == 1, "as Windows ends lines"
+    assert read("Ke nan inf -1").parts[0].surface.emission == (0.0, 0.0, 0.0)
     for lines, words in (("d 0.4", "transparency"), ("Tr 0.3", "transparency"), ("map_Bump -bm 0.5 c.png", "bump")):
         assert [words in note for note in read(lines).warnings] == [True], lines
     assert not read("d 1\nTr 0\nKe 0 0 0").warnings

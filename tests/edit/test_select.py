@@ -147,3 +147,10 @@ def test_the_edge_of_a_box_is_inside_it_and_its_foot_is_not():
         features = Features(linear, np.full(rows.shape, 2.0, np.float32), normal)
         strength[name] = edge_map(features)[22:26].max()
     assert strength["concave"] > 1.5 * strength["convex"]
+
+
+def test_a_click_on_the_last_row_of_an_odd_size():
+    """Half of 341 rows is 170, and half of row 340 as well."""
+    scene = flat_scene(341, 512)
+    assert select(scene, click=(60, 340), method="grabcut").any()
+    assert select(scene, click=(511, 340), method="grabcut").any()

@@ -87,12 +87,15 @@ def test_exr_is_exact_and_clipped_to_ten(tmp_path):
 
 
 def test_exposure_is_of_hdr_photos_only_and_undoes_any_unit():
-    values = np.linspace(0, 1, 3000, dtype=np.float32).reshape(50, 20, 3)
+    values = np.linspace(0.1, 1, 3000, dtype=np.float32).reshape(50, 20, 3)
     camera = Camera(20, 50, 40.0)
     for unit in (0.02, 1, 9):
         photo = exposed(Photo(unit * values, camera, unit * values, True))
         assert np.percentile(photo.linear.max(-1), 97) == pytest.approx(0.9, rel=1e-5)
         assert exposure(photo) == pytest.approx(1, rel=1e-5)
+    night = np.full_like(values, 1e-4)
+    night[:2] = 3 * values[-2:]
+    assert exposure(Photo(night, camera, night, True)) < 1, "what is black says nothing"
     ordinary = Photo(values, camera, values)
     assert exposure(ordinary) == 1 and exposed(ordinary) is ordinary
 

@@ -19,6 +19,8 @@ Upscale = Callable[[Array, tuple[int, int]], Array]
 """upscale(picture [H, W, 3] linear, (H0, W0)) -> [H0, W0, 3] linear."""
 FLOOR = 0.02
 """Radiance added to both sides of edited / base: below it a ratio says nothing."""
+RIM = 4.0
+"""Working pixels under the outline of a new body to which the change beside it goes on: what enlarging looks up."""
 MOST = 1.0
 """Largest factor on what the photo has and the fit has not, under the same light."""
 RERENDERED = 36
@@ -117,6 +119,8 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
     At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
     """
+    from scipy import ndimage
+
     out = photo.original.copy()
     if not layers.reached.any():
         return _in_front(out, layers.portrait, photo.hdr)
@@ -124,11 +128,17 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     stack[~layers.reached, :6] = 0
     upsample = GuidedUpsample(photo.linear, photo.original)
     alpha = matte(layers.changed, photo.original)
-    clear = np.ones_like(layers.changed) if layers.portrait is None else layers.portrait.inside == 0
+    changed, clear = layers.changed, np.ones_like(layers.changed)
+    if layers.portrait is not None:
+        clear = layers.portrait.inside == 0
+    if layers.relit and clear.any() and not clear.all():
+        # The rim of a body: what light changes beside it goes on under it, where there is nothing to look up.
+        away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
+        stack, changed, clear = stack[row, column], changed[row, column], away <= RIM
     for rows in strips(out.shape[0]):
         share = alpha[rows][..., None]
-        large = share * upsample(stack, layers.changed & clear, rows)
-        large += (1 - share) * upsample(stack, ~layers.changed & clear, rows)
+        large = share * upsample(stack, changed & clear, rows)
+        large += (1 - share) * upsample(stack, ~changed & clear, rows)
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
         held = out[rows] if photo.hdr or layers.relit else _unclipped(out[rows], reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)

@@ -229,8 +229,8 @@ def _starts(
         found = around.start(own, lift, least, release.metres)
         if found is None:
             raise InputError(
-                f"There is no room for {name}: it would start inside of something; choose another place, or a smaller "
-                "scale."
+                f"There is no room for {name}: it would start inside of something; choose another place, or a larger "
+                "height."
             )
         shift, top = found
         if shift[:2].any():

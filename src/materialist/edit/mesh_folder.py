@@ -16,7 +16,7 @@ FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp")
 
 
-OPTIONS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*$")
+OPTIONS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*\r?$")
 """A texture of an .mtl with options before its name."""
 
 

@@ -92,9 +92,12 @@ def _from_mtl(material: Any, folder: Any) -> Surface:
         folder.left_out |= {what} if any(key in said for key in keys) else set()
     if _number(said.get("d"), 1.0) < 1 or _number(said.get("tr"), 0.0) > 0:
         folder.left_out.add(OPAQUE)
-    glow = [max(_number([v], 0.0), 0.0) for v in np.ravel(said.get("ke", []))[:3]]
     surface = _clipped(albedo, roughness, metallic)
-    return replace(surface, emission=tuple(glow)) if len(glow) == 3 else surface
+    glow = np.ravel(said.get("ke", []))
+    if len(glow) < 3:
+        return surface
+    r, g, b = (float(np.clip(np.nan_to_num(_number([v], 0.0), posinf=0), 0, 1e6)) for v in glow[:3])
+    return replace(surface, emission=(r, g, b))
 
 
 def _map(reference: Any, folder: Any, otherwise: Any) -> Array:

@@ -81,7 +81,9 @@ def portrait(
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
     rows, columns = slice(*box[:2]), slice(*box[2:])
-    share[rows, columns] = _behind_things(sight, alone, scene, box)
+    # A lamp that touches a surface is cut by it, not hidden by a thing before it.
+    contact = 2.0 if all(name.startswith("lamp") for name in names) else CONTACT
+    share[rows, columns] = _behind_things(sight, alone, scene, box, contact)
     whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
     bright = any(max(bodies[name].surface.emission) > 1 or name.startswith("lamp") for name in names)
     return Portrait(_around(small.share) if bright else small.share, share, whole)
@@ -134,7 +136,9 @@ def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
     return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int]) -> Array:
+def _behind_things(
+    sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int], contact: float = CONTACT
+) -> Array:  # fmt: skip
     """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands before them.
 
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
@@ -149,7 +153,7 @@ def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, in
     nearer = alone.depth - enlarge(scene.depth)
     size = float(alone.depth.max() - alone.depth[alone.depth > 0].min()) + 1e-9
     size = max(size, float(alone.depth.max()) * np.sqrt((alone.share > 0).mean()) * 0.05)
-    hidden = (alone.share > sight.share + 0.05) & (nearer > CONTACT * size)
+    hidden = (alone.share > sight.share + 0.05) & (nearer > contact * size)
     if not hidden.any():
         return sight.share
     scale = max(native[0] / scene.depth.shape[0], 1.0)
@@ -158,7 +162,7 @@ def _behind_things(sight: Any, alone: Any, scene: Scene, box: tuple[int, int, in
     whole = np.zeros(native, np.float32)
     whole[rows, columns] = spread(alone.depth)
     depth = cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    thing = (scene.depth > 0) & (scene.depth < depth - CONTACT * size)
+    thing = (scene.depth > 0) & (scene.depth < depth - contact * size)
     cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
     return np.where(near, cut, sight.share).astype(np.float32)
 

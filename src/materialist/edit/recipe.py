@@ -212,7 +212,7 @@ def _seed(step: Step) -> int:
     """The step's own seed, or that of all."""
     seed = _number(step.options.get("seed", step.seed), "seed")
     if not (0 <= seed < 2**31 and seed == int(seed)):
-        raise InputError(f"The seed is {step.options['seed']}; give a whole number from 0 to {2**31 - 1}.")
+        raise InputError(f"The seed is {seed:g}; give a whole number from 0 to {2**31 - 1}.")
     return int(seed)
 
 

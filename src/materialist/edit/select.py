@@ -79,7 +79,8 @@ def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | 
     from materialist.edit.refine import refined
 
     small, scale = _smaller(scene)
-    seeds = [(int(x * scale), int(y * scale)) for x, y in points]
+    # Rounded sides may be half a pixel short.
+    seeds = [(min(int(x * scale), small.shape[1] - 1), min(int(y * scale), small.shape[0] - 1)) for x, y in points]
     shrunk = None if share is None else np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
     rough = object_around(small, seeds, shrunk)
     return refined(scene, _larger(rough, scene), points, share)

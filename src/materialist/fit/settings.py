@@ -144,7 +144,7 @@ def preset(name: str, *, hdr: bool = False) -> FitSettings:
     """Settings by name.
 
     For HDR photos the paper's loss compares log(1 + x) (paper, Handling HDR Images); ours sees them exposed as a
-    photograph is, whatever unit their radiance is in, and nothing in them is clipped.
+    photograph is, and nothing in them is clipped.
     """
     if name not in PRESETS:
         raise InputError(f"Preset is '{name}'; choose one of {', '.join(PRESETS)}.")

@@ -18,6 +18,8 @@ DEFAULT_FOV = 35.0
 """Horizontal field of view, degrees, when nothing better is known (the paper's)."""
 HDR_CLIP = 10.0
 """Upper bound of HDR input (paper, appendix "Handling HDR Images")."""
+BLACK = 1e-3
+"""Share of the brightest value up to which an HDR photo's pixel is black, and says nothing of its exposure."""
 BRIGHT = 0.9
 """Where `exposure` puts the 97th percentile of an HDR photo's brightest channel."""
 
@@ -55,11 +57,12 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
 def exposure(photo: Photo) -> float:
     """Factor on an HDR photo's radiance that brings it to the exposure of an ordinary photograph; 1 for the others.
 
-    Files of radiance are in any unit. Their 97th percentile comes to BRIGHT.
+    The 97th percentile of what is not black beside the brightest pixel comes to BRIGHT.
     """
     if not photo.hdr:
         return 1.0
-    return BRIGHT / max(float(np.percentile(photo.linear.max(-1), 97)), 1e-6)
+    value = photo.linear.max(-1)
+    return BRIGHT / max(float(np.percentile(value[value > BLACK * value.max()], 97)), 1e-6)
 
 
 def exposed(photo: Photo) -> Photo:

@@ -12,8 +12,8 @@ from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 REPLACE, ADD, REMOVE = "new", "add", "remove"
-WHOLE = 0.7
-"""Share of what is selected from which an object in it is all of it."""
+PART, INSIDE = 0.4, 0.9
+"""An object is a part of what is selected up to this share of it, and with at least this share of itself in it."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,8 @@ class Selection:
         inside = mask is not None and 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column]
         if mode == REMOVE and inside and mask is not None:
             found = select(scene, click=(x, y), method=method)
-            if (found & mask).sum() < WHOLE * mask.sum():
+            # One thing found again from another place of it is never quite the same.
+            if (found & mask).sum() > INSIDE * found.sum() and found.sum() < PART * mask.sum():
                 return self._without(found)
         if inside or mode == REMOVE:
             return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
