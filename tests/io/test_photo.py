@@ -96,6 +96,7 @@ def test_exposure_is_of_hdr_photos_only_and_undoes_any_unit():
     night = np.full_like(values, 1e-4)
     night[:2] = 3 * values[-2:]
     assert exposure(Photo(night, camera, night, True)) < 1, "what is black says nothing"
+    assert np.isfinite(exposure(Photo(0 * values, camera, 0 * values, True)))
     ordinary = Photo(values, camera, values)
     assert exposure(ordinary) == 1 and exposed(ordinary) is ordinary
 

@@ -62,7 +62,7 @@ def exposure(photo: Photo) -> float:
     if not photo.hdr:
         return 1.0
     value = photo.linear.max(-1)
-    return BRIGHT / max(float(np.percentile(value[value > BLACK * value.max()], 97)), 1e-6)
+    return BRIGHT / max(float(np.percentile(value[value >= BLACK * value.max()], 97)), 1e-6)
 
 
 def exposed(photo: Photo) -> Photo:
