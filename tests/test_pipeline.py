@@ -228,14 +228,15 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
     from materialist.types import Camera, Materials, Photo, Prediction
 
     def notes(value, hdr):
-        linear = np.full((8, 8, 3), value, np.float32)
+        linear = np.full((8, 8, 3), 0.9, np.float32)
+        linear[0, 0] = value
         flat = np.ones((8, 8), np.float32)
         prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
         found = SimpleNamespace(materials=prior.materials, rerender=linear, stages=())
         photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
         return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
 
-    assert [notes(1.0, False), notes(4.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
+    assert [notes(1.0, False), notes(9.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
 
 
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder):

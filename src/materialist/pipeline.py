@@ -169,8 +169,8 @@ def _report(
     light = np.float32(exposure(picture))  # an HDR photo is looked at as it would be shown
     again, shown = light * rerender, light * picture.linear
     residual = np.abs(linear_to_srgb(again) - linear_to_srgb(shown)).max(-1)
-    white = HDR_CLIP if picture.hdr else 0.99
-    clipped = float((picture.linear >= white).any(-1).mean())
+    white = 0.999 * HDR_CLIP if picture.hdr else 0.99
+    clipped = float((shown >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings, *told]
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")

@@ -34,12 +34,12 @@ class Photo:
     """A photograph at working size, with its untouched original beside it."""
 
     linear: Array
-    """[H, W, 3] float32 linear Rec.709 at working size, >= 0; HDR input clipped to [0, 10]."""
+    """[H, W, 3] float32 linear Rec.709 at working size, >= 0; see `io.photo.read_photo` for HDR."""
     camera: Camera
     original: Array
     """[H0, W0, 3] float32 linear at native size (after EXIF rotation)."""
     hdr: bool = False
-    """True when the file holds scene-linear values above 1 (EXR, HDR)."""
+    """True when the file holds scene-linear values of any unit (EXR, HDR, float TIFF), not clipped at 1."""
     fov_source: str = "default"
     """Where camera.fov came from: 'exif', 'option', 'predictor' or 'default'."""
     path: str | None = None

@@ -77,13 +77,25 @@ def test_float_tiff_is_scene_linear(tmp_path):
     assert photo.hdr
 
 
-def test_exr_is_exact_and_clipped_to_ten(tmp_path):
-    values = np.random.default_rng(0).random((12, 13, 3), np.float32) * 30
+@pytest.mark.parametrize("unit", [1e-4, 1, 30, 4000])
+def test_exr_is_exact_and_clipped_at_ten_times_white_in_any_unit(tmp_path, unit):
+    values = (np.random.default_rng(0).random((40, 50, 3), np.float32)) * np.float32(unit)
+    values[0, :5] = 1e5 * unit  # a sun must not set the scale
     write_exr(tmp_path / "a.exr", values)
     photo = read_photo(tmp_path / "a.exr")
     np.testing.assert_array_equal(photo.original, values)
-    np.testing.assert_array_equal(photo.linear, np.minimum(values, 10))
-    assert photo.hdr and any("10" in warning for warning in photo.warnings)
+    np.testing.assert_array_equal(photo.linear[1:], values[1:])
+    assert photo.hdr and any("clipped" in warning for warning in photo.warnings)
+    assert exposed(photo).linear.max() == pytest.approx(10, rel=0.02)
+    assert exposed(photo).linear[1:].mean() == pytest.approx(0.45, rel=0.05)
+    np.testing.assert_array_equal(exposed(photo).original, values * np.float32(exposure(photo)))
+
+
+def test_a_bright_window_does_not_make_the_room_black():
+    values = np.full((50, 20, 3), 0.2, np.float32)
+    values[:10] = 40
+    photo = exposed(Photo(values, Camera(20, 50, 40.0), values, True))
+    assert photo.linear[20:].mean() == pytest.approx(0.05)
 
 
 def test_exposure_is_of_hdr_photos_only_and_undoes_any_unit():
@@ -101,9 +113,12 @@ def test_exposure_is_of_hdr_photos_only_and_undoes_any_unit():
     assert exposure(ordinary) == 1 and exposed(ordinary) is ordinary
 
 
-def test_dim_exr_is_not_called_hdr_and_grey_is_spread(tmp_path):
+def test_an_exr_clipped_at_one_is_not_called_hdr_and_grey_is_spread(tmp_path):
     values = np.random.default_rng(0).random((12, 13), np.float32)
     values[0, 0] = -0.25
+    write_exr(tmp_path / "dim.exr", values)
+    assert read_photo(tmp_path / "dim.exr").hdr
+    values[5] = 1
     write_exr(tmp_path / "a.exr", values)
     photo = read_photo(tmp_path / "a.exr")
     assert not photo.hdr and photo.linear[0, 0, 0] == 0

@@ -142,7 +142,7 @@ class Job:
         fit = Fit(
             self._seen, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
-            white=HDR_CLIP * self._exposure if self.picture.hdr else WHITE,
+            white=HDR_CLIP if self.picture.hdr else WHITE,
         )  # fmt: skip
         return Begun(completion, tuple(ends), geometry, fit, judge, stages)
 
@@ -174,7 +174,10 @@ class Job:
 
     @cached_property
     def _seen(self) -> Photo:
-        return exposed(self.picture) if self.settings.exposed else self.picture
+        if self.settings.exposed:
+            return exposed(self.picture)
+        limit = np.float32(HDR_CLIP)  # the paper's, in the unit of the file
+        return replace(self.picture, linear=np.minimum(self.picture.linear, limit))
 
     def _psnr(self, attempt: Attempt) -> float:
         factor = exposure(self.picture)

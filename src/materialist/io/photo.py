@@ -17,19 +17,22 @@ from materialist.types import Array, Camera, Photo
 DEFAULT_FOV = 35.0
 """Horizontal field of view, degrees, when nothing better is known (the paper's)."""
 HDR_CLIP = 10.0
-"""Upper bound of HDR input (paper, appendix "Handling HDR Images")."""
+"""Upper bound of HDR input (paper, appendix "Handling HDR Images"); here of its pixels at `exposure`."""
 BLACK = 1e-3
 """Share of the brightest value up to which an HDR photo's pixel is black, and says nothing of its exposure."""
 BRIGHT = 0.9
 """Where `exposure` puts the 97th percentile of an HDR photo's brightest channel."""
+MIDDLE = 0.05
+"""The median, where that would leave it darker: a bright window must not make the room black."""
 
 
 def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None) -> Photo:
     """Read PATH (or `example:NAME`) as a Photo whose longer side is `size` pixels, or fewer where the file has fewer.
 
     `fov` is the horizontal field of view in degrees, in (1, 170); None or "auto" takes it from EXIF, else 35.
-    Display files (PNG, JPEG, ...) give values in [0, 1]; scene-linear ones (EXR, HDR, float TIFF) are clipped to
-    [0, 10] (paper, appendix "Handling HDR Images"). Shrinking is an area average in linear light.
+    Display files (PNG, JPEG, ...) give values in [0, 1]. Scene-linear ones (EXR, HDR, float TIFF) keep their unit and
+    are clipped at 10 times the white of an ordinary photo of them, see `exposure` (paper, appendix "Handling HDR
+    Images", whose unit that white is). Shrinking is an area average in linear light.
 
     Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
@@ -43,10 +46,11 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     original = decoded.linear
     height, width = original.shape[:2]
     linear = _working(original, size)
-    warnings = [*decoded.warnings, *_remarks(decoded, width, height)]
-    hdr = decoded.scene_linear and float(original.max()) > 1
-    if float(linear.max()) > HDR_CLIP:
-        linear = np.minimum(linear, np.float32(HDR_CLIP))
+    warnings = [*decoded.warnings, *_remarks(width, height)]
+    hdr = decoded.scene_linear and float(original.max()) != 1  # a picture that ends at 1 has been clipped there
+    if hdr and np.any(linear > (limit := _limit(linear))):
+        warnings.append(f"HDR values above {limit:.3g} are clipped at working size.")
+        linear = np.minimum(linear, limit)
     _require_content(linear, name)
     from_exif = horizontal_fov(decoded.tags, width, height)
     source = "option" if angle else "exif" if from_exif else "default"
@@ -57,18 +61,33 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
 def exposure(photo: Photo) -> float:
     """Factor on an HDR photo's radiance that brings it to the exposure of an ordinary photograph; 1 for the others.
 
-    The 97th percentile of what is not black beside the brightest pixel comes to BRIGHT.
+    The 97th percentile of what is not black beside the brightest pixel comes to BRIGHT, or its median to MIDDLE where
+    that asks for more.
     """
-    if not photo.hdr:
-        return 1.0
-    value = photo.linear.max(-1)
-    return BRIGHT / max(float(np.percentile(value[value >= BLACK * value.max()], 97)), 1e-6)
+    return _exposure(photo.linear) if photo.hdr else 1.0
 
 
 def exposed(photo: Photo) -> Photo:
-    """The photo with its working pixels at that exposure."""
-    factor = exposure(photo)
-    return photo if factor == 1 else replace(photo, linear=photo.linear * np.float32(factor))
+    """The photo at that exposure, the same one where it has it."""
+    factor = np.float32(exposure(photo))
+    return photo if factor == 1 else replace(photo, linear=photo.linear * factor, original=photo.original * factor)
+
+
+def _exposure(linear: Array) -> float:
+    value = linear.max(-1)
+    bright, middle = np.percentile(value[value >= BLACK * value.max()], (97, 50))
+    return float(max(BRIGHT / max(bright, 1e-12), MIDDLE / max(middle, 1e-12)))
+
+
+def _limit(linear: Array) -> np.float32:
+    """Where pixels [H, W, 3] are clipped: at HDR_CLIP of the exposure that they have once clipped there."""
+    value = linear.max(-1)
+    limit = HDR_CLIP * float(np.percentile(value, 99)) or float(value.max())  # one sun must not set the scale
+    for _ in range(8):
+        found, limit = limit, HDR_CLIP / _exposure(np.minimum(linear, np.float32(limit)))
+        if abs(found - limit) < 1e-6 * limit:
+            break
+    return np.float32(limit)
 
 
 def decode_photo(file: Path, over: float = 1.0) -> Decoded:
@@ -128,15 +147,13 @@ def _working(original: Array, size: int) -> Array:
     return np.asarray(cv2.resize(original, target, interpolation=cv2.INTER_AREA))
 
 
-def _remarks(decoded: Decoded, width: int, height: int) -> list[str]:
+def _remarks(width: int, height: int) -> list[str]:
     """What the user should know about this photo."""
     remarks = []
     if width == 2 * height:
         remarks.append(
             "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
         )
-    if decoded.scene_linear and float(decoded.linear.max()) > HDR_CLIP:
-        remarks.append(f"HDR values above {HDR_CLIP:g} are clipped at working size.")
     return remarks
 
 
