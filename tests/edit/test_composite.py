@@ -144,6 +144,22 @@ def test_a_lamp_in_the_picture_is_a_disc_at_native_size():
     assert (out[ring] > 1.05 * scene.photo.original[ring]).all(), "it is lit up to the lamp's rim"
 
 
+@pytest.mark.parametrize("other", ["less light", "the same lamp again"])
+def test_the_rim_of_a_lamp_that_the_photo_shows_takes_no_colour_under_another_light(other):
+    scene = rendered_scene(native=4)
+    one = lamp(scene, 36, 18, 2.0, 2500, 0.3)
+    lit = relight(scene, lamps=[one])
+    saved = developed(scene, lit, composite(scene, lit, spp=16))
+    out = composite(saved, relight(saved, **({"lamps": [one]} if "again" in other else {"ambient": 0.2})), spp=16)
+    place, _ = project(np.array([one.position]), scene.camera)
+    radius = 4 * one.radius / 2.0 * scene.camera.focal
+    y, x = np.mgrid[: out.shape[0], : out.shape[1]] + 0.5
+    away = np.hypot(x - 4 * place[0, 0], y - 4 * place[0, 1]) - radius
+    near, wall = out[(away > 1) & (away < 4)], out[(away > 8) & (away < 11)]
+    np.testing.assert_allclose(near.mean(0), wall.mean(0), rtol=0.1)
+    assert near.max() < 1.5 * wall.max()
+
+
 def test_both_sides_use_the_same_tracer_under_a_lamp():
     scene = rendered_scene()
     lit = relight(scene, lamps=[lamp(scene, 30, 10, 2.5, 3000, 1e-6)])

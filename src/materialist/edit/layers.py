@@ -50,12 +50,11 @@ def render_layers(
     """
     scene = studio.scene
     base, other = studio.twins(edited)
-    changed = changed_pixels(scene, edited)
-    # Another light changes every pixel.
-    begun = studio.begun(edited) if sparing and spp >= FEWEST and not is_relit(scene, edited) else None
+    changed, relit = changed_pixels(scene, edited), is_relit(scene, edited)  # another light changes every pixel
+    begun = studio.begun(edited) if sparing and spp >= FEWEST and not relit else None
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
-    if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps):
+    if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
         covered = anything = studio.covered(edited)
         if alone is not None:
@@ -65,7 +64,7 @@ def render_layers(
             albedo, normal = studio.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress)
-    return replace(layers, relit=is_relit(scene, edited), portrait=alone, covered=covered)
+    return replace(layers, relit=relit, portrait=alone, covered=covered)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:

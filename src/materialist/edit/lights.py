@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.layers import Render
+from materialist.edit.layers import Render, is_relit
 from materialist.edit.sparing import Begun
 from materialist.errors import InputError
 from materialist.render.share import Share
@@ -86,12 +86,16 @@ class Studio:
     def portrait(self, edited: Scene, *, spp: int, seed: int, clean: bool):
         """The bodies and lamps that are new in `edited` at native size (`portrait.Portrait`), None for none in sight.
 
-        Bodies that take the place of a surface of the photo are left to the photo's own outlines.
+        Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
+        every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
         """
         from materialist.edit.portrait import free_bodies, portrait
         from materialist.render.scene import MAX_DEPTH
 
-        names = free_bodies(self.scene, edited) + _new_lamps(self.scene, edited)
+        lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
+        if not is_relit(self.scene, edited):
+            lamps = _new_lamps(self.scene, edited)
+        names = free_bodies(self.scene, edited) + lamps
         if not names:
             return None
         depth = _path_depth(edited) or MAX_DEPTH
@@ -149,8 +153,14 @@ class Studio:
 
 
 def _new_lamps(scene: Scene, edited: Scene) -> list[str]:
-    """Names of the shapes of lamps that `edited` has and `scene` has not."""
-    return [f"lamp{k}" for k, lamp in enumerate(edited.lamps) if lamp not in scene.lamps]
+    """Names of the shapes of lamps that `edited` has and `scene` has not; a second one like the first is new."""
+    known, names = list(scene.lamps), []
+    for k, lamp in enumerate(edited.lamps):
+        if lamp in known:
+            known.remove(lamp)
+        else:
+            names.append(f"lamp{k}")
+    return names
 
 
 def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:
