@@ -10,6 +10,7 @@ from made_meshes import box_file, floor_scene
 from materialist.edit import film
 from materialist.edit.convex import convex_pieces, thinned
 from materialist.edit.drop import METRES, down, drop, upright
+from materialist.edit.drop_ground import Surroundings
 from materialist.edit.ground import Field, blocks
 from materialist.edit.insert import extent, insert
 from materialist.edit.mesh_shape import volume
@@ -155,6 +156,35 @@ def test_what_stands_in_its_way_is_beside_its_start(box):
     assert np.abs(np.diff(middle, axis=0)).max() < 0.1 * tall, "nothing pushes it out"
     with pytest.raises(InputError, match="no room for box at 48,50"):
         drop(floating(floor_scene(96, 72), box, 0.01, scale=8), [box], (48.0, 50.0), frames=2)
+
+
+def test_two_that_make_way_do_not_start_in_each_other(box):
+    scene = insert(floor_scene(96, 72), box, (42.0, 50.0), scale=3)
+    for x in (50.0, 52.0, 54.0):
+        first = drop(scene, [box, box], [(50.0, 50.0), (x, 50.0)], frames=2, spin=0, height=0.5)[0]
+        up = upright(np.array(first.provenance["edits"][-1]["gravity"]))
+        (low, high), (other_low, other_high) = (
+            ((body.vertices @ up.T).min(0), (body.vertices @ up.T).max(0)) for body in first.bodies[1:]
+        )
+        assert (low >= other_high - 1e-4).any() or (other_low >= high - 1e-4).any()
+
+
+def test_a_card_whose_faces_look_down_is_no_solid(box):
+    """A ray that begins over it comes onto its back; one that begins in a box stays where it begins."""
+    scene, to_up = floor_scene(96, 72), upright(-UP)
+    (solid,) = floating(scene, box, 0.1).bodies
+    points = solid.vertices @ to_up.T
+    low, high = points.min(0), points.max(0)
+    place = (low + high) / 2
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    vertices = (np.c_[corners, np.full(4, low[2] + 0.1)] @ to_up).astype(np.float32)
+    card = replace(
+        solid, vertices=vertices, normals=np.tile(np.float32(-UP), (4, 1)), uv=np.zeros((4, 2), np.float32),
+        faces=np.int32([[0, 2, 1], [0, 3, 2]]),
+    )  # fmt: skip
+    for body, expected in ((card, low[2] + 0.1), (solid, place[2])):
+        around = Surroundings.of(replace(scene, bodies=(body,)), to_up, 1.0)
+        assert around.meets(*(np.array([v]) for v in place))[0] == pytest.approx(expected, abs=1e-3)
 
 
 def test_it_spins_about_its_centre_of_mass():

@@ -226,7 +226,7 @@ def _starts(
             if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
                 least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
         lift = max(least, release.height * release.metres)
-        found = around.start(own, lift, least, release.metres)
+        found = around.start(own, lift, least, release.metres, boxes)
         if found is None:
             raise InputError(
                 f"There is no room for {name}: it would start inside of something; choose another place, or a larger "

@@ -5,6 +5,7 @@ Coordinates are those of the simulation: metres, z up. `to_up` [3, 3] and `facto
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,21 +55,25 @@ class Surroundings:
     def meets(self, x: Array, y: Array, z: Array, upwards: bool = False) -> Array:
         """z [n] of what rays down (or up) from (x, y, z) [n] meet first, NaN for nothing.
 
-        A surface that a ray down meets from behind is that of a solid it began in, which reaches as high as its start.
+        A ray down that begins in a solid, which rays up and down meet from behind, meets it at its start.
         """
+        start = np.stack([x, y, z], -1) / self.factor @ self.to_up  # back in the camera frame
+        distance, behind = self._trace(start, 1.0 if upwards else -1.0)
+        if not upwards and behind.any():  # or it comes on the back of an open surface
+            distance[behind & self._trace(start, 1.0)[1]] = 0
+        return z + (distance if upwards else -distance)
+
+    def _trace(self, start: Array, sign: float) -> tuple[Array, Array]:
+        """(metres to what rays up (1) or down (-1) from [n, 3] meet first, NaN for nothing; whether from behind)."""
         from materialist.render.buffers import floats
 
         mi = self.target.mi
-        sign = 1.0 if upwards else -1.0
-        start = np.stack([x, y, z], -1) / self.factor @ self.to_up  # back in the camera frame
         origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
         direction = mi.Vector3f(*(float(sign * v) for v in self.to_up[2]))
         hit = self.target.mi_scene.ray_intersect(mi.Ray3f(origin, direction))
-        distance = np.array(hit.t, np.float64) * self.factor
-        if not upwards:
-            along = np.array(hit.n, np.float64).T @ -self.to_up[2]
-            distance[along > BEHIND] = 0
-        return np.where(np.isfinite(distance) & np.array(hit.is_valid()), z + sign * distance, np.nan)
+        met = np.array(hit.is_valid())
+        distance = np.where(met, np.array(hit.t, np.float64) * self.factor, np.nan)
+        return distance, met & (np.array(hit.n, np.float64).T @ (sign * self.to_up[2]) > BEHIND)
 
     def room_over(self, points: Array, metres: float) -> float:
         """How far a thing that stands with its points [n, 3] can be lifted before it meets what hangs over it.
@@ -93,28 +98,34 @@ class Surroundings:
 
         return field(self.meets, self.visible, middles.mean(0), half, top, metres)
 
-    def start(self, points: Array, lift: float, least: float, metres: float) -> tuple[Array, float] | None:
+    def start(
+        self, points: Array, lift: float, least: float, metres: float, taken: Sequence[tuple[Array, Array]] = ()
+    ) -> tuple[Array, float] | None:
         """Where a thing that stands with its points [n, 3] is let go of: its shift [3], and z that sees its ground.
 
         That is `lift` over its place; lower, but not below `least`, where something hangs there; or beside the place,
-        where something stands there. None where all of that would be inside of something.
+        where something stands there. None where all of that would be inside of something, or of the boxes (low, high)
+        that are `taken`.
         """
+        low, high = points.min(0), points.max(0)
         under = min(lift, max(self.room_over(points, metres) - GAP * metres, 0.0))
         heights = [(lift, metres)]
         if least <= under < lift:
             heights.append((under, GAP * metres / 2))
         looks = []
-        for high, space in heights:
-            top = float(points[:, 2].max()) + high + space
+        for raised, space in heights:
+            top = float(high[2]) + raised + space
             ground = self.ground([middle(points)], [top], metres)
-            looks.append((high, top, ground, tops(ground, blocks_of(ground, metres))))
+            looks.append((raised, top, ground, tops(ground, blocks_of(ground, metres))))
         for ways in (np.zeros((1, 3)), _ways(metres)):
-            for high, top, ground, shape in looks:
+            for raised, top, ground, shape in looks:
                 for way in ways:
-                    shift = way + np.array([0, 0, high])
+                    shift = way + np.array([0, 0, raised])
                     deep = depth_in(ground, shape, points + shift)
-                    if deep <= BUMP * metres:
-                        return shift + np.array([0, 0, max(deep, 0.0)]), top
+                    shift[2] += max(deep, 0.0)
+                    clear = not any(_meet(low + shift, high + shift, *box) for box in taken)
+                    if deep <= BUMP * metres and clear:
+                        return shift, top
         return None
 
 
@@ -126,6 +137,11 @@ def middle(points: Array) -> Array:
 def blocks_of(ground: Field, metres: float) -> list[Array]:
     """Convex blocks [8, 3] each, for things whose longest side is `metres`."""
     return blocks(ground, flat=FLAT * metres, depth=2 * metres)
+
+
+def _meet(low: Array, high: Array, other_low: Array, other_high: Array) -> bool:
+    """Whether two boxes have room in common."""
+    return bool((low < other_high).all() and (high > other_low).all())
 
 
 def _ways(metres: float) -> Array:
