@@ -149,7 +149,8 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     """Glow is taken, options before a texture's name are not part of it, and what is not shown is told."""
     from PIL import Image
 
-    Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path / "c.png")
+    for name in ("c.png", "my wood 2.png"):
+        Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path / name)
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
     (tmp_path / "m.obj").write_text(f"mtllib m.mtl\nusemtl a\n{corners}f 1/1 2/2 3/3\n")
 
@@ -161,6 +162,8 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     scaled = read("map_Kd -s 2 2 1 c.png")
     np.testing.assert_allclose(scaled.parts[0].surface.albedo, 1.0)
     assert ["such as -s" in note for note in scaled.warnings] == [True]
+    for line in ("-o 0.5 -bm 1e-1 -mm 0 1 c.png", "-clamp on my wood 2.png", "my wood 2.png", "-s 2 2 my wood 2.png"):
+        assert read(f"map_Kd {line}").parts[0].surface.albedo.mean() == 1
     assert read("map_Kd -s 2 2 1 c.png\r").parts[0].surface.albedo.mean() == 1, "as Windows ends lines"
     assert read("Ke nan inf -1").parts[0].surface.emission == (0.0, 0.0, 0.0)
     for lines, words in (("d 0.4", "transparency"), ("Tr 0.3", "transparency"), ("map_Bump -bm 0.5 c.png", "bump")):

@@ -127,3 +127,5 @@ def test_the_built_in_predictor_warns_of_its_own_maps_only(photo, other):
     assert "roughness" in note and "geometry" not in note and "albedo" not in note
     (note,) = get_predictor(other[0], depth="classical").predict(photo).warnings
     assert "geometry" in note and "neutral" not in note
+    (note,) = get_predictor(other[0], metallic="classical").predict(photo).warnings
+    assert "metallic is neutral" in note and "roughness" not in note

@@ -16,8 +16,13 @@ FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp")
 
 
-OPTIONS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*\r?$")
-"""A texture of an .mtl with options before its name."""
+OPTIONS = re.compile(
+    rb"(?im)^([ \t]*map_kd[ \t]+)"
+    rb"(?:-(?:blendu|blendv|cc|clamp|boost|texres|bm|imfchan|type)[ \t]+\S+[ \t]+"
+    rb"|-mm[ \t]+\S+[ \t]+\S+[ \t]+"
+    rb"|-[ost](?:[ \t]+[-+.\de]+(?=[ \t])){1,3}[ \t]+)+"
+)
+"""A texture of an .mtl up to its name, which may hold spaces, with the options of the format before it."""
 
 
 class MeshFolder:
@@ -51,7 +56,7 @@ class MeshFolder:
         self.damaged += path.suffix.lower() in PICTURES and not _is_picture(data)
         if path.suffix.lower() == ".mtl" and OPTIONS.search(data):
             self.left_out.add("the options of its textures, such as -s")
-            return OPTIONS.sub(rb"\1\2", data)  # trimesh takes them for a part of the name
+            return OPTIONS.sub(rb"\1", data)  # trimesh takes them for a part of the name
         return data
 
     def _inside(self, name: str) -> Path | None:

@@ -16,7 +16,8 @@ from materialist.types import Array, Materials, Photo, Prediction
 GUESSES = (
     (("normal", "depth"), "geometry is a guess (ground plane, back wall, upright objects)"),
     (("albedo",), "albedo is a colour Retinex estimate"),
-    (("roughness", "metallic"), "roughness and metallic are neutral"),
+    (("roughness",), "roughness is neutral"),
+    (("metallic",), "metallic is neutral"),
 )
 """Maps -> what is true of them."""
 
