@@ -56,6 +56,18 @@ def test_matte_finds_the_share_of_mixed_pixels():
     assert (alpha[:, :20] == 1).all() and (alpha[:, 44:] == 0).all()
 
 
+def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
+    """And where what is behind is even, what cannot be of it belongs to the pattern: two native pixels here."""
+    rows, columns = np.mgrid[:80, :80]
+    dark = (rows // 5 + columns // 5) % 2 == 1
+    large = np.where(dark & (columns < 46), 0.1, 0.7)[..., None] * np.ones(3, np.float32)
+    mask = np.zeros((20, 20), bool)
+    mask[:, :11] = True  # up to native column 44
+    alpha = matte(mask, large.astype(np.float32))
+    assert (alpha[:, :42] > 0.99).all() and (alpha[:, 46:] < 0.5).all()
+    assert (alpha[:, 40:46][dark[:, 40:46]] > 0.95).all()
+
+
 def test_without_a_colour_edge_the_mask_decides():
     mask = np.zeros((15, 15), bool)
     mask[:, :8] = True

@@ -13,6 +13,11 @@ STRIP = 256
 """Native rows handled at a time: bounds the memory."""
 _RANGE = 0.06
 """Standard deviation of the colour weight, sRGB-encoded values: about a just visible step in a picture."""
+GRAIN = 0.03
+"""Standard deviation of the colour of an even surface, sRGB-encoded values, channels added."""
+PATTERN = (0.2, 0.5)
+"""Standard deviation of the colour of one side, in units of the distance between the two: none from the first is a
+pattern, and from the second on nothing else."""
 _RADIUS = 0.8
 """Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
 
@@ -72,8 +77,9 @@ def matte(mask: Array, large: Array) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
     Within about two working pixels of the mask's border a native pixel lies somewhere between the colour of what is
-    well inside and well outside nearby; its place on the line between them is its share. Where both look the same,
-    the enlarged mask decides. Exactly 0 and 1 further away.
+    well inside and well outside nearby; its place on the line between them is its share. Where both look the same the
+    enlarged mask decides, and where one has a pattern, whether the pixel can be of the other. Exactly 0 and 1 further
+    away.
     """
     import cv2
 
@@ -87,27 +93,39 @@ def matte(mask: Array, large: Array) -> Array:
     inner, outer = cv2.erode(soft, kernel), cv2.dilate(soft, kernel)
     sure_in, sure_out = (inner >= 0.999), (outer <= 0.001)
     encoded = linear_to_srgb(large)
-    front, known_front = _mean_of(encoded, sure_in, 2.5 * scale)
-    back, known_back = _mean_of(encoded, sure_out, 2.5 * scale)
+    front, front_spread, known_front = _mean_of(encoded, sure_in, 2.5 * scale)
+    back, back_spread, known_back = _mean_of(encoded, sure_out, 2.5 * scale)
     line = front - back
     length = (line**2).sum(-1)
     share = np.clip(((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6), 0, 1)
     # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
-    trust = np.clip(length / 0.1**2, 0, 1) * known_front * known_back
-    alpha = soft + trust * (share - soft)
+    spread = np.sqrt(np.maximum(front_spread, back_spread) / np.maximum(length, 1e-6))
+    plain = np.clip((PATTERN[1] - spread) / (PATTERN[1] - PATTERN[0]), 0, 1)
+    trust = np.clip(length / 0.1**2, 0, 1) * plain * known_front * known_back
+    no_back, no_front = (_unlike(encoded, *side) for side in ((back, back_spread), (front, front_spread)))
+    guess = soft + (1 - soft) * no_back * (1 - no_front) - soft * no_front * (1 - no_back)
+    alpha = guess + trust * (share - guess)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)
 
 
-def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array]:
-    """[H0, W0, 3] Gaussian mean of the members nearby, and [H0, W0] whether there are any."""
+def _unlike(picture: Array, mean: Array, variance: Array) -> Array:
+    """[H0, W0] how certainly pixels are none of a side: from 2 to 4 standard deviations away, grain included."""
+    away = np.sqrt(((picture - mean) ** 2).sum(-1) / (variance + GRAIN**2))
+    return np.clip(away / 2 - 1, 0, 1)
+
+
+def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
+    """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
     import cv2
 
     weight = members.astype(np.float32)
     size = 2 * int(np.ceil(3 * sigma)) + 1
     blur = lambda v: cv2.GaussianBlur(v, (size, size), sigma)  # noqa: E731
-    total, norm = blur(picture * weight[..., None]), blur(weight)
-    return total / np.maximum(norm, 1e-12)[..., None], norm > 1e-5
+    norm = np.maximum(blur(weight), 1e-12)
+    mean = blur(picture * weight[..., None]) / norm[..., None]
+    square = blur((picture**2).sum(-1) * weight) / norm
+    return mean, np.maximum(square - (mean**2).sum(-1), 0), norm > 1e-5
 
 
 def _blurred(layer: Array, members: Array) -> Array:
