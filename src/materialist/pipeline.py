@@ -14,7 +14,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.photo import HDR_CLIP, exposed, exposure
+from materialist.io.photo import HDR_CLIP
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
@@ -166,11 +166,9 @@ def _report(
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
         for name in ("albedo", "roughness", "metallic")
     }
-    light = np.float32(exposure(picture))  # an HDR photo is looked at as it would be shown
-    again, shown = light * rerender, light * picture.linear
-    residual = np.abs(linear_to_srgb(again) - linear_to_srgb(shown)).max(-1)
-    white = 0.999 * HDR_CLIP if picture.hdr else 0.99
-    clipped = float((shown >= white).any(-1).mean())
+    residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
+    white = HDR_CLIP if picture.hdr else 0.99
+    clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings, *told]
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
@@ -183,8 +181,8 @@ def _report(
     return FitReport(
         stages=stages,
         metrics={
-            "rerender_psnr_path": metrics.psnr(again, shown),
-            "rerender_ssim_path": metrics.ssim(again, shown),
+            "rerender_psnr_path": metrics.psnr(rerender, picture.linear),
+            "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
             **distance,
             "clipped_fraction": clipped,
             "poor_fraction": poor,
@@ -226,7 +224,7 @@ def _seen_by(source, picture: Photo) -> Photo:
 
 
 def _predict(picture: Photo, source, seed: int) -> Prediction:
-    prediction = source.predict(exposed(picture), seed=seed)
+    prediction = source.predict(picture, seed=seed)
     if not (prediction.depth > 0).any():
         raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
     middle = float(np.median(prediction.depth[prediction.depth > 0]))

@@ -34,10 +34,10 @@ class Photo:
     """A photograph at working size, with its untouched original beside it."""
 
     linear: Array
-    """[H, W, 3] float32 linear Rec.709 at working size, >= 0; see `io.photo.read_photo` for HDR."""
+    """[H, W, 3] float32 linear Rec.709 at working size, >= 0; HDR input clipped to [0, 10]."""
     camera: Camera
     original: Array
-    """[H0, W0, 3] float32 linear at native size (after EXIF rotation)."""
+    """[H0, W0, 3] float32 linear at native size (after EXIF rotation), times 2**stops."""
     hdr: bool = False
     """True when the file holds scene-linear values of any unit (EXR, HDR, float TIFF), not clipped at 1."""
     fov_source: str = "default"
@@ -48,6 +48,8 @@ class Photo:
     warnings: tuple[str, ...] = ()
     deep: bool = False
     """True when it comes from a display file of more than 8 bits a channel that is not in `source` any more."""
+    stops: int = 0
+    """Exposure of `linear` and `original` over the values of an HDR file, see `io.photo.read_photo`."""
 
 
 @dataclass(frozen=True)

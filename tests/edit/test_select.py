@@ -56,15 +56,6 @@ def test_one_click_finds_the_whole_object(table, click):
     assert overlap(select(scene, click=click), first) > 0.9
 
 
-def test_the_unit_of_an_hdr_photo_does_not_matter(table):
-    scene, first, _ = table
-    for unit in (0.01, 300):
-        linear = np.float32(unit) * scene.photo.linear
-        photo = replace(scene.photo, linear=linear, original=linear, hdr=True)
-        for way in ({"click": (50, 50)}, {"box": (24, 24, 116, 96)}):
-            assert overlap(select(replace(scene, photo=photo), **way), first) > 0.9
-
-
 def test_several_clicks_and_the_other_object(table):
     scene, first, second = table
     assert overlap(select(scene, click=(130, 85)), second) > 0.85

@@ -44,7 +44,7 @@ def job(
     monkeypatch.setattr(Job, "begin", begin)
     monkeypatch.setattr(Job, "finish", finish)
     monkeypatch.setattr(attempt, "find_ends", lambda *_, **__: found)
-    settings = SimpleNamespace(trust=0.08, exposed=True)
+    settings = SimpleNamespace(trust=0.08)
     rest = (None, settings, "transport", 16, 6.0, None, "default", 0, "cpu", 4, None, lambda *_: None)
     return Job(SimpleNamespace(linear=PHOTO, hdr=False, camera=Camera(8, 8, 40.0)), *rest), finished
 

@@ -92,5 +92,4 @@ def test_hdr_photos_are_compared_as_log_in_the_paper_and_as_seen_in_ours(name, e
     settings = preset(name, hdr=True)
     assert settings.light.encoding == settings.materials.encoding == encoding
     assert not settings.light.clipped and not settings.materials.clipped
-    assert settings.exposed == (name == "default")
     assert preset(name) == {"paper": PAPER, "default": DEFAULT}[name]

@@ -22,7 +22,6 @@ from materialist.batch.packages import file_hash, package_hash, whole_size
 from materialist.batch.remote import is_url, local_copy
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
-from materialist.io.photo import exposure
 from materialist.types import Array, Scene
 
 Tick = Callable[[str, int, int], None]
@@ -58,8 +57,7 @@ def process(job: Job, tick: Tick) -> dict[str, Any]:
         warnings += notes
         facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(job.picture)}
         facts["edits"] = edits_key(job.edits, job.name, job.spp)
-    light = np.float32(exposure(scene.photo))
-    _write_strip(thumbnail_path(job.runs, job.name), [light * picture for picture in strip])
+    _write_strip(thumbnail_path(job.runs, job.name), strip)
     metrics = scene.report.metrics
     facts |= {
         "scene_hash": package_hash(job.scene), "scene_bytes": whole_size(job.scene),

@@ -28,7 +28,8 @@ def render(
     force: Force = False,
 ) -> None:
     """Path-trace a scene package."""
-    from materialist.io.image import ensure_image_writable, write_image
+    from materialist.edit.output import write_composite
+    from materialist.io.image import ensure_image_writable
     from materialist.io.package import load_scene
 
     if not 1 <= spp <= 1_000_000:
@@ -41,5 +42,5 @@ def render(
 
     with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
         image = pipeline.render_scene(loaded, spp=spp, denoise=denoise, seed=seed, device=device.value)
-    write_image(output, image, force=force)
+    write_composite(output, image, loaded.photo, force=force)
     report_success("render", as_json, [f"Look at {output}"], image=str(output), spp=spp)

@@ -18,7 +18,6 @@ from materialist.edit.seamless import seamless
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
-from materialist.io.photo import exposed
 from materialist.types import Array, Camera, Materials, Photo, Scene
 
 Inpaint = Callable[[Array, Array], Array]
@@ -53,7 +52,7 @@ def without(
     label = scene.geometry.plane_label.astype(np.int64)
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
-    features = looks(scene.materials.albedo, exposed(scene.photo).linear)
+    features = looks(scene.materials.albedo, scene.photo.linear)
     plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed)
     shown = _denoised(scene)
     picture = _given(scene, background, inpaint, hole)

@@ -13,13 +13,12 @@ from materialist.edit.portrait import Portrait
 from materialist.edit.revealed import revealed
 from materialist.edit.upsample import GuidedUpsample, matte, strips
 from materialist.errors import InputError
-from materialist.io.photo import exposed, exposure
 from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array, tuple[int, int]], Array]
 """upscale(picture [H, W, 3] linear, (H0, W0)) -> [H0, W0, 3] linear."""
 FLOOR = 0.02
-"""Radiance added to both sides of edited / base, 1 an ordinary photo's white: below it a ratio says nothing."""
+"""Radiance added to both sides of edited / base: below it a ratio says nothing."""
 RIM = 4.0
 """Working pixels under the outline of a new body to which the change beside it goes on: what enlarging looks up."""
 MOST = 1.0
@@ -127,9 +126,8 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
         return _in_front(out, layers.portrait, photo.hdr)
     stack = np.concatenate((_other_light if layers.relit else _same_light)(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
-    seen = exposed(photo)
-    upsample = GuidedUpsample(seen.linear, seen.original)
-    alpha = matte(layers.changed, seen.original)
+    upsample = GuidedUpsample(photo.linear, photo.original)
+    alpha = matte(layers.changed, photo.original)
     changed, clear = layers.changed, np.ones_like(layers.changed)
     if layers.portrait is not None:
         clear = layers.portrait.inside == 0
@@ -178,8 +176,7 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     What the photo has and the fit has not is mostly texture that the albedo lacks: it dims as the surface does,
     factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
     """
-    floor = np.float32(FLOOR / exposure(photo))
-    factor = np.minimum((layers.edited + floor) / (layers.base + floor), MOST)
+    factor = np.minimum((layers.edited + FLOOR) / (layers.base + FLOOR), MOST)
     return layers.edited - layers.base, factor - 1, layers.base
 
 
@@ -193,8 +190,7 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """
     import cv2
 
-    floor = np.float32(FLOOR / exposure(photo))
-    ratio = np.log((layers.edited + floor) / (layers.base + floor))
+    ratio = np.log((layers.edited + FLOOR) / (layers.base + FLOOR))
     overall = np.median(ratio.reshape(-1, 3), axis=0)
     window = max(3, max(ratio.shape[:2]) // 8)
     away = cv2.blur(np.abs(ratio - overall), (window, window), borderType=cv2.BORDER_REFLECT)
@@ -224,8 +220,7 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
         scene.photo, linear=linear.astype(np.float32), original=picture, source=None, deep=is_deep(scene.photo)
     )
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
-    light = np.float32(exposure(photo))
-    figures = {f"rerender_{kind}_path": metric(light * again, light * photo.linear) for kind, metric in kinds.items()}
+    figures = {f"rerender_{kind}_path": metric(again, photo.linear) for kind, metric in kinds.items()}
     stage = {"name": "edit", "edits": edited.provenance.get("edits", []), "bodies": len(edited.bodies)}
     old = edited.report
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})

@@ -9,7 +9,6 @@ import numpy as np
 from materialist.edit.material import warned
 from materialist.edit.mesh_material import constant
 from materialist.errors import InputError
-from materialist.io.photo import exposure
 from materialist.render.scene import part
 from materialist.types import Array, Body, Scene
 
@@ -40,7 +39,7 @@ def visible_lights(scene: Scene) -> list[Array]:
     photo, surface = scene.photo, scene.depth > 0
     least = CLIPPED
     if photo.hdr and surface.any():
-        least = max(CLIPPED / exposure(photo), BRIGHTER * float(np.median(photo.linear[surface].mean(-1))))
+        least = max(CLIPPED, BRIGHTER * float(np.median(photo.linear[surface].mean(-1))))
     bright = (photo.linear.min(-1) >= least) & surface
     label, count = ndimage.label(bright)
     masks = [label == k for k in range(1, count + 1)]
@@ -114,12 +113,12 @@ def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tupl
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), 1e-6, np.float32))
     by_lights = target.render_path(spp=SPP, seed=seed)  # [H, W, 3] of lights of radiance 1 alone
-    photo, white = scene.photo.linear, 1 / exposure(scene.photo)
-    seen = (scene.depth > 0) & ~np.any(masks, 0) & (photo.max(-1) < CLIPPED * white)
+    photo = scene.photo.linear
+    seen = (scene.depth > 0) & ~np.any(masks, 0) & (photo.max(-1) < CLIPPED)
     if not seen.any():
         return 1.0, 1.0
     wanted, base, lit = (v[seen].astype(np.float64) for v in (photo, scene.rerender, by_lights))
-    weight = 1 / (wanted.mean(-1, keepdims=True) + 0.05 * white)  # errors count relative to the brightness
+    weight = 1 / (wanted.mean(-1, keepdims=True) + 0.05)  # errors count relative to the brightness
 
     def fitted(radiance: float) -> tuple[float, float]:
         rest = wanted - radiance * lit

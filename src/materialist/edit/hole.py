@@ -9,7 +9,6 @@ import numpy as np
 from materialist.edit.cast import cast
 from materialist.edit.region import checked_region
 from materialist.errors import InputError
-from materialist.io.photo import exposed
 from materialist.types import Array, Scene
 
 GROW = 0.006
@@ -55,7 +54,7 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | 
         )
     plane, upward = scene.geometry.plane_label, scene.normal[..., 1] > UPWARD
     if shadow is None:
-        painted = gone | cast(exposed(scene.photo).linear, plane, upward, own, gone)
+        painted = gone | cast(scene.photo.linear, plane, upward, own, gone)
     else:
         painted = gone | ((plane >= 0) & upward & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
     return Hole(own, gone, painted)

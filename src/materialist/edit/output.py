@@ -17,10 +17,12 @@ from materialist.types import Array, Photo
 def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> None:
     """Write linear [H, W, 3] to PATH.exr (float32, HDR kept) or PATH.png, with 16 bits if the photo had more than 8.
 
-    A pixel that is the photo's gets the photo's own 8 or 16 bits back. Whole or not at all. Raises OutputError or
-    InputError as `write_image`.
+    A pixel that is the photo's gets the photo's own 8 or 16 bits back, or, as EXR, the value that an HDR file has.
+    Whole or not at all. Raises OutputError or InputError as `write_image`.
     """
     path = Path(path)
+    if path.suffix.lower() == ".exr" and photo.stops:
+        picture = picture * np.float32(2.0**-photo.stops)
     if path.suffix.lower() == ".exr" or not is_deep(photo):
         write_image(path, picture, force=force)
         return

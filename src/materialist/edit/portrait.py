@@ -9,7 +9,6 @@ import numpy as np
 
 from materialist.edit import glass, glows
 from materialist.edit.mesh_material import constant
-from materialist.io.photo import exposed
 from materialist.types import Array, Body, Scene
 
 MOST = 1_500_000
@@ -164,7 +163,7 @@ def _behind_things(
     whole[rows, columns] = spread(alone.depth)
     depth = cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
     thing = (scene.depth > 0) & (scene.depth < depth - contact * size)
-    cut = alone.share * (1 - matte(thing, exposed(scene.photo).original)[rows, columns])
+    cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
     return np.where(near, cut, sight.share).astype(np.float32)
 
 

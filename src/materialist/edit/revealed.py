@@ -12,11 +12,10 @@ import numpy as np
 
 from materialist.edit.layers import Layers, denoised
 from materialist.geometry.membrane import membrane
-from materialist.io.photo import exposure
 from materialist.types import Array, Photo, Scene
 
 LEAST = 0.02
-"""Added to radiance before its change is taken as a factor; 1 is an ordinary photo's white."""
+"""Added to radiance before its change is taken as a factor."""
 MOST = 0.4
 """Logarithm of the largest change of light that is carried on."""
 
@@ -37,8 +36,7 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     bare = _bare(studio, edited, layers, spp, seed, clean)
     if not _given(edited):
-        least = LEAST / exposure(scene.photo)
-        factor = np.log((np.maximum(bare, 0) + least) / (np.maximum(layers.base, 0) + least))
+        factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
         change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
         bare = np.maximum(bare - change, 0)  # filled places may be far brighter than what is rendered there
     base = np.where(filled[..., None], bare, layers.base)

@@ -9,7 +9,6 @@ import numpy as np
 
 from materialist.edit.region import HIDDEN, PLACED, checked_pixel, checked_region, placed
 from materialist.errors import InputError
-from materialist.io.photo import exposed
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
@@ -51,7 +50,7 @@ def select(
     if method == "sam2":
         from materialist.edit.sam import segment
 
-        found = segment(exposed(scene.photo).linear, points, frame, device=device)
+        found = segment(scene.photo.linear, points, frame, device=device)
     elif frame is not None:
         found = from_box(scene, frame)
     elif method == "network":
@@ -69,7 +68,7 @@ def likely(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     from materialist.color import linear_to_srgb
     from materialist.predict.clicks.segment import Photo, object_at
 
-    return object_at(Photo(linear_to_srgb(exposed(scene.photo).linear), scene.normal, scene.depth), points)
+    return object_at(Photo(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth), points)
 
 
 def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | None = None) -> Array:
@@ -120,7 +119,7 @@ def _smaller(scene: Scene) -> tuple[Features, float]:
     normal = shrink(scene.normal, cv2.INTER_AREA)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     depth = shrink(scene.depth, cv2.INTER_NEAREST)
-    return Features(shrink(exposed(scene.photo).linear, cv2.INTER_AREA), depth, normal), scale
+    return Features(shrink(scene.photo.linear, cv2.INTER_AREA), depth, normal), scale
 
 
 def _larger(mask: Array, scene: Scene) -> Array:

@@ -12,7 +12,6 @@ from materialist.errors import InputError
 from materialist.geometry.front import smooth_front
 from materialist.geometry.lathe import Lathed
 from materialist.geometry.symmetry import object_size, surface_in, symmetric_thickness
-from materialist.io.photo import exposed
 from materialist.types import Array, Scene
 
 METHODS = ("auto", "half-turn", "network", "symmetry")
@@ -72,7 +71,7 @@ def object_thickness(
 def _by_network(scene: Scene, inside: Array, size: float) -> ObjectThickness:
     from materialist.predict.refraction import thickness
 
-    found = thickness(exposed(scene.photo).linear, inside, scene.normal, scene.depth, scene.camera)
+    found = thickness(scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
     return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network", found.back)
 
 
@@ -81,8 +80,9 @@ def _chosen(scene: Scene, inside: Array, size: float, method: str, behind: Array
     from materialist.predict.refraction.choice import best_thickness
 
     up = upright(scene.depth, scene.normal, np.where(inside, -1, scene.geometry.plane_label), scene.camera)
-    photo = exposed(scene.photo).linear
-    choice = best_thickness(photo, inside, scene.normal, scene.depth, scene.camera, up=up, behind=behind, prefer=method)
+    choice = best_thickness(
+        scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, behind=behind, prefer=method,
+    )  # fmt: skip
     solid = choice.thickness.solid
     if choice.method == "symmetry":
         solid = _mirrored(scene, inside)

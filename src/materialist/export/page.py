@@ -19,7 +19,6 @@ from materialist.export import pictures
 from materialist.export.parts import Part
 from materialist.export.textures import jpeg
 from materialist.io.display import to_bytes
-from materialist.io.photo import exposure
 from materialist.types import Array, Camera, Scene
 
 _VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)])
@@ -46,15 +45,15 @@ def write_page(path: Path, scene: Scene, parts: list[Part]) -> None:
 def page(scene: Scene, parts: list[Part]) -> str:
     """The page as text; everything that came from outside is escaped, and a policy in it forbids any request."""
     assets = files("materialist.export") / "assets"
-    camera, title, light = scene.camera, _title(scene), np.float32(exposure(scene.photo))
+    camera, title = scene.camera, _title(scene)
     values = {
         "title": html.escape(title),
         "subtitle": html.escape(_subtitle(scene)),
         "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in _warnings(scene)),
         "width": str(camera.width),
         "height": str(camera.height),
-        "photo": _image(to_bytes(linear_to_srgb(light * scene.photo.linear)), quality=94),
-        "rerender": _image(to_bytes(linear_to_srgb(light * scene.rerender)), quality=94),
+        "photo": _image(to_bytes(linear_to_srgb(scene.photo.linear)), quality=94),
+        "rerender": _image(to_bytes(linear_to_srgb(scene.rerender)), quality=94),
         "triangles": f"{sum(len(part.mesh.faces) for part in parts):,}",
         "maps": _maps(scene),
         "envmap": _image(pictures.light(scene.envmap)),
@@ -89,7 +88,7 @@ def _warnings(scene: Scene) -> list[str]:
 
 
 def _maps(scene: Scene) -> str:
-    m, light = scene.materials, np.float32(exposure(scene.photo))
+    m = scene.materials
     figures = (
         ("albedo", "Albedo", to_bytes(linear_to_srgb(m.albedo))),
         ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", pictures.grey(m.roughness)),
@@ -99,7 +98,7 @@ def _maps(scene: Scene) -> str:
         (
             "error",
             f"Error of the re-rendering × {pictures.ERROR_GAIN}",
-            pictures.error(light * scene.photo.linear, light * scene.rerender),
+            pictures.error(scene.photo.linear, scene.rerender),
         ),
     )
     return "".join(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from materialist.fit.inverse import WHITE, Fit
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
 from materialist.geometry.ends import Ends
-from materialist.io.photo import HDR_CLIP, exposed, exposure
+from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
@@ -119,7 +119,7 @@ class Job:
         stages: list[dict] = []
         self._tick("walls")
         camera, settings = self.picture.camera, self.settings
-        search = partial(find_ends, self._seen.linear, self.prior, camera, settings, tau=self.tau, seed=self.seed)
+        search = partial(find_ends, self.picture.linear, self.prior, camera, settings, tau=self.tau, seed=self.seed)
         found = timed(stages, "walls", search)
         begun = self.begin(FULL, found.ends if found else ())
         begun.stages[:0] = stages
@@ -140,7 +140,7 @@ class Job:
         judge = _judge(renderer)
         engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
         fit = Fit(
-            self._seen, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
+            self.picture, self.prior.materials, engine, self.settings, envmap_height=self.envmap_height, judge=judge,
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
             white=HDR_CLIP if self.picture.hdr else WHITE,
         )  # fmt: skip
@@ -159,7 +159,7 @@ class Job:
             timed(stages, "trace", fit.engine.cache.trace)
         state = fit.run()
         materials = fit.materials(state)
-        envmap = state.envmap / np.float32(self._exposure)
+        envmap = state.envmap
         self.found("light", envmap)
         self.found("materials", materials)
         self._tick("rerender")
@@ -167,21 +167,8 @@ class Job:
         rerender = timed(stages, "rerender", lambda: begun.judge(materials, envmap, self.spp, self.seed + 1))
         return Attempt(begun.completion, begun.ends, begun.geometry, materials, envmap, rerender, tuple(stages))
 
-    @cached_property
-    def _exposure(self) -> float:
-        """Factor on the photo's radiance, and on the light, under which they are fitted."""
-        return exposure(self.picture) if self.settings.exposed else 1.0
-
-    @cached_property
-    def _seen(self) -> Photo:
-        if self.settings.exposed:
-            return exposed(self.picture)
-        limit = np.float32(HDR_CLIP)  # the paper's, in the unit of the file
-        return replace(self.picture, linear=np.minimum(self.picture.linear, limit))
-
     def _psnr(self, attempt: Attempt) -> float:
-        factor = exposure(self.picture)
-        return metrics.psnr(factor * attempt.rerender, factor * self.picture.linear)
+        return metrics.psnr(attempt.rerender, self.picture.linear)
 
     def _tick(self, stage: str) -> None:
         if self.progress is not None:
@@ -193,7 +180,7 @@ class Job:
             surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
             return PathEngine(renderer, camera, surface, envmap_height=self.envmap_height, seed=self.seed)
         return TransportEngine(
-            geometry, camera, self._seen.linear, seed=self.seed, light_height=self.settings.light_grid,
+            geometry, camera, self.picture.linear, seed=self.seed, light_height=self.settings.light_grid,
             progress=self.progress,
         )  # fmt: skip
 

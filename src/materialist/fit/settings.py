@@ -84,8 +84,6 @@ class FitSettings:
     below it, leaving the prior grows dearer with the third power. None: no such scaling."""
     light_grid: int = 32
     """Rows of the envmap that the transport engine's light matrix resolves."""
-    exposed: bool = False
-    """Whether an HDR photo is brought to the exposure of an ordinary one first (`io.photo.exposure`)."""
 
 
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
@@ -133,7 +131,6 @@ DEFAULT = FitSettings(
     correction_spp=4,
     trust=0.08,
     light_grid=16,
-    exposed=True,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 
@@ -151,7 +148,7 @@ def preset(name: str, *, hdr: bool = False) -> FitSettings:
     settings = PRESETS[name]
     if not hdr:
         return settings
-    encoding = settings.light.encoding if settings.exposed else "log1p"
+    encoding: Encoding = "log1p" if settings is PAPER else settings.light.encoding
     return replace(
         settings,
         light=replace(settings.light, encoding=encoding, clipped=False),

@@ -11,7 +11,6 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.io import display
-from materialist.io.photo import exposure
 from materialist.io.relief import relief
 from materialist.metrics import psnr
 from materialist.types import Array, Scene
@@ -63,16 +62,16 @@ def overview(scene: Scene) -> Array:
 def _rows(scene: Scene) -> list[list[_Tile]]:
     """Tiles by row; each row is stretched to the full width, so any photo shape fills the sheet."""
     aspect = float(np.clip(scene.camera.width / scene.camera.height, 0.4, 4))
-    light = np.float32(exposure(scene.photo))
-    photo, again = linear_to_srgb(light * scene.photo.linear), linear_to_srgb(light * scene.rerender)
+    stops = scene.photo.stops
+    photo, again = linear_to_srgb(scene.photo.linear), linear_to_srgb(scene.rerender)
     materials = scene.materials
-    quality = scene.report.metrics.get("rerender_psnr_path", psnr(light * scene.photo.linear, light * scene.rerender))
+    quality = scene.report.metrics.get("rerender_psnr_path", psnr(scene.photo.linear, scene.rerender))
 
     def tile(title: str, note: str, pixels: Array, shape: float = aspect) -> _Tile:
         return _Tile(title, note, pixels, shape)
 
     pictures = [
-        tile("Photo", "as given" if light == 1 else f"exposed x {light:.3g}", display.to_bytes(photo)),
+        tile("Photo", "as given" if not stops else f"exposed by {stops:+d} stops", display.to_bytes(photo)),
         tile("Re-rendering", f"path traced, {quality:.1f} dB", display.to_bytes(again)),
         tile(
             "Error",

@@ -120,6 +120,7 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "fov_source": photo.fov_source,
             "path": photo.path,
             "deep": photo.deep,
+            "stops": photo.stops,
             "warnings": list(photo.warnings),
         },
         "prior": {
@@ -160,7 +161,12 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     """The Photo; its native pixels are decoded again from the original file."""
     file = folder / Path(meta["original"]).name
     try:
-        original = decode_photo(file).linear if meta["has_source"] else read_exr(file)
+        stops = int(meta.get("stops", 0))
+        if meta["has_source"]:
+            original = decode_photo(file).linear
+            original = original * np.float32(2.0**stops) if stops else original
+        else:
+            original = read_exr(file)
         source = file.read_bytes() if meta["has_source"] else None
     except (MaterialistError, OSError) as error:
         raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
@@ -174,6 +180,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
         source,
         tuple(meta["warnings"]),
         bool(meta.get("deep", False)),
+        stops,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,11 @@ from materialist.types import Array, Camera, Photo
 DEFAULT_FOV = 35.0
 """Horizontal field of view, degrees, when nothing better is known (the paper's)."""
 HDR_CLIP = 10.0
-"""Upper bound of HDR input (paper, appendix "Handling HDR Images"); here of its pixels at `exposure`."""
+"""Upper bound of HDR input (paper, appendix "Handling HDR Images"), in units of an ordinary photo's white."""
 BLACK = 1e-3
 """Share of the brightest value up to which an HDR photo's pixel is black, and says nothing of its exposure."""
 BRIGHT = 0.9
-"""Where `exposure` puts the 97th percentile of an HDR photo's brightest channel."""
+"""Where the 97th percentile of an HDR photo's brightest channel belongs."""
 MIDDLE = 0.05
 """The median, where that would leave it darker: a bright window must not make the room black."""
 
@@ -30,9 +29,9 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     """Read PATH (or `example:NAME`) as a Photo whose longer side is `size` pixels, or fewer where the file has fewer.
 
     `fov` is the horizontal field of view in degrees, in (1, 170); None or "auto" takes it from EXIF, else 35.
-    Display files (PNG, JPEG, ...) give values in [0, 1]. Scene-linear ones (EXR, HDR, float TIFF) keep their unit and
-    are clipped at 10 times the white of an ordinary photo of them, see `exposure` (paper, appendix "Handling HDR
-    Images", whose unit that white is). Shrinking is an area average in linear light.
+    Display files (PNG, JPEG, ...) give values in [0, 1]. Scene-linear ones (EXR, HDR, float TIFF), of any unit, are
+    exposed as an ordinary photo is, by whole stops, so that no digit is lost (`Photo.stops`); at working size they are
+    clipped to [0, 10] (paper, appendix "Handling HDR Images"). Shrinking is an area average in linear light.
 
     Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
@@ -48,46 +47,31 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     linear = _working(original, size)
     warnings = [*decoded.warnings, *_remarks(width, height)]
     hdr = decoded.scene_linear and float(original.max()) != 1  # a picture that ends at 1 has been clipped there
-    if hdr and np.any(linear > (limit := _limit(linear))):
-        warnings.append(f"HDR values above {limit:.3g} are clipped at working size.")
-        linear = np.minimum(linear, limit)
+    stops = _stops(linear) if hdr else 0
+    if stops:
+        original, linear = (picture * np.float32(2.0**stops) for picture in (original, linear))
+        warnings.append(f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit.")
     _require_content(linear, name)
+    if hdr and float(linear.max()) > HDR_CLIP:
+        warnings.append(f"HDR values above {HDR_CLIP * 2.0**-stops:.3g} are clipped at working size.")
+        linear = np.minimum(linear, np.float32(HDR_CLIP))
     from_exif = horizontal_fov(decoded.tags, width, height)
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
-    return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings))
+    return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings), stops=stops)
 
 
-def exposure(photo: Photo) -> float:
-    """Factor on an HDR photo's radiance that brings it to the exposure of an ordinary photograph; 1 for the others.
+def _stops(linear: Array) -> int:
+    """Whole stops that bring an HDR picture [H, W, 3] to about the exposure of an ordinary photograph.
 
-    The 97th percentile of what is not black beside the brightest pixel comes to BRIGHT, or its median to MIDDLE where
-    that asks for more.
+    The 97th percentile of what is not black comes near BRIGHT, or the median near MIDDLE where that asks for more.
     """
-    return _exposure(photo.linear) if photo.hdr else 1.0
-
-
-def exposed(photo: Photo) -> Photo:
-    """The photo at that exposure, the same one where it has it."""
-    factor = np.float32(exposure(photo))
-    return photo if factor == 1 else replace(photo, linear=photo.linear * factor, original=photo.original * factor)
-
-
-def _exposure(linear: Array) -> float:
     value = linear.max(-1)
+    value = np.minimum(value, HDR_CLIP * float(np.percentile(value, 99)) or value.max())  # suns set no scale
     bright, middle = np.percentile(value[value >= BLACK * value.max()], (97, 50))
-    return float(max(BRIGHT / max(bright, 1e-12), MIDDLE / max(middle, 1e-12)))
-
-
-def _limit(linear: Array) -> np.float32:
-    """Where pixels [H, W, 3] are clipped: at HDR_CLIP of the exposure that they have once clipped there."""
-    value = linear.max(-1)
-    limit = HDR_CLIP * float(np.percentile(value, 99)) or float(value.max())  # one sun must not set the scale
-    for _ in range(8):
-        found, limit = limit, HDR_CLIP / _exposure(np.minimum(linear, np.float32(limit)))
-        if abs(found - limit) < 1e-6 * limit:
-            break
-    return np.float32(limit)
+    if bright <= 0:
+        return 0
+    return int(np.clip(np.round(np.log2(max(BRIGHT / bright, MIDDLE / middle))), -60, 60))
 
 
 def decode_photo(file: Path, over: float = 1.0) -> Decoded:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import json
 from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from materialist.edit.recipe import Step, apply
-from materialist.io.photo import exposure
 from materialist.studio import glass
 from materialist.studio.ghost import glazed, with_bodies, with_pane
 from materialist.types import Array, Scene
@@ -40,11 +38,6 @@ class Live:
         self._edited: OrderedDict[str, Scene] = OrderedDict()
         self._panes: OrderedDict[str, tuple[Array, glass.Tint]] = OrderedDict()
         self._preview: Future[Any] = _THREAD.submit(_build, scene)
-
-    @cached_property
-    def light(self) -> np.float32:
-        """Factor under which linear pictures of an HDR photo are shown, see `io.photo.exposure`."""
-        return np.float32(exposure(self.scene.photo))
 
     @property
     def ready(self) -> bool:

@@ -55,7 +55,7 @@ def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
     state = _asked(tracer, stack) if edits and tracer is not None else None
     linear, waiting = live.picture(steps, tracer), state is not None and state.waiting
     shown |= {"asked": state.asked if state else 0, "waiting": waiting}
-    return {**shown, "picture": views.jpeg_url(live.light * linear), "badge": _badge(steps, tracer, waiting)}
+    return {**shown, "picture": views.jpeg_url(linear), "badge": _badge(steps, tracer, waiting)}
 
 
 def picture(session: Session) -> Array:

@@ -85,13 +85,13 @@ def compared(session: Session) -> tuple[Array, Array]:
 
     live, steps = session.live, session.stack.active
     assert live is not None
-    before = _bytes(live.light * live.scene.photo.linear)
+    before = _bytes(live.scene.photo.linear)
     if session.final is not None and session.final.of(steps):
         after: Array = np.asarray(cv2.imread(str(session.final.path.with_suffix(".jpg"))))[..., ::-1]
-        native = _bytes(live.light * live.scene.photo.original)
+        native = _bytes(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)
-    return before, _bytes(live.light * picture(session))
+    return before, _bytes(picture(session))
 
 
 def _bytes(linear: Array) -> Array:

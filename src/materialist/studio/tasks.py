@@ -18,10 +18,10 @@ Progress = Any
 
 def do_photo(progress: Progress, photo: str, thumbnail: str) -> dict[str, Any]:
     """Read a photo: its size and field of view, and a small picture of it in the file `thumbnail`."""
-    from materialist.io.photo import exposed, read_photo
+    from materialist.io.photo import read_photo
 
     picture = read_photo(photo, size=512)
-    write_jpeg(Path(thumbnail), exposed(picture).linear)
+    write_jpeg(Path(thumbnail), picture.linear)
     height, width = picture.original.shape[:2]
     return {
         "width": width, "height": height, "fov": picture.camera.fov, "fov_source": picture.fov_source,
@@ -80,14 +80,13 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edit.composite import composite
     from materialist.edit.output import write_composite
-    from materialist.io.photo import exposure
 
     loaded, edited = _edited(progress, scene, edits)
     picture = composite(loaded, edited, spp=spp, seed=seed, progress=progress)
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
-    write_jpeg(out.with_suffix(".jpg"), np.float32(exposure(loaded.photo)) * picture, longest=2048)
+    write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
     notes = [note for note in edited.report.warnings if note not in loaded.report.warnings]
     return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.io.photo import exposure
 from materialist.types import Array, Scene
 
 _QUALITY = 88
@@ -49,8 +48,7 @@ def maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
     from materialist.export import pictures
 
-    materials, light = scene.materials, np.float32(exposure(scene.photo))
-    photo, again = light * scene.photo.linear, light * scene.rerender
+    materials = scene.materials
     bytes_of = lambda linear: np.round(linear_to_srgb(linear) * 255).astype(np.uint8)  # noqa: E731
     return [
         (bytes_of(materials.albedo), "Albedo: colour without light"),
@@ -59,8 +57,8 @@ def maps(scene: Scene) -> list[tuple[Array, str]]:
         (pictures.normals(scene.normal), "Normals: which way surfaces face"),
         (pictures.nearness(scene.depth), "Depth: near is bright"),
         (pictures.light(scene.envmap), "Light, all around; ahead is the middle"),
-        (bytes_of(again), "Re-rendering: the scene, path traced"),
-        (pictures.error(photo, again), "Residual: where it misses the photo (x 4)"),
+        (bytes_of(scene.rerender), "Re-rendering: the scene, path traced"),
+        (pictures.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
     ]
 
 

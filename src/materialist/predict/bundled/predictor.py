@@ -8,7 +8,6 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
-from materialist.io.photo import exposed
 from materialist.predict.bundled import WEIGHTS, weights
 from materialist.predict.bundled.inference import infer, rays_of
 from materialist.predict.device import on_gpu
@@ -52,7 +51,7 @@ class BundledPredictor:
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        found = infer(self.network, exposed(photo).linear, rays_of(photo.camera), device=self.device)
+        found = infer(self.network, photo.linear, rays_of(photo.camera), device=self.device)
         m = found.materials
         if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
