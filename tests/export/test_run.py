@@ -75,13 +75,13 @@ def test_command(package, tmp_path, capsys):
     arguments = ["export", str(package), "--to", "glb", "-o", str(target), "--json"]
     assert run_to_exit_code(app, arguments) == 0
     told = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.hdr")]
+    assert told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.light.hdr")]
     before = target.read_bytes()
     assert run_to_exit_code(app, arguments) == 2
     assert "give --force" in capsys.readouterr().err and target.read_bytes() == before
     assert run_to_exit_code(app, [*arguments, "--force", "--max-triangles", "1000"]) == 0
     assert len(target.read_bytes()) < len(before) / 3
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.hdr"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.light.hdr"]
 
 
 def test_command_with_bad_input(package, tmp_path, capsys):

@@ -55,6 +55,14 @@ def test_a_folder_is_replaced_only_where_it_is_an_export(tmp_path):
     (mine / "thesis.txt").touch()
     with pytest.raises(OutputError, match="is no export"), whole_folder(mine, force=True):
         pass
+    (target / "work").mkdir()
+    (target / "work" / "comp.nk").touch()
+    with (
+        pytest.raises(OutputError, match=r"holds work/comp\.nk, which no export wrote"),
+        whole_folder(target, force=True),
+    ):
+        pass
+    assert names(target) == [MARKER, "two", "work"]
     (tmp_path / "link").symlink_to(target)
     with pytest.raises(OutputError, match="is not a folder"), whole_folder(tmp_path / "link", force=True):
         pass

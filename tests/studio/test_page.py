@@ -42,6 +42,17 @@ def test_select_edit_undo(page, running):
     assert not page.errors
 
 
+def test_what_cannot_be_done_is_said_on_the_page(page, running):
+    opened(page, running[0])
+    page.get_by_role("button", name="Select nothing").click()
+    script = """() => { const r = document.querySelector('#hue input[type=range]');
+        r.value = 90; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
+    page.evaluate(script)
+    page.wait_for_selector("#message:visible >> text=Click the object")
+    page.locator("#message").click()
+    page.wait_for_selector("#message", state="hidden")
+
+
 def test_nothing_is_asked_of_anyone_else(page, running):
     opened(page, running[0])
     for name in ("Open", "Light", "Objects", "Take away", "Look"):

@@ -42,7 +42,7 @@ def export_blend(
     if path.suffix.lower() != ".blend":
         with whole_folder(path, force, format="blend") as folder:
             write_blender_assets(folder, scene, parts)
-        command = _command(["blender"], path / "build.py", path / "scene.blend", options)
+        command = _command(["blender"], path / "build.py", path.with_name(f"{path.name}.blend"), options)
         return Exported(path, (), (f"Make the .blend with: {shlex.join(command)}",))
     ensure_free(path, force, folder=False)
     program = _find_blender(blender)

@@ -117,7 +117,7 @@ def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.export.glb import write_glb, write_hdr
     from materialist.export.target import whole_files
 
-    light = path.with_suffix(".hdr")
+    light = path.with_suffix(".light.hdr")
     with whole_files([path, light], force) as (mesh_file, light_file):
         write_glb(mesh_file, scene, parts)
         write_hdr(light_file, scene.envmap)

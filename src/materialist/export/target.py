@@ -12,11 +12,14 @@ from pathlib import Path
 from materialist.errors import OutputError
 
 MARKER = "materialist-export.json"
-"""The file that makes a folder an export: nothing else is ever replaced."""
+"""The file that makes a folder an export: nothing else is ever replaced. It lists what was written."""
 
 
 def ensure_free(path: Path, force: bool, *, folder: bool) -> None:
-    """Raise OutputError unless PATH can be written: it is free, or `force` and of the kind it would be replaced by."""
+    """Raise OutputError unless PATH can be written: it is free, or `force` and of the kind it would be replaced by.
+
+    An export's folder is replaced only where it holds nothing but what was written there.
+    """
     try:
         if path.is_symlink() or path.exists():
             if not force:
@@ -26,6 +29,11 @@ def ensure_free(path: Path, force: bool, *, folder: bool) -> None:
                 raise OutputError(f"{path} is not {kind}, so --force will not replace it; give another name.")
             if folder and any(path.iterdir()) and not (path / MARKER).is_file():
                 raise OutputError(f"{path} is no export, so --force will not replace it; give another name.")
+            if folder and (own := _added(path)):
+                raise OutputError(
+                    f"{path} holds {own}, which no export wrote, so --force will not replace it; move that, or give "
+                    "another name."
+                )
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
         probe = _beside(path, "probe")
         probe.touch()
@@ -60,6 +68,7 @@ def whole_folder(path: Path, force: bool = False, **facts: object) -> Iterator[P
     try:
         temporary.mkdir()
         yield temporary
+        facts = {**facts, "files": _files(temporary)}
         (temporary / MARKER).write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
         if path.exists():
             os.rename(path, aside)
@@ -75,6 +84,20 @@ def whole_folder(path: Path, force: bool = False, **facts: object) -> Iterator[P
         shutil.rmtree(temporary, ignore_errors=True)
         if path.exists():  # else the old one is still aside, and is all there is
             shutil.rmtree(aside, ignore_errors=True)
+
+
+def _files(folder: Path) -> list[str]:
+    """Names of the files in and below a folder."""
+    return sorted(file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir())
+
+
+def _added(folder: Path) -> str:
+    """A file in an export's folder that it did not write, "" for none."""
+    try:
+        known = json.loads((folder / MARKER).read_text("utf-8"))["files"]
+    except (OSError, ValueError, KeyError, TypeError):
+        known = []
+    return next((name for name in _files(folder) if name not in known and name != MARKER), "")
 
 
 def _beside(path: Path, kind: str, suffix: str = "") -> Path:

@@ -8,6 +8,7 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.errors import InputError
 from materialist.studio import tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
 from materialist.studio.context import Context, steps
 from materialist.studio.follow import follow
@@ -126,7 +127,7 @@ def _wire(context: Context) -> None:
     def undo(request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
         if not session.undo():
-            gr.Info("There is nothing to take back.")
+            raise InputError("There is nothing to take back.")
         return context.everything(session)
 
     @guarded

@@ -88,12 +88,14 @@ def _badge(steps: tuple[Step, ...], tracer: glass.Tracer | None = None, waiting:
     if not steps:
         return "Photo"
     panes = [step for step in steps if glass.traced(step)]
+    sketched = "; objects are sketched" if any(s.kind not in LIVE and s not in panes for s in steps) else ""
     if waiting:
-        return "Glass: tracing …" if all(tracer and tracer.pane(step) for step in panes) else "Glass: sketch, tracing …"
+        known = all(tracer and tracer.pane(step) for step in panes)
+        return ("Glass: tracing …" if known else "Glass: sketch, tracing …") + sketched
     if panes and tracer and all(tracer.fresh(_others(steps, step), step) for step in panes):
-        return "Glass traced; shadow and caustics in the final picture"
+        return f"Glass traced; shadow and caustics in the final picture{sketched}"
     if panes and tracer and all(tracer.pane(step) for step in panes):
-        return "Live preview; click the glass in the list to trace it anew"
+        return f"Live preview; click the glass in the list to trace it anew{sketched}"
     if any(step.kind not in LIVE for step in steps):
         return "Sketch: path tracing shows the rest"
     if any("lamps" in step.options for step in steps):

@@ -1,1 +1,26 @@
-() => { document.body.classList.remove("dark"); document.documentElement.lang = "en"; }
+() => {
+  document.body.classList.remove("dark");
+  document.documentElement.lang = "en";
+  // Of an event that skips the queue Gradio shows no error.
+  const note = document.createElement("div");
+  note.id = "message";
+  note.setAttribute("role", "alert");
+  note.hidden = true;
+  note.onclick = () => { note.hidden = true; };
+  document.body.append(note);
+  let timer;
+  const say = (text) => {
+    // The server has made markup of a message harmless; here it is text again.
+    note.textContent = text.replaceAll("&lt;", "<").replaceAll("&gt;", ">").replaceAll("&amp;", "&");
+    note.hidden = false;
+    clearTimeout(timer);
+    timer = setTimeout(() => { note.hidden = true; }, 12000);
+  };
+  const ask = window.fetch.bind(window);
+  window.fetch = async (...request) => {
+    const answer = await ask(...request);
+    if (!answer.ok && answer.url.includes("/run/predict"))
+      answer.clone().json().then((body) => { if (typeof body.error === "string") say(body.error); }).catch(() => {});
+    return answer;
+  };
+}
