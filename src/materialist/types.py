@@ -23,6 +23,11 @@ class Camera:
     fov: float = 35.0
     """Horizontal field of view, degrees, in (0, 180)."""
 
+    def __post_init__(self) -> None:
+        """NumPy's numbers become Python's, as files and other programs need them."""
+        for name, kind in (("width", int), ("height", int), ("fov", float)):
+            object.__setattr__(self, name, kind(getattr(self, name)))
+
     @property
     def focal(self) -> float:
         """Focal length in pixels."""
@@ -116,6 +121,12 @@ class Lamp:
     """Radiant flux in R, G, B: radiance of the photo x scene units squared x steradian."""
     radius: float
     """Scene units, > 0."""
+
+    def __post_init__(self) -> None:
+        """NumPy's numbers become Python's, as files and other programs need them."""
+        for name in ("position", "power"):
+            object.__setattr__(self, name, tuple(float(v) for v in getattr(self, name)))
+        object.__setattr__(self, "radius", float(self.radius))
 
     @property
     def radiance(self) -> tuple[float, float, float]:

@@ -180,6 +180,23 @@ def test_frames_become_a_folder_or_a_video(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["turn", "turn.mp4"]
 
 
+def test_films_have_the_colours_that_players_take_them_for(tmp_path):
+    """Those of BT.709, which the file says as well."""
+    import subprocess
+
+    from materialist.color import srgb_to_linear
+
+    video = pytest.importorskip("imageio_ffmpeg", reason="needs the optional extra 'video'")
+    colour = np.array([39, 203, 63])
+    frame = np.broadcast_to(srgb_to_linear(colour / 255), (64, 64, 3)).astype(np.float32)
+    write_frames(tmp_path / "a.mp4", iter([frame, frame]))
+    options = ["-vf", "scale=in_color_matrix=bt709", "-f", "rawvideo", "-pix_fmt", "rgb24", "-frames:v", "1", "-"]
+    command = [video.get_ffmpeg_exe(), "-i", str(tmp_path / "a.mp4"), *options]
+    done = subprocess.run(command, capture_output=True, check=True)
+    pixel = np.frombuffer(done.stdout, np.uint8).reshape(64, 64, 3)[32, 32]
+    assert np.abs(pixel.astype(int) - colour).max() <= 3 and b"bt709" in done.stderr
+
+
 def test_video_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
     with pytest.raises(SetupError, match="pip install imageio-ffmpeg"):

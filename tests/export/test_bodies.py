@@ -56,6 +56,38 @@ def test_glb_has_textures_that_repeat_and_glass():
     assert "extensionsUsed" not in document(room())
 
 
+def test_glb_colours_coated_glass_by_the_mean_of_tint_and_albedo():
+    glass = constant(0.2, 0.2, 0.0, transmission=0.75, ior=1.4, tint=(1.0, 0.6, 0.2))
+    material = document(with_bodies(glass))["materials"][-1]
+    expected = 0.25 * 0.2 + 0.75 * np.array([1.0, 0.6, 0.2])
+    np.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-5)
+
+
+def test_clear_glass_keeps_no_texture_of_what_it_was():
+    clear = replace(CHECKS, transmission=1.0, tint=(0.5, 1.0, 0.5))
+    content = document(with_bodies(clear))
+    assert content["materials"][-1]["pbrMetallicRoughness"]["baseColorFactor"][:3] == [0.5, 1.0, 0.5]
+    assert len(content["images"]) == len(document(room())["images"])
+
+
+def test_the_page_shows_bodies_without_the_continued_planes():
+    from materialist.export.page import _packed
+
+    scene = with_bodies(CHECKS)
+    parts = [*scene_parts(scene), *body_parts.body_parts(scene)]
+    packed = _packed(scene.camera, scene.depth, parts)
+    assert len(parts) > 2 and packed["surface"] == 3 * (len(parts[0].mesh.faces) + 2) < packed["all"]
+
+
+@pytest.mark.parametrize("to", ["mitsuba", "usd", "blend"])
+def test_numbers_of_numpy_are_numbers(tmp_path, to):
+    lamp = Lamp(tuple(np.float32([0, 0.5, -2])), tuple(np.float32([1, 2, 3])), np.float32(0.05))
+    scene = replace(room(), lamps=(lamp,), camera=replace(room().camera, fov=np.float64(40.0)))
+    done = export(scene, tmp_path / "a", to=to)
+    if to == "mitsuba":
+        assert "np." not in done.path.read_text()
+
+
 def test_trimesh_reads_the_bodies_back(tmp_path):
     import trimesh
 

@@ -17,6 +17,11 @@ from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.image import probe_beside, write_png_bytes
 from materialist.types import Array, Lamp, Scene
 
+BT709 = (
+    "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
+    "-color_trc", "bt709",
+)  # fmt: skip
+"""ffmpeg's options for the colours that players take films for; without them it encodes those of old television."""
 MAX_FRAMES = 3600
 
 
@@ -107,6 +112,7 @@ def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
             if writer is None:
                 writer = _ffmpeg().write_frames(
                     str(path), (width, height), fps=fps, codec="libx264", quality=8, macro_block_size=2,
+                    output_params=list(BT709),
                 )  # fmt: skip
                 writer.send(None)
             writer.send(np.ascontiguousarray(pixels[:height, :width]))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from materialist.errors import OutputError
 from materialist.export.body_parts import one_roughness
 from materialist.export.parts import Part
 from materialist.export.textures import base_color, metallic_roughness, png
-from materialist.types import Array, Camera, Lamp, Scene, Surface
+from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -120,8 +121,8 @@ class _Document:
 
     def _material(self, part: Part) -> int:
         pbr: dict = {}
-        m = one_roughness(part)
-        if part.constant:
+        m = _passing(part)
+        if part.constant or (part.surface is not None and part.surface.transmission >= 1):
             pbr["baseColorFactor"] = [*(float(c) for c in m.albedo[0, 0]), 1.0]
             pbr["roughnessFactor"] = float(m.roughness[0, 0])
             pbr["metallicFactor"] = float(m.metallic[0, 0])
@@ -137,15 +138,11 @@ class _Document:
             material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
-            material.setdefault("extensions", {}).update(self._glass(part.surface, pbr))
+            material.setdefault("extensions", {}).update(self._glass(part.surface))
         return self._add("materials", material)
 
-    def _glass(self, surface: Surface, pbr: dict) -> dict:
-        """KHR_materials_transmission and KHR_materials_ior; the base colour tints what passes."""
-        tint = [float(c) for c in surface.tint]
-        if surface.transmission >= 1:
-            pbr["baseColorFactor"] = [*tint, 1.0]
-            pbr.pop("baseColorTexture", None)
+    def _glass(self, surface: Surface) -> dict:
+        """KHR_materials_transmission and KHR_materials_ior; the base colour tints what passes, see `_passing`."""
         self.extensions |= {"KHR_materials_transmission", "KHR_materials_ior"}
         return {
             "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
@@ -192,3 +189,12 @@ def _unit(normals: Array) -> Array:
     """[V, 3] unit to float32 rounding; straight to the viewer where there is none."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0, 0, 1], np.float32))
+
+
+def _passing(part: Part) -> Materials:
+    """The maps of a part; one colour of glTF is for what glass reflects diffusely and what passes: their mean."""
+    m, surface = one_roughness(part), part.surface
+    if surface is None or surface.transmission == 0:
+        return m
+    share = np.float32(surface.transmission)
+    return replace(m, albedo=((1 - share) * m.albedo + share * np.array(surface.tint, np.float32)).astype(np.float32))

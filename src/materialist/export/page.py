@@ -60,7 +60,7 @@ def page(scene: Scene, parts: list[Part]) -> str:
         "light_note": f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
         "metrics": _metrics(scene.report.metrics),
         "stages": _table((s.get("name", ""), f"{s.get('seconds', 0):.1f} s") for s in scene.report.stages),
-        "provenance": _table((key, value) for key, value in scene.provenance.items() if not isinstance(value, dict)),
+        "provenance": _table(_options(scene)),
         "scene": json.dumps(_packed(camera, scene.depth, parts)),
         "style": (assets / "page.css").read_text("utf-8"),
         "script": (assets / "page.js").read_text("utf-8"),
@@ -69,6 +69,16 @@ def page(scene: Scene, parts: list[Part]) -> str:
     pieces = (assets / "page.html").read_text("utf-8").split("{{")
     rest = (piece.split("}}", 1) for piece in pieces[1:])
     return pieces[0] + "".join(values[name] + text for name, text in rest)
+
+
+def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
+    """What the scene was made with, in few words."""
+    for key, value in scene.provenance.items():
+        if isinstance(value, list | tuple):
+            plain = all(isinstance(one, int | float | str) for one in value)
+            yield key, " x ".join(map(str, value)) if plain and value else f"{len(value)} of them"
+        elif not isinstance(value, dict):
+            yield key, value
 
 
 def _title(scene: Scene) -> str:
@@ -126,7 +136,9 @@ def _image(pixels: Array, quality: int = 90) -> str:
 
 
 def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
-    """What page.js needs: the meshes one after the other, deflated, and the camera."""
+    """What page.js needs: the meshes one after the other, deflated, and the camera. Continued planes come last."""
+    shown = [parts[0], *(part for part in parts if part.surface is not None)]
+    parts = [*shown, *(part for part in parts[1:] if part.surface is None)]
     vertices = np.concatenate([_vertices(part) for part in parts])
     starts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     indices = np.concatenate([part.mesh.faces + start for part, start in zip(parts, starts)]).astype("<u4")
@@ -134,7 +146,7 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
     nearest = float(depth[depth > 0].min()) if (depth > 0).any() else 1.0
     return {
         "vertices": _deflated(vertices), "indices": _deflated(indices),
-        "surface": 3 * len(parts[0].mesh.faces), "all": indices.size,
+        "surface": 3 * sum(len(part.mesh.faces) for part in shown), "all": indices.size,
         "tangent": math.tan(math.radians(camera.fov) / 2), "aspect": camera.width / camera.height,
         "pivot": float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0,
         "near": nearest * 0.05, "far": reach * 4,

@@ -16,7 +16,9 @@ SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
 """Formats that may also be a folder: PATH without a suffix of its own."""
-COATED = "glass whose coat is seen from outside alone: where the transmission is below 1 it is up to 7 % darker there"
+COATED = (
+    "glass whose coat is seen from outside alone: where the transmission is below 1 it is darker there, by 7 to 30 %"
+)
 PAGE_TRIANGLES = 60_000
 """Triangles in an HTML page unless the caller says otherwise."""
 
