@@ -58,6 +58,46 @@ def test_the_composite_shows_the_wall_and_keeps_the_rest():
     assert same[far].mean() > 0.5 and np.abs(picture - scene.photo.original)[far].max() < 0.1
 
 
+@pytest.mark.parametrize("native", [1, 3])
+def test_what_was_put_before_it_stays_whole(native):
+    """A mask that lies on a thing before the object takes nothing of the thing away, nor copies it."""
+    from test_composite import tetrahedron
+
+    from materialist.edit.composite import developed
+    from materialist.edit.lights import Studio
+
+    scene = rendered_scene(native)
+    red = replace(scene, bodies=(tetrahedron(),))
+    saved = developed(scene, red, composite(scene, red, spp=16))
+    studio = Studio(saved)
+    here, there = studio.bodies_seen(saved), studio.bodies_seen(saved, saved.photo.original.shape[:2])
+    mask = block_mask(36, 48)
+    mask |= (here > 0) & (np.arange(48) < np.median(np.nonzero(here)[1]))
+    assert (here[mask] == 1).sum() > 10
+    gone = without(saved, mask, shadow=0)
+    np.testing.assert_array_equal(gone.photo.linear[here == 1], saved.photo.linear[here == 1])
+    np.testing.assert_array_equal(gone.photo.original[there == 1], saved.photo.original[there == 1])
+    out = composite(saved, gone, spp=16)
+    assert np.abs(out - saved.photo.original)[there == 1].max() < 0.06
+    red_here = lambda picture: picture[..., 0] > 2 * picture[..., 1]  # noqa: E731
+    assert not (red_here(out) & ~red_here(saved.photo.original) & (there == 0)).any(), "nor is it copied"
+
+
+def test_the_outline_of_what_was_filled_is_smooth_at_native_size():
+    from materialist.edit.background import _enlarged
+
+    rows, columns = np.mgrid[:40, :40] + 0.5
+    share = _enlarged(np.hypot(rows - 20, columns - 20) < 11, (320, 320))
+    y, x = np.mgrid[:320, :320] + 0.5
+    radius = np.hypot(y - 160, x - 160) / 8
+    rim = (share > 0.3) & (share < 0.7)
+    assert rim.sum() > 60 and radius[rim].std() < 0.25  # of whole pixels: 0.4
+    assert (share[radius < 9.5] == 1).all() and not share[radius > 11.8].any()
+    lines = np.zeros((40, 40), bool)
+    lines[10], lines[20:22] = True, True
+    assert _enlarged(lines, (320, 320))[84].all() and _enlarged(lines, (320, 320))[168].all(), "thin ones are kept"
+
+
 def test_a_true_background_is_what_is_seen():
     scene = rendered_scene()
     y, x = np.mgrid[:36, :48]

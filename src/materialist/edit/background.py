@@ -13,6 +13,7 @@ from materialist.edit.behind import Behind, behind
 from materialist.edit.exemplar import Plan, exemplar_plan
 from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted
+from materialist.edit.region import placed
 from materialist.edit.regular import regular_sources
 from materialist.edit.seamless import seamless
 from materialist.errors import InputError
@@ -20,6 +21,8 @@ from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
 from materialist.types import Array, Camera, Materials, Photo, Scene
 
+SMOOTH = 1.0
+"""Standard deviation, working pixels, by which the outline of a hole is smoothed at native size."""
 Inpaint = Callable[[Array, Array], Array]
 """inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
 
@@ -53,7 +56,8 @@ def without(
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
     features = looks(scene.materials.albedo, scene.photo.linear)
-    plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed)
+    usable = placed(scene) == 0 if scene.bodies else None
+    plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed, usable=usable)
     shown = _denoised(scene)
     picture = _given(scene, background, inpaint, hole)
     if picture is None:
@@ -67,6 +71,8 @@ def without(
     )  # fmt: skip
     cast = "auto" if shadow is None else shadow
     what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast}
+    if scene.bodies:
+        removed = _with_bodies(removed, scene, hole)
     if picture is not None:
         removed = _matched(removed, hole, picture, fitted or scene)
     return noted(removed, "remove", what)
@@ -78,13 +84,15 @@ def looks(albedo: Array, photo: Array) -> Array:
 
 
 def sources(
-    features: Array, hole: Array, label: Array, depth: Array, camera: Camera, *, seed: int = 0
+    features: Array, hole: Array, label: Array, depth: Array, camera: Camera, *, seed: int = 0,
+    usable: Array | None = None,
 ) -> Plan | None:  # fmt: skip
     """Where a hole [H, W] bool is filled from: patterns of planes go on; else `looks` must be alike, on a surface.
 
-    `label`, `depth` [H, W]: surfaces in and around the hole (see `behind.Behind`). None where nothing can be copied.
+    `label`, `depth` [H, W]: surfaces in and around the hole (see `behind.Behind`); `usable` [H, W] bool: what may be
+    copied, None for anything. None where nothing can be.
     """
-    anywhere = np.ones(hole.shape, bool)
+    anywhere = np.ones(hole.shape, bool) if usable is None else usable
     told = regular_sources(features, hole, anywhere, label, depth, camera)
     return exemplar_plan(features, hole, anywhere, joined(label, hole), told=told, seed=seed)
 
@@ -145,12 +153,28 @@ def _painted(
     # A picture says nothing about shine: what it shows is taken as matt.
     rough = np.where(hole.painted, np.maximum(materials.roughness, 0.6), materials.roughness)
     metal = np.where(hole.painted, 0, materials.metallic).astype(np.float32)
-    native = scene.photo.original.shape[:2]
     linear = np.where(inside, small, scene.photo.linear).astype(np.float32)
-    outline = _enlarged_mask(hole.painted, native)[..., None]
-    original = np.where(outline, resized(picture, native), scene.photo.original).astype(np.float32)
+    share = _enlarged(hole.painted, scene.photo.original.shape[:2])
+    original = _laid(resized(picture, share.shape), share, scene.photo.original)
     photo = replace(scene.photo, linear=linear, original=original)
     return Materials(albedo.astype(np.float32), rough.astype(np.float32), metal), photo, linear
+
+
+def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
+    """The scene with its bodies in the filled photo and re-rendering again: they stand before what was taken away."""
+    from materialist.edit.lights import Studio
+
+    share = placed(scene)
+    if not (share[hole.painted] > 0).any():
+        return removed
+    photo, native = scene.photo, scene.photo.original.shape[:2]
+    large = share if native == share.shape else Studio(scene).bodies_seen(scene, native)
+    linear, rerender = (
+        _laid(old, share, new)
+        for old, new in ((photo.linear, removed.photo.linear), (scene.rerender, removed.rerender))
+    )
+    original = _laid(photo.original, large, removed.photo.original)
+    return replace(removed, photo=replace(removed.photo, linear=linear, original=original), rerender=rerender)
 
 
 def _matched(removed: Scene, hole: Hole, picture: Array, fitted: Scene, *, spp: int = 24) -> Scene:
@@ -183,15 +207,21 @@ def _with_hole(photo: Photo, linear: Array, hole: Array, plan: Plan | None) -> P
     if native == hole.shape:
         original = np.where(hole[..., None], linear, photo.original).astype(np.float32)
         return replace(photo, linear=linear.astype(np.float32), original=original)
-    outline = _enlarged_mask(hole, native)
+    share = _enlarged(hole, native)
     large = resized(linear.astype(np.float32), native)
     if plan is not None:
         detail = photo.original - resized(photo.linear, native)
-        rows, columns = np.nonzero(outline)
+        rows, columns = np.nonzero(share)
         y, x = _native_sources(plan, hole, rows, columns, native)
         large[rows, columns] += detail[y, x]
-    original = np.where(outline[..., None], np.maximum(large, 0), photo.original).astype(np.float32)
+    original = _laid(np.maximum(large, 0), share, photo.original)
     return replace(photo, linear=linear.astype(np.float32), original=original)
+
+
+def _laid(picture: Array, share: Array, photo: Array) -> Array:
+    """[H0, W0, 3] a picture over the photo by its share [H0, W0]; bit for bit the photo where that is 0."""
+    over = share[..., None]
+    return np.where(over > 0, over * picture + (1 - over) * photo, photo).astype(np.float32)
 
 
 def _native_sources(plan: Plan, hole: Array, rows: Array, columns: Array, native: tuple[int, int]):
@@ -252,10 +282,18 @@ def _denoised(scene: Scene) -> Array:
     return denoised(scene.rerender, scene.rerender, guides)[0]
 
 
-def _enlarged_mask(mask: Array, native: tuple[int, int]) -> Array:
+def _enlarged(mask: Array, native: tuple[int, int]) -> Array:
+    """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
     import cv2
 
-    return cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    hard = cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
+    if native == mask.shape:
+        return hard.astype(np.float32)
+    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), SMOOTH)
+    share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
+    thin = mask & (cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((4, 4), np.uint8)) == 0)
+    thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
+    return np.where(thin > 0, 1, hard * share).astype(np.float32)
 
 
 def resized(picture: Array, shape: tuple[int, ...]) -> Array:

@@ -81,8 +81,13 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
         return np.ones(scene.depth.shape, bool)
     a, b = scene.materials, edited.materials
     changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
-    # Where a surface was taken away, what stands behind it is seen.
-    return (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
+    # Where a surface was taken away, what stands behind it is seen, but for what a body hides before and after.
+    changed = (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
+    if changed.any() and scene.bodies and scene.bodies == edited.bodies[: len(scene.bodies)]:
+        from materialist.edit.region import placed
+
+        changed &= placed(scene) < 1
+    return changed
 
 
 def difference(

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from materialist.edit.layers import Layers, denoised
+from materialist.edit.region import placed
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Photo, Scene
 
@@ -34,6 +35,8 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if edited.photo is scene.photo:
         return scene.photo, layers
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
+    if scene.bodies:
+        filled &= placed(scene) < 1
     bare = _bare(studio, edited, layers, spp, seed, clean)
     if not _given(edited):
         factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
