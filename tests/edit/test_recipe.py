@@ -43,6 +43,16 @@ def test_steps_are_the_functions_in_order(folder):
     assert got.lamps == expected.lamps and len(got.provenance["edits"]) == 3
 
 
+def test_an_insert_may_have_several_places(folder):
+    from made_meshes import box_file
+
+    box_file(folder / "box.ply", (0.1, 0.1, 0.1))
+    for places in ("[[8, 30], [40, 30]]", "['8,30', '40,30']"):
+        bodies = replay(folder, f"- insert: {{mesh: box.ply, at: {places}}}").bodies
+        assert len(bodies) == 2 and bodies[0].vertices[:, 0].max() < bodies[1].vertices[:, 0].min()
+    assert len(replay(folder, "- insert: {mesh: box.ply, at: '8,30'}").bodies) == 1
+
+
 def test_a_plus_sign_is_a_shift_in_yaml_too(folder):
     shifted = replay(folder, "- edit: {mask: block.png, roughness: +0.25}")
     level = replay(folder, "- edit: {mask: block.png, roughness: 0.25}")

@@ -156,6 +156,16 @@ def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
     assert (tmp_path / "holiday/precious.jpg").exists()
 
 
+def test_force_never_deletes_what_somebody_put_beside_a_scene(scene, tmp_path):
+    target = tmp_path / "a.scene"
+    save_scene(scene, target)
+    save_scene(scene, target, force=True)
+    (target / "mask.png").write_text("mine")
+    with pytest.raises(OutputError, match=r"holds mask\.png, which is no part of a scene"):
+        save_scene(scene, target, force=True)
+    assert (target / "mask.png").read_text() == "mine"
+
+
 @pytest.mark.parametrize("place", ["/proc/a.scene", "FILE/a.scene", "n" * 300, "/"])
 def test_places_that_cannot_be_written(scene, tmp_path, place):
     (tmp_path / "FILE").write_text("x")

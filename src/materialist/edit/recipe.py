@@ -190,7 +190,9 @@ def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
     if missing:
         raise InputError(f"An insert needs its {missing[0]}, as in insert: {{mesh: mug.glb, at: [310, 220]}}.")
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("scale", "turn", "size") if k in given}
-    return insert(edited, _file(step, "mesh"), _numbers(given["at"], 2, "at"), **options, **_thing(step))
+    for place in [_numbers(one, 2, "at") for one in _list_of(given["at"])]:
+        edited = insert(edited, _file(step, "mesh"), place, **options, **_thing(step))
+    return edited
 
 
 def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -313,8 +315,9 @@ def _files(step: Step, name: str) -> list[Path]:
 
 
 def _list_of(value: Any) -> list[Any]:
-    """A single entry, or a list of them."""
-    return value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
+    """A single entry, or a list of them: of lists, or of texts such as 310,220."""
+    several = isinstance(value, list) and value and all(isinstance(v, list) or "," in str(v) for v in value)
+    return value if several else [value]
 
 
 def _number(value: Any, name: str) -> float:

@@ -19,6 +19,11 @@ from materialist.errors import OutputError
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
+MEMBERS = frozenset(
+    (MARKER, "photo.exr", "photo.png", "prior", "maps", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr",
+     "rerender.png", "overview.png", "report.json", "bodies")
+)  # fmt: skip
+"""Names in a package, beside `original` with the photo's ending."""
 
 
 def ensure_writable(path: str | Path, force: bool = False) -> None:
@@ -61,6 +66,12 @@ def _require_replaceable(path: str | Path, target: Path, force: bool) -> None:
         raise OutputError(f"{path} exists; give --force to replace it, or another name.")
     if target.is_symlink() or not target.is_dir() or (any(target.iterdir()) and not (target / MARKER).is_file()):
         raise OutputError(f"{path} is not a scene package, so --force will not replace it; give another name.")
+    for name in sorted(file.name for file in target.iterdir()):
+        if name not in MEMBERS and not name.startswith(("original.", ".")):
+            raise OutputError(
+                f"{path} holds {name}, which is no part of a scene, so --force will not replace it; move that, or give "
+                "another name."
+            )
 
 
 def interrupted_replacement(path: str | Path) -> Path | None:
