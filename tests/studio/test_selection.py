@@ -18,7 +18,9 @@ def test_click_add_and_remove():
     assert one.mask is not None and overlap(one.mask, block()) > 0.9
     two = one.click(scene, 50, 40, "add")
     assert two.mask is not None and two.mask[40, 50] and two.mask[24, 25]
-    assert two.click(scene, 25, 24, "add").mask[24, 25] == False  # noqa: E712 - on what is selected: taken away
+    again = two.click(scene, 25, 24, "add").mask
+    assert again is not None and (again >= two.mask).all(), "adding takes nothing away"
+    assert two.click(scene, 25, 24, "new").mask[24, 25] == False  # noqa: E712 - on what is selected: taken away
     assert one.click(scene, 25, 24, "new").mask is None
     assert one.click(scene, 50, 40, "remove") is one
 

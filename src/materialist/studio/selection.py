@@ -32,7 +32,7 @@ class Selection:
         return mask if mask.any() else None
 
     def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
-        """With the object at a pixel: alone, added, or (where it is selected already) taken away.
+        """With the object at a pixel: alone, added, or taken away, as a plain click does where it is selected already.
 
         Taking away leaves the rest of a larger region: a click on the spoon in a selected cup takes away the spoon.
         """
@@ -44,7 +44,7 @@ class Selection:
             # One thing found again from another place of it is never quite the same.
             if (found & mask).sum() > INSIDE * found.sum() and found.sum() < PART * mask.sum():
                 return self._without(found)
-        if inside or mode == REMOVE:
+        if (inside and mode != ADD) or mode == REMOVE:
             return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
         found = select(scene, click=(x, y), method=method)
         return self._with(found, mode)
