@@ -195,6 +195,9 @@ def _report(
 
 def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
     if isinstance(photo, Photo):
+        from materialist.io.photo import exposed
+
+        photo = exposed(photo)
         if fov in ("auto", None):
             return photo
         from materialist.io.photo import option_fov

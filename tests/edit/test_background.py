@@ -69,8 +69,8 @@ def test_what_was_put_before_it_stays_whole(native):
     scene = rendered_scene(native)
     red = replace(scene, bodies=(tetrahedron(),))
     saved = developed(scene, red, composite(scene, red, spp=16))
-    studio = Studio(saved)
-    here, there = studio.bodies_seen(saved), studio.bodies_seen(saved, saved.photo.original.shape[:2])
+    studio, size = Studio(saved), saved.photo.original.shape[:2]
+    here, there = studio.bodies_seen(saved), studio.bodies_in(saved, size, (0, size[0], 0, size[1]))
     mask = block_mask(36, 48)
     mask |= (here > 0) & (np.arange(48) < np.median(np.nonzero(here)[1]))
     assert (here[mask] == 1).sum() > 10
@@ -81,6 +81,17 @@ def test_what_was_put_before_it_stays_whole(native):
     assert np.abs(out - saved.photo.original)[there == 1].max() < 0.06
     red_here = lambda picture: picture[..., 0] > 2 * picture[..., 1]  # noqa: E731
     assert not (red_here(out) & ~red_here(saved.photo.original) & (there == 0)).any(), "nor is it copied"
+
+
+def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
+    from materialist.io.exr import write_exr
+
+    scene = rendered_scene()
+    hdr = replace(scene, photo=replace(scene.photo, hdr=True, stops=7))
+    write_exr(tmp_path / "behind.exr", scene.photo.original / 128)
+    plain = without(scene, block_mask(36, 48), background=scene.photo.linear)
+    told = without(hdr, block_mask(36, 48), background=tmp_path / "behind.exr")
+    np.testing.assert_array_equal(told.photo.linear, plain.photo.linear)
 
 
 def test_the_outline_of_what_was_filled_is_smooth_at_native_size():

@@ -162,7 +162,13 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     scaled = read("map_Kd -s 2 2 1 c.png")
     np.testing.assert_allclose(scaled.parts[0].surface.albedo, 1.0)
     assert ["such as -s" in note for note in scaled.warnings] == [True]
-    for line in ("-o 0.5 -bm 1e-1 -mm 0 1 c.png", "-clamp on my wood 2.png", "my wood 2.png", "-s 2 2 my wood 2.png"):
+    for line in (
+        "-o 0.5 -bm 1e-1 -mm 0 1 c.png",
+        "-clamp on my wood 2.png",
+        "my wood 2.png",
+        "-s 2 2 my wood 2.png",
+        "-s 1 1 1 -colorspace sRGB c.png",
+    ):
         assert read(f"map_Kd {line}").parts[0].surface.albedo.mean() == 1
     assert read("map_Kd -s 2 2 1 c.png\r").parts[0].surface.albedo.mean() == 1, "as Windows ends lines"
     assert read("Ke nan inf -1").parts[0].surface.emission == (0.0, 0.0, 0.0)

@@ -1,6 +1,7 @@
 """Enlarged layers follow the photo's edges; mixed pixels are told apart by their colour."""
 
 import numpy as np
+import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edit.upsample import GuidedUpsample, matte, strips
@@ -66,6 +67,17 @@ def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
     alpha = matte(mask, large.astype(np.float32))
     assert (alpha[:, :42] > 0.99).all() and (alpha[:, 46:] < 0.5).all()
     assert (alpha[:, 40:46][dark[:, 40:46]] > 0.95).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.06])
+def test_thin_parts_and_gaps_keep_their_mask(noise):
+    """Where nothing is surely inside, or outside, nearby, colour tells nothing of that side."""
+    rng = np.random.default_rng(0)
+    large = np.clip(0.25 + noise * rng.standard_normal((160, 160, 1)), 0.02, 1).astype(np.float32).repeat(3, -1)
+    leg = np.zeros((40, 40), bool)
+    leg[:, 19:21] = True
+    assert matte(leg, large)[:, 77:83].mean() > 0.9
+    assert matte(~leg, large)[:, 77:83].mean() < 0.1
 
 
 def test_without_a_colour_edge_the_mask_decides():

@@ -63,6 +63,13 @@ def test_a_folder_is_replaced_only_where_it_is_an_export(tmp_path):
     ):
         pass
     assert names(target) == [MARKER, "two", "work"]
+    (target / "work" / "comp.nk").unlink()
+    (target / ".DS_Store").touch()
+    with whole_folder(target, force=True, format="usd"):
+        pass
+    (target / MARKER).write_text("{}")
+    with pytest.raises(OutputError, match="did not list its files"), whole_folder(target, force=True):
+        pass
     (tmp_path / "link").symlink_to(target)
     with pytest.raises(OutputError, match="is not a folder"), whole_folder(tmp_path / "link", force=True):
         pass

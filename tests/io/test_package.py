@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import fields, is_dataclass, replace
@@ -160,10 +161,15 @@ def test_force_never_deletes_what_somebody_put_beside_a_scene(scene, tmp_path):
     target = tmp_path / "a.scene"
     save_scene(scene, target)
     save_scene(scene, target, force=True)
-    (target / "mask.png").write_text("mine")
-    with pytest.raises(OutputError, match=r"holds mask\.png, which is no part of a scene"):
-        save_scene(scene, target, force=True)
-    assert (target / "mask.png").read_text() == "mine"
+    for name in ("mask.png", "maps/mask.png", "original.psd", ".keys/a.txt", "bodies/notes.txt"):
+        (target / name).parent.mkdir(exist_ok=True)
+        (target / name).write_text("mine")
+        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which is no part of a scene"):
+            save_scene(scene, target, force=True)
+        assert (target / name).read_text() == "mine"
+        (target / name).unlink()
+    (target / ".DS_Store").touch()  # a file manager's
+    save_scene(scene, target, force=True)
 
 
 @pytest.mark.parametrize("place", ["/proc/a.scene", "FILE/a.scene", "n" * 300, "/"])

@@ -6,6 +6,7 @@ import zlib
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from made_dng import write_dng
 from PIL import Image, ImageCms
@@ -13,7 +14,8 @@ from PIL import Image, ImageCms
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError
 from materialist.io.exr import write_exr
-from materialist.io.photo import read_photo
+from materialist.io.photo import exposed, read_photo
+from materialist.types import Camera, Photo
 
 
 def picture(height=20, width=30, seed=0):
@@ -87,6 +89,35 @@ def test_exr_of_any_unit_is_exposed_by_whole_stops_and_clipped_to_ten(tmp_path, 
     np.testing.assert_array_equal(photo.original * np.float32(2.0**-photo.stops), values)  # not a digit is lost
     np.testing.assert_array_equal(photo.linear, np.minimum(photo.original, 10))
     assert 0.63 < np.percentile(photo.linear.max(-1), 97) < 1.28
+
+
+@pytest.mark.parametrize("unit", [1 / 300, 1, 300])
+def test_transparent_parts_are_white_in_any_unit(tmp_path, unit):
+    from materialist.io.photo import decode_photo
+
+    alpha = np.ones((20, 30, 1), np.float32)
+    alpha[:, :12] = 0
+    colour = alpha * np.float32(unit) * np.linspace(0.1, 0.9, 600, dtype=np.float32).reshape(20, 30, 1)
+    pixels = np.concatenate([colour, colour, colour, alpha], -1)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGBA": pixels}).write(str(tmp_path / "a.exr"))
+    photo = read_photo(tmp_path / "a.exr")
+    np.testing.assert_array_equal(photo.linear[:, :12], 1)
+    assert photo.hdr and 0.2 < np.median(photo.linear[:, 12:]) < 1
+    again = decode_photo(tmp_path / "a.exr", over=2.0**-photo.stops).linear * np.float32(2.0**photo.stops)
+    np.testing.assert_array_equal(again, photo.original)
+
+
+def test_a_photo_from_memory_is_exposed_and_one_pixel_at_one_is_no_clipping(tmp_path):
+    values = np.random.default_rng(0).random((60, 70, 3), np.float32) * np.float32(0.01)
+    photo = exposed(Photo(values, Camera(70, 60, 40.0), values, True))
+    assert photo.stops == 7 and exposed(photo) is photo
+    np.testing.assert_array_equal(photo.original, 128 * values)
+    ordinary = Photo(values, Camera(70, 60, 40.0), values)
+    assert exposed(ordinary) is ordinary
+    values[0, 0] = 1
+    write_exr(tmp_path / "a.exr", values)
+    assert read_photo(tmp_path / "a.exr").stops == 7
 
 
 def test_a_bright_window_does_not_make_the_room_black_nor_the_night_a_lamp_white(tmp_path):

@@ -22,6 +22,7 @@ from materialist.batch.packages import file_hash, package_hash, whole_size
 from materialist.batch.remote import is_url, local_copy
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
+from materialist.io.target import ensure_writable
 from materialist.types import Array, Scene
 
 Tick = Callable[[str, int, int], None]
@@ -82,6 +83,7 @@ def _scene(job: Job, tick: Tick) -> tuple[Scene, dict[str, Any]]:
         return scene, {"photo_hash": _hash(scene.photo.source)}
     if not job.replace and job.scene.exists():
         raise OutputError(f"{job.scene} exists and is not of this batch; move it away.")
+    ensure_writable(job.scene, job.replace)
     options = job.named_options()
     size, fov = options.pop("size", 512), options.pop("fov", "auto")
     tick("read", 0, 1)

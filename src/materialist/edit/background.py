@@ -38,8 +38,9 @@ def without(
 
     Args:
         mask: [H, W] bool, or weights in [0, 1], at working size.
-        background: the true background, [h, w, 3] linear at working or native size, or a file of that aspect; it
-            takes the place of inpainting, and its albedo is what makes the re-rendering equal to it.
+        background: the true background, [h, w, 3] linear at working or native size and the exposure of the photo,
+            or a file of that aspect, an EXR in the unit of the photo's file; it takes the place of inpainting, and
+            its albedo is what makes the re-rendering equal to it.
         inpaint: another inpainter of the photo, used like a background (see `inpaint.diffusion`).
         grow: rim around the mask that is filled as well, as a part of the picture's longer side, in [0, 0.2].
         shadow: how far the surface it stands on is filled as well, as a part of the object's size, in [0, 2]; None:
@@ -56,7 +57,8 @@ def without(
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
     features = looks(scene.materials.albedo, scene.photo.linear)
-    usable = placed(scene) == 0 if scene.bodies else None
+    photographed = replace(scene, bodies=(fitted or scene).bodies)  # what an edit puts there is not in the photo
+    usable = placed(photographed) == 0 if photographed.bodies else None
     plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed, usable=usable)
     shown = _denoised(scene)
     picture = _given(scene, background, inpaint, hole)
@@ -71,8 +73,8 @@ def without(
     )  # fmt: skip
     cast = "auto" if shadow is None else shadow
     what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast}
-    if scene.bodies:
-        removed = _with_bodies(removed, scene, hole)
+    if photographed.bodies:
+        removed = _with_bodies(removed, photographed, hole)
     if picture is not None:
         removed = _matched(removed, hole, picture, fitted or scene)
     return noted(removed, "remove", what)
@@ -162,19 +164,30 @@ def _painted(
 
 def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
     """The scene with its bodies in the filled photo and re-rendering again: they stand before what was taken away."""
-    from materialist.edit.lights import Studio
-
     share = placed(scene)
     if not (share[hole.painted] > 0).any():
         return removed
     photo, native = scene.photo, scene.photo.original.shape[:2]
-    large = share if native == share.shape else Studio(scene).bodies_seen(scene, native)
+    large = share if native == share.shape else _enlarged_share(scene, hole.painted & (share > 0), native)
     linear, rerender = (
         _laid(old, share, new)
         for old, new in ((photo.linear, removed.photo.linear), (scene.rerender, removed.rerender))
     )
     original = _laid(photo.original, large, removed.photo.original)
     return replace(removed, photo=replace(removed.photo, linear=linear, original=original), rerender=rerender)
+
+
+def _enlarged_share(scene: Scene, where: Array, native: tuple[int, int]) -> Array:
+    """[H0, W0] share of each native pixel in which a body is seen, near `where` [H, W] bool; 0 elsewhere."""
+    from materialist.edit.lights import Studio
+
+    box: list[int] = []
+    for axis in (0, 1):
+        (inside,), scale = np.nonzero(where.any(1 - axis)), native[axis] / where.shape[axis]
+        box += [max(0, int((inside[0] - 1) * scale)), min(native[axis], int(np.ceil((inside[-1] + 2) * scale)))]
+    large = np.zeros(native, np.float32)
+    large[box[0] : box[1], box[2] : box[3]] = Studio(scene).bodies_in(scene, native, (box[0], box[1], box[2], box[3]))
+    return large
 
 
 def _matched(removed: Scene, hole: Hole, picture: Array, fitted: Scene, *, spp: int = 24) -> Scene:
@@ -249,7 +262,8 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Arr
     if isinstance(background, str | Path):
         from materialist.io.photo import decode_photo
 
-        background = decode_photo(Path(background)).linear
+        decoded = decode_photo(Path(background))
+        background = decoded.linear * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
     picture = np.asarray(background, np.float32)
     shape = hole.painted.shape
     if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, shape):

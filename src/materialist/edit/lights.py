@@ -103,10 +103,17 @@ class Studio:
             self._dressed(edited), self.scene, edited, names, spp=spp, seed=seed, max_depth=depth, clean=clean
         )  # fmt: skip
 
-    def bodies_seen(self, scene: Scene, size: tuple[int, int] | None = None) -> Array:
-        """[H, W] share of each pixel in which one of its bodies is seen, of a picture of this size or another."""
+    def bodies_seen(self, scene: Scene) -> Array:
+        """[H, W] share of each pixel in which one of its bodies is seen."""
         names = [f"body{k}" for k in range(len(scene.bodies))]
-        return self._seen(scene, names, size) if names else np.zeros(size or scene.depth.shape, np.float32)
+        return self._seen(scene, names) if names else np.zeros(scene.depth.shape, np.float32)
+
+    def bodies_in(self, scene: Scene, size: tuple[int, int], box: tuple[int, int, int, int]) -> Array:
+        """The same in a box (top, bottom, left, right) of a picture of another size (H, W)."""
+        from materialist.render.portrait import look
+
+        bodies = {f"body{k}": body for k, body in enumerate(scene.bodies)}
+        return look(self._target(scene).mi_scene, scene.camera, bodies, size, box).share
 
     def guides(self, edited: Scene) -> tuple[Array, Array]:
         """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with those of the bodies that are seen."""
@@ -128,11 +135,11 @@ class Studio:
         normal[part] = share * sight.normal + (1 - share) * normal[part]
         return albedo, normal
 
-    def _seen(self, scene: Scene, names: list[str], size: tuple[int, int] | None = None) -> Array:
+    def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
         from materialist.render.seen import bodies_seen
 
-        return bodies_seen(self._target(scene).mi_scene, scene.camera, names, size=size)
+        return bodies_seen(self._target(scene).mi_scene, scene.camera, names)
 
     def _dressed(self, scene: Scene):
         """Its `RenderScene` with its materials and its light."""

@@ -23,6 +23,8 @@ OPTIONS = re.compile(
     rb"|-[ost](?:[ \t]+[-+.\de]+(?=[ \t])){1,3}[ \t]+)+"
 )
 """A texture of an .mtl up to its name, which may hold spaces, with the options of the format before it."""
+OTHERS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*\r?$")
+"""The same with options that the format does not know: the name is the last word."""
 
 
 class MeshFolder:
@@ -54,9 +56,11 @@ class MeshFolder:
             self.missing.append(name)
             raise
         self.damaged += path.suffix.lower() in PICTURES and not _is_picture(data)
-        if path.suffix.lower() == ".mtl" and OPTIONS.search(data):
-            self.left_out.add("the options of its textures, such as -s")
-            return OPTIONS.sub(rb"\1", data)  # trimesh takes them for a part of the name
+        if path.suffix.lower() == ".mtl":
+            plain = OTHERS.sub(rb"\1\2", OPTIONS.sub(rb"\1", data))  # trimesh takes them for a part of the name
+            if plain != data:
+                self.left_out.add("the options of its textures, such as -s")
+            return plain
         return data
 
     def _inside(self, name: str) -> Path | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import numpy as np
 
 from materialist.errors import InputError
@@ -44,13 +46,21 @@ def placed(scene: Scene) -> Array:
     from materialist.edit.lights import Studio
 
     asked = (scene.geometry, *scene.bodies)
-    if not _answered or list(map(id, _answered[0][0])) != list(map(id, asked)):
-        _answered[:] = [(asked, Studio(scene).bodies_seen(scene))]
-    return _answered[0][1]
+    key = tuple(map(id, asked))
+    with _LOCK:
+        known = _answered.get(key)
+    if known is None:
+        known = asked, Studio(scene).bodies_seen(scene)
+        with _LOCK:
+            _answered[key] = known
+            while len(_answered) > _KEPT:
+                del _answered[next(iter(_answered))]
+    return known[1]
 
 
-_answered: list[tuple[tuple, Array]] = []
-"""What `placed` was last asked of, and its answer: the steps of an edit ask about one scene."""
+_LOCK, _KEPT = Lock(), 8
+_answered: dict[tuple[int, ...], tuple[tuple, Array]] = {}
+"""What `placed` was asked of of late, which keeps their ids theirs, and its answers."""
 
 
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:

@@ -101,9 +101,10 @@ def matte(mask: Array, large: Array) -> Array:
     # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
     spread = np.sqrt(np.maximum(front_spread, back_spread) / np.maximum(length, 1e-6))
     plain = np.clip((PATTERN[1] - spread) / (PATTERN[1] - PATTERN[0]), 0, 1)
-    trust = np.clip(length / 0.1**2, 0, 1) * plain * known_front * known_back
+    known = known_front * known_back
+    trust = np.clip(length / 0.1**2, 0, 1) * plain * known
     no_back, no_front = (_unlike(encoded, *side) for side in ((back, back_spread), (front, front_spread)))
-    guess = soft + (1 - soft) * no_back * (1 - no_front) - soft * no_front * (1 - no_back)
+    guess = soft + known * ((1 - soft) * no_back * (1 - no_front) - soft * no_front * (1 - no_back))
     alpha = guess + trust * (share - guess)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import OutputError
+from materialist.io.target import files_below
 
 MARKER = "materialist-export.json"
 """The file that makes a folder an export: nothing else is ever replaced. It lists what was written."""
@@ -29,11 +30,8 @@ def ensure_free(path: Path, force: bool, *, folder: bool) -> None:
                 raise OutputError(f"{path} is not {kind}, so --force will not replace it; give another name.")
             if folder and any(path.iterdir()) and not (path / MARKER).is_file():
                 raise OutputError(f"{path} is no export, so --force will not replace it; give another name.")
-            if folder and (own := _added(path)):
-                raise OutputError(
-                    f"{path} holds {own}, which no export wrote, so --force will not replace it; move that, or give "
-                    "another name."
-                )
+            if folder and (reason := _not_ours(path)):
+                raise OutputError(f"{path} {reason}, so --force will not replace it; move that, or give another name.")
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
         probe = _beside(path, "probe")
         probe.touch()
@@ -68,7 +66,7 @@ def whole_folder(path: Path, force: bool = False, **facts: object) -> Iterator[P
     try:
         temporary.mkdir()
         yield temporary
-        facts = {**facts, "files": _files(temporary)}
+        facts = {**facts, "files": files_below(temporary)}
         (temporary / MARKER).write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
         if path.exists():
             os.rename(path, aside)
@@ -86,18 +84,16 @@ def whole_folder(path: Path, force: bool = False, **facts: object) -> Iterator[P
             shutil.rmtree(aside, ignore_errors=True)
 
 
-def _files(folder: Path) -> list[str]:
-    """Names of the files in and below a folder."""
-    return sorted(file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir())
-
-
-def _added(folder: Path) -> str:
-    """A file in an export's folder that it did not write, "" for none."""
+def _not_ours(folder: Path) -> str:
+    """Why an export's folder may hold something that it did not write, "" where it does not."""
+    if not (folder / MARKER).is_file():  # an empty folder
+        return ""
     try:
         known = json.loads((folder / MARKER).read_text("utf-8"))["files"]
     except (OSError, ValueError, KeyError, TypeError):
-        known = []
-    return next((name for name in _files(folder) if name not in known and name != MARKER), "")
+        return "was written by a version that did not list its files"
+    name = next((name for name in files_below(folder) if name not in known and name != MARKER), "")
+    return f"holds {name}, which no export wrote" if name else ""
 
 
 def _beside(path: Path, kind: str, suffix: str = "") -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ BLACK = 1e-3
 """Share of the brightest value up to which an HDR photo's pixel is black, and says nothing of its exposure."""
 BRIGHT = 0.9
 """Where the 97th percentile of an HDR photo's brightest channel belongs."""
+CLIPPED = 1e-3
+"""Share of pixels at 1, the brightest value, from which a scene-linear file is a clipped picture."""
 MIDDLE = 0.05
 """The median, where that would leave it darker: a bright window must not make the room black."""
 
@@ -42,12 +45,18 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     name = str(path)
     file = example_path(name) if name.startswith(PREFIX) else Path(path)
     decoded = decode_photo(file)
+    hdr, stops = False, 0
+    if decoded.scene_linear:
+        opaque = decode_photo(file, over=0.0).linear  # what is transparent tells nothing
+        hdr = not _is_clipped(opaque)
+        stops = _stops(_working(opaque, size)) if hdr else 0
+        if stops and np.any(opaque != decoded.linear):
+            decoded.linear = decode_photo(file, over=2.0**-stops).linear
+        del opaque
     original = decoded.linear
     height, width = original.shape[:2]
     linear = _working(original, size)
     warnings = [*decoded.warnings, *_remarks(width, height)]
-    hdr = decoded.scene_linear and float(original.max()) != 1  # a picture that ends at 1 has been clipped there
-    stops = _stops(linear) if hdr else 0
     if stops:
         original, linear = (picture * np.float32(2.0**stops) for picture in (original, linear))
         warnings.append(f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit.")
@@ -59,6 +68,22 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
     return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings), stops=stops)
+
+
+def exposed(photo: Photo) -> Photo:
+    """An HDR photo from memory, in any unit, as `read_photo` would have exposed it; any other as it is."""
+    stops = _stops(photo.linear) if photo.hdr and not photo.stops else 0
+    if not stops:
+        return photo
+    factor = np.float32(2.0**stops)
+    linear = np.minimum(factor * photo.linear, np.float32(HDR_CLIP))
+    return replace(photo, linear=linear, original=factor * photo.original, stops=stops)
+
+
+def _is_clipped(linear: Array) -> bool:
+    """Whether a picture ends at 1 on more than CLIPPED of its pixels: as a display file does."""
+    value = linear.max(-1)
+    return float(value.max()) == 1 and float((value == 1).mean()) > CLIPPED
 
 
 def _stops(linear: Array) -> int:

@@ -6,7 +6,9 @@ aside); both are recognised by name and removed by the next save to the same tar
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import shutil
 import zlib
 from collections.abc import Iterator
@@ -19,11 +21,14 @@ from materialist.errors import OutputError
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
-MEMBERS = frozenset(
-    (MARKER, "photo.exr", "photo.png", "prior", "maps", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr",
-     "rerender.png", "overview.png", "report.json", "bodies")
-)  # fmt: skip
-"""Names in a package, beside `original` with the photo's ending."""
+_MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
+MEMBERS = re.compile(
+    r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
+    rf"|(prior|maps)/{_MAPS}|bodies/\d+(\.ply|\.{_MAPS}))"
+)
+"""Files of a package, beside the photo as it was given."""
+JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
+"""What file managers leave in folders."""
 
 
 def ensure_writable(path: str | Path, force: bool = False) -> None:
@@ -66,12 +71,29 @@ def _require_replaceable(path: str | Path, target: Path, force: bool) -> None:
         raise OutputError(f"{path} exists; give --force to replace it, or another name.")
     if target.is_symlink() or not target.is_dir() or (any(target.iterdir()) and not (target / MARKER).is_file()):
         raise OutputError(f"{path} is not a scene package, so --force will not replace it; give another name.")
-    for name in sorted(file.name for file in target.iterdir()):
-        if name not in MEMBERS and not name.startswith(("original.", ".")):
-            raise OutputError(
-                f"{path} holds {name}, which is no part of a scene, so --force will not replace it; move that, or give "
-                "another name."
-            )
+    if name := next((name for name in files_below(target) if name != _original(target) and not _is_member(name)), ""):
+        raise OutputError(
+            f"{path} holds {name}, which is no part of a scene, so --force will not replace it; move that, or give "
+            "another name."
+        )
+
+
+def files_below(folder: Path) -> list[str]:
+    """Names of the files in and below a folder, without those that file managers leave."""
+    files = (file for file in folder.rglob("*") if file.is_symlink() or not file.is_dir())
+    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in JUNK)
+
+
+def _is_member(name: str) -> bool:
+    return MEMBERS.fullmatch(name) is not None
+
+
+def _original(folder: Path) -> str:
+    """The name of the photo as it was given in a package."""
+    try:
+        return str(json.loads((folder / MARKER).read_text("utf-8"))["photo"]["original"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return "original.exr"
 
 
 def interrupted_replacement(path: str | Path) -> Path | None:
