@@ -96,6 +96,6 @@ def test_taking_away(tmp_path):
     import zipfile
 
     names = zipfile.ZipFile(tmp_path / "a.zip").namelist()
-    assert "a/scene.glb" in names and "a/scene.hdr" in names
+    assert "a/scene.glb" in names and "a/scene.light.hdr" in names
     assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
     assert not list(tmp_path.glob(".partial*"))
