@@ -103,7 +103,7 @@ def test_transparent_parts_are_white_in_any_unit(tmp_path, unit):
     OpenEXR.File(header, {"RGBA": pixels}).write(str(tmp_path / "a.exr"))
     photo = read_photo(tmp_path / "a.exr")
     np.testing.assert_array_equal(photo.linear[:, :12], 1)
-    assert photo.hdr and 0.2 < np.median(photo.linear[:, 12:]) < 1
+    assert photo.hdr and 0.2 < np.median(photo.linear[:, 12:]) < 1 and exposed(photo) is photo
     again = decode_photo(tmp_path / "a.exr", over=2.0**-photo.stops).linear * np.float32(2.0**photo.stops)
     np.testing.assert_array_equal(again, photo.original)
 

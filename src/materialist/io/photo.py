@@ -72,7 +72,8 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
 
 def exposed(photo: Photo) -> Photo:
     """An HDR photo from memory, in any unit, as `read_photo` would have exposed it; any other as it is."""
-    stops = _stops(photo.linear) if photo.hdr and not photo.stops else 0
+    from_memory = photo.source is None and not photo.stops
+    stops = _stops(photo.linear) if photo.hdr and from_memory else 0
     if not stops:
         return photo
     factor = np.float32(2.0**stops)
