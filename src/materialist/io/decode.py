@@ -201,14 +201,14 @@ def _exr(path: Path, over: float) -> Decoded:
     with OpenEXR.File(str(path), header_only=True) as file:
         low, high = file.header()["dataWindow"]
     check_size(int(high[0] - low[0] + 1), int(high[1] - low[1] + 1), path)
-    pixels, warnings = read_exr(path), []
+    pixels, laid = read_exr(path), False
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
     if pixels.shape[-1] == 4:
-        if over > 0 and np.any(pixels[..., 3] < 1):
-            warnings.append("Transparent parts are laid over white.")
+        laid = over > 0 and bool(np.any(pixels[..., 3] < 1))
         pixels = pixels[..., :3] + over * np.clip(1 - pixels[..., 3:], 0, 1)
-    return Decoded(np.ascontiguousarray(pixels), True, {}, warnings)
+    warnings = ["Transparent parts are laid over white."] * laid
+    return Decoded(np.ascontiguousarray(pixels), True, {}, warnings, laid)
 
 
 def _hdr(path: Path) -> Decoded:

@@ -27,6 +27,8 @@ class Decoded:
     tags: dict[str, Any] = field(default_factory=dict)
     """EXIF by name."""
     warnings: list[str] = field(default_factory=list)
+    over: bool = False
+    """Whether transparent parts were laid over a radiance of the caller's: an EXR's."""
 
 
 def check_size(width: int, height: int, name: object) -> None:

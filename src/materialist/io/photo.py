@@ -47,12 +47,12 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     decoded = decode_photo(file)
     hdr, stops = False, 0
     if decoded.scene_linear:
-        opaque = decode_photo(file, over=0.0).linear  # what is transparent tells nothing
+        # What is transparent tells nothing.
+        opaque = decode_photo(file, over=0.0).linear if decoded.over else decoded.linear
         hdr = not _is_clipped(opaque)
         stops = _stops(_working(opaque, size)) if hdr else 0
-        if stops and np.any(opaque != decoded.linear):
+        if stops and decoded.over:
             decoded.linear = decode_photo(file, over=2.0**-stops).linear
-        del opaque
     original = decoded.linear
     height, width = original.shape[:2]
     linear = _working(original, size)
