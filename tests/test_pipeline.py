@@ -118,6 +118,7 @@ def test_provenance_names_the_options(scene):
     assert (told["engine"], told["preset"], told["seed"], told["spp"]) == ("transport", "default", 0, 8)
     assert told["envmap_size"] == [32, 16]
     assert told["predictor"].startswith("maps")
+    assert told["completion_asked"] in ("auto", told["completion"]) and told["mask"] is None
 
 
 def test_equal_seeds_give_equal_scenes(folder, scene):
@@ -159,6 +160,9 @@ def test_mask_is_taken_at_working_size(folder):
     scene = invert(**options(folder, mask=mask))
     assert float(np.ptp(scene.materials.roughness[mask])) < 1e-6
     assert float(np.ptp(scene.materials.metallic[mask])) < 1e-6
+    other = invert(**options(folder, mask=mask.T.reshape(mask.shape)))
+    assert scene.provenance["mask"]["pixels"] == other.provenance["mask"]["pixels"] == 48
+    assert scene.provenance["mask"]["sha256"] != other.provenance["mask"]["sha256"]
 
 
 @pytest.mark.parametrize(
@@ -227,16 +231,40 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
     from materialist.pipeline import _report
     from materialist.types import Camera, Materials, Photo, Prediction
 
+    flat = np.ones((8, 8), np.float32)
+    even = np.ones((8, 16, 3), np.float32)
+
     def notes(value, hdr):
         linear = np.full((8, 8, 3), 0.9, np.float32)
         linear[0, 0] = value
-        flat = np.ones((8, 8), np.float32)
         prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
-        found = SimpleNamespace(materials=prior.materials, rerender=linear, stages=())
+        found = SimpleNamespace(materials=prior.materials, rerender=linear, envmap=even, stages=())
         photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
         return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
 
     assert [notes(1.0, False), notes(9.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
+
+
+def test_what_may_be_baked_into_the_albedo_is_said():
+    from types import SimpleNamespace
+
+    from materialist.pipeline import _report
+    from materialist.types import Camera, Materials, Photo, Prediction
+
+    linear, flat = np.full((8, 8, 3), 0.5, np.float32), np.ones((8, 8), np.float32)
+    even = np.ones((8, 16, 3), np.float32)
+    sunny = even.copy()
+    sunny[1, 3] = 500
+    prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
+
+    def notes(envmap, trust):
+        found = SimpleNamespace(materials=prior.materials, rerender=linear, envmap=envmap)
+        photo = Photo(linear, Camera(8, 8, 40.0), linear, False)
+        return " ".join(_report(photo, prior, found, ({"prior_trust": trust},), (), 0.0).warnings)
+
+    assert notes(even, 3.0) == ""
+    assert "hard light" in notes(sunny, 3.0) and "shadows may be baked" in notes(sunny, 3.0)
+    assert "No light explains" in notes(even, 1.0) and "may be baked into the albedo" in notes(even, 1.0)
 
 
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):

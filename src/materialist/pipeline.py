@@ -6,6 +6,7 @@ import resource
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.photo import HDR_CLIP
+from materialist.render.envmap import is_peaked
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
@@ -124,7 +126,9 @@ def invert(
         depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": best.completion, "ends": [asdict(e) for e in best.ends], "tau": tau, "strategy": strategy,
+            "completion": best.completion, "completion_asked": completion, "ends": [asdict(e) for e in best.ends],
+            "tau": tau, "strategy": strategy, "mask": _named(mask),
+            "settings": asdict(settings) if overrides.get("settings") else None,
             "seed": seed, "spp": spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
@@ -174,7 +178,12 @@ def _report(
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
     measured = next((s for s in stages if "prior_trust" in s), {"prior_trust": None})
     if measured["prior_trust"] == 1.0:
-        notes.append("No light explains the photo with the predicted materials; they were changed to match it.")
+        notes.append(
+            "No light explains the photo with the predicted materials; they were changed to match it, and shadows or "
+            "shading may be baked into the albedo."
+        )
+    elif is_peaked(found.envmap):
+        notes.append("The photo has hard light: its shadows may be baked into the albedo.")
     poor = float((residual > 0.1).mean())
     if poor > 0.05:
         notes.append(f"The re-rendering is off by more than 0.1 (sRGB) on {poor:.0%} of the pixels; see overview.png.")
@@ -191,6 +200,14 @@ def _report(
         },
         warnings=tuple(notes),
     )
+
+
+def _named(mask: Array | None) -> dict[str, Any] | None:
+    """What the provenance keeps of a mask [H, W] bool: its size, and by what to know it again."""
+    if mask is None:
+        return None
+    packed = np.packbits(np.asarray(mask, bool))
+    return {"pixels": int(np.sum(mask)), "sha256": sha256(packed.tobytes()).hexdigest()}
 
 
 def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:

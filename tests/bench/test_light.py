@@ -20,6 +20,21 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     assert better > 3 + metrics.psnr(sample.render(grey, spp=64), photo)
 
 
+def test_without_materials_the_paper_s_neutral_ones_are_given(sample, monkeypatch):
+    """ "w/o mat": A = R = 0.5 and M = 0.1 everywhere, whatever the true ones are."""
+    from materialist.fit.engine import PathEngine
+
+    seen = []
+    monkeypatch.setattr(PathEngine, "light_problem", lambda self, materials: seen.append(materials) or 1 / 0)
+    for name in ("paper path 128x64", "paper path w/o mat"):
+        with pytest.raises(ZeroDivisionError):
+            light.fit(sample, light.METHODS[name], "auto", device="cpu")
+    true, neutral = seen
+    assert np.array_equal(true.albedo, sample.truth.materials.albedo)
+    assert neutral.albedo.shape == true.albedo.shape and (neutral.albedo == 0.5).all()
+    assert (neutral.roughness == 0.5).all() and np.allclose(neutral.metallic, 0.1)
+
+
 def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
     out = bench.run(
         "light",

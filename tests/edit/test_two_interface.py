@@ -1,10 +1,13 @@
 """The two-interface model, against slabs, balls and energy in closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays, project
 from materialist.edit import two_interface as ti
+from materialist.edit.dielectric import fresnel_dielectric, masking
 from materialist.errors import InputError
 from materialist.types import Camera
 
@@ -174,6 +177,28 @@ def test_rough_glass_blurs():
     inner = np.s_[10:30, 10:38]
     assert rough[inner].std() < 0.4 * clear[inner].std()
     assert rough[inner].mean() == pytest.approx(clear[inner].mean(), rel=0.15)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 45.0, 75.0])
+@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
+def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
+    """F D G / (4 cos_i cos_o) over the upper hemisphere, by quadrature: nothing is reflected below the surface."""
+    alpha, angle = roughness**2, np.deg2rad(tilt)
+    view, up = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([0, 0, 1.0])
+    cosine, azimuth = np.meshgrid((np.arange(1500) + 0.5) / 1500, (np.arange(600) + 0.5) / 600 * 2 * np.pi)
+    sine = np.sqrt(1 - cosine**2)
+    out = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
+    half = (view + out) / np.linalg.norm(view + out, axis=-1, keepdims=True)
+    normals = alpha**2 / (np.pi * (half[..., 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
+    value = fresnel_dielectric(half @ view, 1.5) * normals * masking(out, up, alpha) * masking(view, up, alpha)
+    expected = 2 * np.pi * (value / (4 * view[2])).mean()
+    count = 3000
+    front = SimpleNamespace(
+        point=np.zeros((1, 3)), direction=-view[None], normal=up[None], way=lambda _, d: d, back_at=lambda *_: -up[None]
+    )
+    found = [ti.cross(front, np.ones(1), ior=1.5, alpha=alpha, sample=(k, count)) for k in range(count)]
+    assert np.mean([c.reflectance for c in found]) == pytest.approx(expected, rel=0.02)
+    assert all(c.reflected[0, 2] > 0 for c in found if c.reflectance[0] > 0)
 
 
 def test_distance_to_a_slanting_background():

@@ -7,7 +7,11 @@ import pytest
 import torch
 from transport_scenes import furnished_room
 
-from materialist.fit.light import SEEN, STIFFEST, stiffness
+from materialist.fit.engine import LightProblem
+from materialist.fit.fields import EnvmapMLP
+from materialist.fit.light import SEEN, STIFFEST, fit_light, stiffness
+from materialist.fit.loop import Schedule
+from materialist.fit.settings import LightSettings
 from materialist.transport.cache import TransportCache
 from materialist.transport.light import light_matrix
 
@@ -39,3 +43,21 @@ def test_hidden_texels_are_stiff(matrix):
     middle = 2 * HEIGHT * HEIGHT // 4
     assert float(flat[middle]) == pytest.approx(SEEN / (middle / (2 * HEIGHT * HEIGHT - 1)))
     assert (flat.diff() <= 0).all()
+
+
+@pytest.mark.parametrize("rows, asked", [(4, (4, False)), (8, (8, False)), (16, (8, True))])
+def test_a_map_of_few_texels_is_what_is_fitted(rows, asked):
+    """The ablation of 32 x 16 constrains the map; a finer one than the light matrix is sampled inside its texels."""
+
+    class Recorded(EnvmapMLP):
+        def forward(self, height, jitter=None):
+            heights.add((height, jitter is not None))
+            return super().forward(height, jitter)
+
+    heights, taken = set(), []
+    problem = LightProblem(
+        torch.arange(2), HEIGHT, lambda envmap: (taken.append(envmap), envmap[:1, :2].flatten(0, 1))[1]
+    )
+    settings = LightSettings(field="mlp", height=rows, schedule=Schedule(max_steps=2))
+    fit_light(problem, torch.ones(2, 3), Recorded(), settings)
+    assert heights == {asked} and all(envmap.shape == (HEIGHT, 2 * HEIGHT, 3) for envmap in taken)

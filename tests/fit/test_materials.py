@@ -53,3 +53,22 @@ def test_where_the_prior_says_dielectric_metal_must_win_clearly():
     between = price + SETTINGS.doubt / 2
     assert start_of(0.0, between, dielectric=1.0) < 0.1
     assert start_of(0.0, between, dielectric=1.0, doubt=0.0) > 0.9
+
+
+def test_a_region_of_one_metallic_decides_as_one():
+    """Two pixels gain more than the other two lose: alone they part, under one mask all of them start as metal."""
+    gain = torch.tensor([0.6, 0.6, -0.2, -0.2])[:, None]
+    photo, prior = torch.full((4, 3), 0.5), priors([0.3] * 4)
+    metal = lambda m: (m[:, 4:].detach() > 0.5).float()  # noqa: E731
+    problem = MaterialProblem(
+        lambda m: photo + gain.clamp(min=0) * (1 - metal(m)) - gain.clamp(max=0) * metal(m) + 0 * m[:, :3], None
+    )
+    settings = replace(SETTINGS, encoding="linear")
+
+    def found(inside):
+        start = better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost, inside=inside, steps=1)
+        return (start[:, 4] > 0.5).tolist()
+
+    assert found(None) == [True, True, False, False]
+    assert found(torch.ones(4, dtype=torch.bool)) == [True] * 4
+    assert found(torch.tensor([False, False, True, True])) == [True, True, False, False]

@@ -62,7 +62,7 @@ class Crossing:
     reflected: Array
     """[N, 3] unit direction of the reflection at the front."""
     reflectance: Array
-    """[N] of the front."""
+    """[N] of the front; what its roughness hides of the reflection stays inside."""
 
 
 def two_interface(
@@ -187,8 +187,10 @@ def cross(
     points[1] = (k + 0.5) / n
     facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
     inner, _ = refract(front.direction, facet, 1 / ior)
-    reflectance = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
-    share = (1 - reflectance) * _unmasked(inner, front.normal, alpha, below=True)
+    mirrored = reflect(front.direction, facet)
+    fresnel = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
+    reflectance = fresnel * _unmasked(mirrored, front.normal, alpha, below=False)
+    share = (1 - fresnel) * _unmasked(inner, front.normal, alpha, below=True)
     exit_point = front.point + front.way(inner, d1)[:, None] * inner
     outward = front.back_at(exit_point, back)
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
@@ -197,8 +199,6 @@ def cross(
     direction, total = refract(inner, facet, ior)
     passed = 1 - fresnel_dielectric(-np.sum(inner * facet, -1), 1 / ior)
     passed = np.where(total, 1.0, passed) * _unmasked(direction, against, alpha, below=~total)
-    mirrored = reflect(front.direction, front.normal if alpha <= 0 else visible_facet(
-        front.direction, front.normal, alpha, points[0], points[1]))  # fmt: skip
     return Crossing(exit_point, direction, share * passed, mirrored, reflectance)
 
 

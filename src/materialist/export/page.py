@@ -77,7 +77,7 @@ def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
         if isinstance(value, list | tuple):
             plain = all(isinstance(one, int | float | str) for one in value)
             yield key, " x ".join(map(str, value)) if plain and value else f"{len(value)} of them"
-        elif not isinstance(value, dict):
+        elif value is not None and not isinstance(value, dict):
             yield key, value
 
 

@@ -146,7 +146,9 @@ class Fit:
         )
         photo = self._photo()[self.engine.pixels]
         if settings.other_metallic is not None and settings.field == "maps" and first and not stages:
-            start = better_start(problem, photo, start, held, settings, self._smooth, progress=self.progress)
+            start = better_start(
+                problem, photo, start, held, settings, self._smooth, inside=inside, progress=self.progress
+            )
         model = material_field(
             start, replace(settings, remap=False), self.engine.pixels, self.photo.camera, inside=inside, seed=self.seed
         )

@@ -9,7 +9,7 @@ from torch import nn
 
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
-from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels
+from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
 from materialist.fit.loop import Progress, StageResult, optimise
 from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual
 from materialist.fit.settings import LightSettings
@@ -73,9 +73,7 @@ def fit_light(
     weight = None if problem.matrix is None else stiffness(problem.matrix)
 
     def loss(_: int) -> torch.Tensor:
-        # The full map is costly to evaluate: a coarser light matrix is served by random points of its texels.
-        full = problem.height >= settings.height or settings.field == "texels"
-        envmap = field(problem.height, None if full else jitter)
+        envmap = _seen(field, settings, problem.height, jitter)
         radiance = problem.render(envmap) if slack is None else problem.render(envmap, slack)
         value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped))
         if slack is not None:
@@ -90,6 +88,17 @@ def fit_light(
             slack.clamp_(0, 1)
 
     return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)
+
+
+def _seen(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:
+    """[height, 2 height, 3] of a field whose map has `settings.height` rows.
+
+    A coarser map is what is optimised, enlarged. A finer one is costly to evaluate: a coarser light matrix is served by
+    random points of its texels.
+    """
+    if settings.height <= height:
+        return resize_envmap(field(settings.height), height)
+    return field(height, None if settings.field == "texels" else jitter)
 
 
 def stiffness(matrix: LightMatrix) -> torch.Tensor:

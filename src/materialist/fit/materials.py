@@ -71,13 +71,15 @@ def better_start(
     settings: MaterialSettings,
     smooth: Callable[[torch.Tensor], torch.Tensor],
     *,
+    inside: torch.Tensor | None = None,
     steps: int = 25,
     progress: Progress | None = None,
 ) -> torch.Tensor:
     """[P, 5] maps to start from: `start`, or where it fits better after `steps` steps, another metallic.
 
-    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide. Where the prior says
-    dielectric, the other start must win by `settings.doubt`: what fits either way stays what it was.
+    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide; pixels `inside` [P]
+    bool, which get one metallic (see `Unified`), decide together. Where the prior says dielectric, the other start must
+    win by `settings.doubt`: what fits either way stays what it was.
     """
     assert settings.other_metallic is not None
     other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
@@ -94,7 +96,10 @@ def better_start(
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
     doubt = settings.doubt * _below(prior[:, 4], DIELECTRIC[0]) * _dearer(prior, settings)
-    return torch.where(costs[1] < costs[0] - smooth(doubt[:, None]), candidates[1], candidates[0])
+    gain = costs[0] - costs[1] - smooth(doubt[:, None])  # of the other start
+    if inside is not None:
+        gain = torch.where(inside[:, None], gain[inside].mean(), gain)
+    return torch.where(gain > 0, candidates[1], candidates[0])
 
 
 def fit_materials(
