@@ -58,15 +58,18 @@ class Finding:
     """The one command that mends it; empty when there is nothing to mend."""
 
 
-def examine() -> list[Finding]:
-    """Look at everything the program needs; takes a few seconds and never raises."""
+def examine(device: str = "auto") -> list[Finding]:
+    """Look at everything the program needs; takes a few seconds and never raises.
+
+    With `device` "cuda" a GPU is no option: where it is missing the main job cannot run.
+    """
     llvm, path = _llvm()
     return [
         _python(),
         *(_package(name) for name in ("torch", "mitsuba", "drjit")),
         llvm,
         _renderer(path),
-        _cuda(),
+        _cuda(needed=device == "cuda"),
         *(_extra(name, *what) for name, what in _EXTRAS.items()),
         _weights(),
         _memory(),
@@ -128,8 +131,15 @@ def _apt(library: str) -> str:
     return f"sudo apt-get install -y {package_of(library)}"
 
 
-def _cuda() -> Finding:
+def _cuda(needed: bool = False) -> Finding:
     """Whether an NVIDIA driver answers."""
+    found = _driver()
+    if needed and found.state != "ok":
+        return Finding(found.name, "broken", found.detail.split(";")[0], "materialist doctor --device cpu")
+    return found
+
+
+def _driver() -> Finding:
     tool = shutil.which("nvidia-smi")
     if tool is None:
         return Finding("GPU (CUDA)", "missing", "no NVIDIA driver; everything runs on the CPU")

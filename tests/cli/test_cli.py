@@ -272,3 +272,20 @@ def test_a_photo_is_read_once_saved_scenes_keep_their_bytes(run, photo, tmp_path
     scene = load_scene(tmp_path / "a.scene")
     save_scene(scene, tmp_path / "b.scene")
     assert (tmp_path / "b.scene/maps/albedo.exr").read_bytes() == (tmp_path / "a.scene/maps/albedo.exr").read_bytes()
+
+
+def test_every_command_takes_seed_device_and_json():
+    """What scripts pass to all of them, but for those that compute nothing."""
+    import typer
+
+    def commands(group, name=""):
+        for word, command in getattr(group, "commands", {}).items():
+            yield from commands(command, f"{name} {word}".strip())
+        if not hasattr(group, "commands"):
+            yield name, {option for parameter in group.params for option in parameter.opts}
+
+    found = dict(commands(typer.main.get_command(app)))
+    assert {"invert", "studio", "doctor", "train refraction", "bench"} <= set(found)
+    lacking = {name: {"--seed", "--device", "--json"} - options for name, options in found.items()}
+    idle = {"models list", "models download", "models verify", "train export"}
+    assert {name for name, options in lacking.items() if options} == idle

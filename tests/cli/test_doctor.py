@@ -67,13 +67,18 @@ def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
 
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("missing", 0), ("broken", 2)])
 def test_exit_code_follows_the_main_job(monkeypatch, capsys, state, code):
-    monkeypatch.setattr(doctor, "examine", lambda: [Finding("LLVM", state, "19", "mend it")])
+    monkeypatch.setattr(doctor, "examine", lambda device: [Finding("LLVM", state, "19", "mend it")])
     assert run_to_exit_code(app, ["doctor"]) == code
     shown = capsys.readouterr().out
     assert "LLVM" in shown and "mend it" in shown
     assert run_to_exit_code(app, ["doctor", "--json"]) == code
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert last["ok"] is (code == 0) and last["findings"][0]["remedy"] == "mend it"
+
+
+def test_a_gpu_that_is_asked_for_must_be_there(monkeypatch):
+    monkeypatch.setattr(doctor.shutil, "which", lambda _: None)
+    assert doctor._cuda().state == "missing" and doctor._cuda(needed=True).state == "broken"
 
 
 def test_this_machine():

@@ -24,7 +24,7 @@ elif spec["how"] == "die":
 elif spec["how"] == "noise":
     print("not json"); print("[1, 2]"); tell(found="albedo", file="a.jpg"); tell(result={"a": 1})
 else:
-    tell(result={"a": 1})
+    tell(result={"a": 1, "device": spec["device"]})
 """
 
 
@@ -77,6 +77,7 @@ def test_order_limit_and_stop(jobs, tmp_path):
     jobs.stop(second)
     jobs.stop(first)
     until(lambda: third.over)
+    assert third.result["device"] == "auto"
     assert (first.state, second.state, third.state) == (STOPPED, STOPPED, DONE)
     assert process.poll() is not None and second.process is None
     assert not list((tmp_path / "out").glob(f".partial-{process.pid}*"))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from materialist.cli.options import Json
+from materialist.cli.options import Device, DeviceOption, Json, Seed
 from materialist.cli.outcome import BAD_INPUT, report_success
 
 if TYPE_CHECKING:
@@ -20,11 +20,11 @@ def register(app: typer.Typer) -> None:
     app.command("doctor")(doctor)
 
 
-def doctor(as_json: Json = False) -> None:
-    """Say what works here, what does not, and the one command that mends it."""
+def doctor(seed: Seed = 0, device: DeviceOption = Device.auto, as_json: Json = False) -> None:
+    """Say what works here, what does not, and the one command that mends it; with --device cuda a GPU must be there."""
     from materialist.doctor import examine
 
-    findings = examine()
+    findings = examine(device.value)
     broken = [finding for finding in findings if finding.state == "broken"]
     if not as_json:
         _show(findings)

@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from materialist.cli.options import Device, DeviceOption, Json
+from materialist.cli.outcome import report_success
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -30,6 +33,9 @@ def studio(
     password: Annotated[str | None, typer.Option(metavar="WORD", help="Ask everyone for it.")] = None,
     everyone: Annotated[bool, typer.Option("--open", help="Let everybody in who can reach --host.")] = False,
     workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Random seed of inversions.")] = 0,
+    device: DeviceOption = Device.auto,
+    as_json: Json = False,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio.server import check_host, check_port, first_target, new_hub, serve
@@ -37,13 +43,17 @@ def studio(
 
     alone = check_host(host, password, everyone)
     check_port(host, port)
-    hub = new_hub(work or default_root(), alone=alone, workers=workers)
+    if device is not Device.auto:
+        from materialist.render.variant import setup
+
+        setup(device.value)
+    hub = new_hub(work or default_root(), alone=alone, workers=workers, seed=seed, device=device.value)
     hub.start = first_target(hub.work, target)
-    typer.echo(f"Scenes and edits are kept in {hub.work.root}")
-    serve(
-        hub,
-        host=host,
-        port=port,
-        password=password,
-        told=lambda address: typer.echo(f"The studio is open at {address} (Ctrl-C ends it)"),
-    )
+    if not as_json:
+        typer.echo(f"Scenes and edits are kept in {hub.work.root}")
+
+    def told(address: str) -> None:
+        lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
+        report_success("studio", as_json, lines, address=address, work=str(hub.work.root))
+
+    serve(hub, host=host, port=port, password=password, told=told)

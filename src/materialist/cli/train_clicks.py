@@ -11,6 +11,8 @@ from materialist.cli.options import (
     Batch,
     Bfloat16,
     CheckpointSeconds,
+    Device,
+    DeviceOption,
     Json,
     Minutes,
     Rate,
@@ -39,6 +41,7 @@ def clicks(
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,
+    device: DeviceOption = Device.auto,
     as_json: Json = False,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
@@ -55,7 +58,7 @@ def clicks(
         produce(data, output / "views", progress)
         trainer = Trainer(
             output, output / "views", budget=budget, recipe=recipe, seed=seed, every=every, resume=resume, init=init,
-            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
+            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
         )  # fmt: skip
         figures = trainer.run(progress)
     lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]

@@ -11,6 +11,8 @@ from materialist.cli.options import (
     Batch,
     Bfloat16,
     CheckpointSeconds,
+    Device,
+    DeviceOption,
     Json,
     Minutes,
     Rate,
@@ -44,6 +46,7 @@ def refraction(
     resume: ResumeRun = False,
     every: CheckpointSeconds = 180,
     seed: Seed = 0,
+    device: DeviceOption = Device.auto,
     as_json: Json = False,
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
@@ -69,7 +72,7 @@ def refraction(
             return
         trainer = Trainer(
             output, train, aside, budget=budget, recipe=recipe, seed=seed, every=every, resume=resume,
-            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True),
+            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
         )  # fmt: skip
         figures = trainer.run(progress)
     lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]

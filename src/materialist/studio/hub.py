@@ -35,6 +35,8 @@ class Hub:
     start: Project | Path | None = None
     """What to open first: a scene, or a photo to show on the opening tab."""
     examples: bool = True
+    seed: int = 0
+    """Of inversions."""
     run: str = field(default_factory=lambda: secrets.token_hex(4))
     """Tells this studio from the ones before it in what a browser keeps."""
     _sessions: dict[str, Session] = field(default_factory=dict)

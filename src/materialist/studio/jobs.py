@@ -54,9 +54,10 @@ class Job:
 
 
 class Jobs:
-    """Runs at most `limit` jobs at a time, in the order they came."""
+    """Runs at most `limit` jobs at a time, in the order they came, on a device of `invert`."""
 
-    def __init__(self, limit: int = 1):
+    def __init__(self, limit: int = 1, device: str = "auto"):
+        self.device = device
         self._pool = ThreadPoolExecutor(limit, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._jobs: list[Job] = []
@@ -118,7 +119,7 @@ class Jobs:
                 return
         process = job.process
         try:
-            child.ask(process, job.spec)
+            child.ask(process, {**job.spec, "device": self.device})
             for entry in child.lines(process):
                 _take(job, entry)
             code = process.wait()

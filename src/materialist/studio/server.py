@@ -105,11 +105,11 @@ def serve(
         shutil.rmtree(hub.work.cache, ignore_errors=True)
 
 
-def new_hub(work: str | Path, *, alone: bool, workers: int = 1) -> Hub:
+def new_hub(work: str | Path, *, alone: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Hub:
     """A hub on a work folder. Raises OutputError where it cannot be written."""
     if not 1 <= workers <= 64:
         raise InputError(f"--workers is a number from 1 to 64, not {workers}.")
-    return Hub(WorkFolder(work), Jobs(workers), alone)
+    return Hub(WorkFolder(work), Jobs(workers, device), alone, seed=seed)
 
 
 def _door(password: str | None) -> Any:

@@ -175,6 +175,7 @@ def _begun(
     job = hub.jobs.submit(
         "invert", session.person, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
         predictor=predictor, size=int(size), fov=fov.strip() or "auto",
+        seed=hub.seed,
     )  # fmt: skip
     return project, job
 

@@ -16,6 +16,15 @@ Progress = Any
 """A `worker.Reporter`: progress(stage, done, total), and progress.found(name, file)."""
 
 
+def do(progress: Progress, kind: str, device: str = "auto", **spec: Any) -> dict[str, Any]:
+    """The task of a kind, on a device of `invert`."""
+    if device != "auto":
+        from materialist.render.variant import setup
+
+        setup(device)  # for the whole process
+    return globals()[f"do_{kind}"](progress, **spec)
+
+
 def do_photo(progress: Progress, photo: str, thumbnail: str) -> dict[str, Any]:
     """Read a photo: its size and field of view, and a small picture of it in the file `thumbnail`."""
     from materialist.io.photo import read_photo

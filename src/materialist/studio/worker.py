@@ -30,7 +30,7 @@ def main() -> None:
     from materialist.studio import tasks
 
     try:
-        tell({"result": getattr(tasks, f"do_{spec.pop('kind')}")(Reporter(tell), **spec)})
+        tell({"result": tasks.do(Reporter(tell), **spec)})
     except Exception as error:
         tell({"error": sentence(error)})
     # Without the interpreter's own goodbye: libraries with threads take seconds over it.

@@ -46,15 +46,24 @@ class Processes:
             distributed.destroy_process_group()
 
 
-def join(device: str = "auto") -> Processes:
-    """Take the place that torchrun gave this process, or be alone; raises SetupError when there is no such device."""
+def place_of(device: str = "auto") -> torch.device:
+    """Where this process trains: `auto` (CUDA where there is one), `cpu` or `cuda`.
+
+    Raises SetupError when there is no such device.
+    """
     if device == "cuda" and not torch.cuda.is_available():
         raise SetupError("There is no CUDA device that PyTorch can use; train with --device cpu.")
-    cuda = device != "cpu" and torch.cuda.is_available()
+    if device == "cpu" or not torch.cuda.is_available():
+        return torch.device("cpu")
+    return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
+
+
+def join(device: str = "auto") -> Processes:
+    """Take the place that torchrun gave this process, or be alone; raises SetupError when there is no such device."""
+    place = place_of(device)
     world, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
-    place = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if cuda else torch.device("cpu")
-    if cuda:
+    if place.type == "cuda":
         torch.cuda.set_device(place)
     if world > 1:
-        distributed.init_process_group("nccl" if cuda else "gloo")
+        distributed.init_process_group("nccl" if place.type == "cuda" else "gloo")
     return Processes(rank, world, place)

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from materialist.errors import InputError
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
+from materialist.train.launch import place_of
 
 CURVE = "curve.jsonl"
 """Mean losses of the steps since the last line, every REPORT_STEPS steps."""
@@ -51,14 +52,15 @@ class Run(ABC):
 
     def __init__(
         self, folder: Path, network: Callable[[], nn.Module], recipe: Recipe, *, budget: Budget, seed: int = 0,
-        every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
+        every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None, device: str = "auto",
     ):  # fmt: skip
         """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off, InputError when it is
-        of another network."""
-        state = checkpoint.begun(folder, self.kind, resume=resume)
+        of another network, SetupError when there is no such device."""
+        self.device = place_of(device)
+        state = checkpoint.begun(folder, self.kind, resume=resume, device=self.device)
         self.folder, self.recipe, self.note, self.seed, self.every = folder, recipe, note, seed, every
         torch.manual_seed(seed)
-        self.network: Any = network()
+        self.network: Any = network().to(self.device)
         self.averaged: Any = copy.deepcopy(self.network).requires_grad_(False).eval()
         learnt = [p for p in self.network.parameters() if p.requires_grad]
         self.optimizer = torch.optim.AdamW(
@@ -113,6 +115,7 @@ class Run(ABC):
 
     def save(self) -> dict[str, float]:
         """Write the checkpoint, the scores of the averaged weights, and these as float16."""
+        self.averaged.cpu()  # where it is judged, and written from
         figures = self.figures()
         state = {
             "kind": self.kind, "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
@@ -126,6 +129,7 @@ class Run(ABC):
             **line, "views": self.clock.step * self.recipe.batch, "recipe": asdict(self.recipe), "scores": figures
         }  # fmt: skip
         self.write(self.folder / WEIGHTS, facts)
+        self.averaged.to(self.device)
         self.note(f"step {self.clock.step}  " + "  ".join(f"{k} {v:.3f}" for k, v in figures.items()))
         return figures
 
@@ -145,12 +149,13 @@ class Run(ABC):
 
     def _step(self, batch: dict[str, Tensor]) -> dict[str, float]:
         recipe = self.recipe
+        batch = {name: value.to(self.device) for name, value in batch.items()}
         for group in self.optimizer.param_groups:
             group["lr"] = recipe.rate * self.clock.rate(recipe.warm_up, recipe.last_rate)
-        with torch.autocast("cpu", torch.bfloat16, enabled=recipe.bfloat16):
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=recipe.bfloat16):
             found = self.network(batch["maps"])
         terms = self.terms(found, batch)
-        loss = sum(terms.values(), torch.zeros(()))
+        loss = sum(terms.values(), torch.zeros((), device=self.device))
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), recipe.clip)

@@ -66,7 +66,7 @@ class Trainer(small.Run):
     def __init__(
         self, folder: Path, views: Path, *, budget: Budget, recipe: Recipe | None = None, seed: int = 0,
         every: float = 180, resume: bool = False, init: Path | None = None,
-        note: Callable[[str], None] = lambda _: None,
+        note: Callable[[str], None] = lambda _: None, device: str = "auto",
     ):  # fmt: skip
         """Start a run, from the weights in `init`, or resume one. Raises OutputError for a second start."""
         found = load(views)
@@ -76,7 +76,7 @@ class Trainer(small.Run):
         self.views, self.aside = found[: len(found) - aside], found[len(found) - aside :]
         super().__init__(
             folder, lambda: _begun(init), recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume,
-            note=note,
+            note=note, device=device,
         )  # fmt: skip
 
     def figures(self) -> dict[str, float]:

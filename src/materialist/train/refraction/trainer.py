@@ -56,13 +56,15 @@ class Trainer(small.Run):
     def __init__(
         self, folder: Path, data: Path, heldout: Path | None, *, budget: Budget, recipe: Recipe | None = None,
         seed: int = 0, every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
+        device: str = "auto",
     ):  # fmt: skip
         """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off."""
         self.data = data
         self.kept_aside = None if heldout is None else lessons.load(heldout)
         super().__init__(
-            folder, RefractionNet, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note
-        )
+            folder, RefractionNet, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note,
+            device=device,
+        )  # fmt: skip
 
     def figures(self) -> dict[str, float]:
         """Scores on the shapes kept aside."""
