@@ -13,6 +13,7 @@ BENCHMARKS = (
     "invert",
     "batch",
     "light",
+    "ablation",
     "materials",
     "whdr",
     "predictor",
