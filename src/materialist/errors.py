@@ -23,5 +23,11 @@ class SceneError(MaterialistError):
     """A scene package that is missing, incomplete, or of an unknown format version."""
 
 
+class Interrupted(MaterialistError):
+    """Ctrl-C, where something was kept that one can go on with; the message says what."""
+
+    exit_code = 130
+
+
 class OutputError(MaterialistError):
     """A result that cannot be written: the target exists, or the disk is full or read-only."""

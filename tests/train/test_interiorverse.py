@@ -70,9 +70,10 @@ def test_one_part_alone_and_what_is_wrong(folder):
         InteriorVerse(folder, "dev")
     with pytest.raises(InputError, match="no pictures of the InteriorVerse split 'test'"):
         InteriorVerse(folder, "test")
+    source = InteriorVerse(folder)
     (folder / "dataset_85" / "L3D1" / "000_depth.exr").unlink()
     with pytest.raises(InputError, match=r"000_depth\.exr is missing"):
-        InteriorVerse(folder).read(0)
+        source.read(0)
     write_exr(folder / "dataset_85" / "L3D1" / "000_depth.exr", np.ones((5, 5), np.float32))
     with pytest.raises(InputError, match=r"000_depth\.exr is \(5, 5\)"):
         InteriorVerse(folder).read(0)
@@ -89,6 +90,11 @@ def test_what_is_lost_is_told(folder):
     (folder / "dataset_85" / "L3D1" / "001_albedo.exr").unlink()
     source = InteriorVerse(folder)
     assert source.bare == 1 and len(source) == 3
+    normal = source.pictures[0].with_name(source.pictures[0].name.replace("_im", "_normal"))
+    kept = normal.read_bytes()
+    normal.unlink()
+    assert InteriorVerse(folder).bare == 2, "a picture without normals is none"
+    normal.write_bytes(kept)
     first, second = source.notes()
     assert first.startswith("2 scenes of the split 'train' are not there (dataset_85/LOST") and second.startswith(
         "1 pic"

@@ -65,20 +65,22 @@ def test_a_run_goes_on(run, data):
     assert after["step"] == 63 and after["epoch"] > before["epoch"] and after["seconds"] > before["seconds"]
 
 
-def test_a_terminated_run_leaves_a_checkpoint(data, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_told_to_end_leaves_a_checkpoint(data, tmp_path, number):
+    before = signal.getsignal(number)
     trainer = made_runs.trainer(data, tmp_path / "run", steps=10_000)
     step, seen = trainer._step, []
 
     def third_step_is_the_last(batch):
         seen.append(step(batch))
         if len(seen) == 3:
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.kill(os.getpid(), number)
         return seen[-1]
 
     trainer._step = third_step_is_the_last
     assert trainer.run() == {}
     assert checkpoint.load(tmp_path / "run")["step"] == 3
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert trainer.interrupted is (number == signal.SIGINT) and signal.getsignal(number) == before
 
 
 def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_path):
@@ -204,9 +206,46 @@ def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
 
 
 def test_kept_aside_samples_are_never_trained_on():
-    trained = stream.trained_on(100)
+    trained = stream.trained_on(range(100))
     assert len(trained) == 98 and not {39, 79} & set(trained)
-    assert stream.trained_on(5) == [0, 1, 2, 3, 4]
+    assert stream.trained_on(range(5)) == [0, 1, 2, 3, 4]
+
+
+def test_a_sample_that_goes_moves_no_other_one(tmp_path):
+    """Which samples are kept aside is told by their own numbers, not by their places."""
+    (tmp_path / "samples").mkdir()
+    for k in range(90):
+        (tmp_path / "samples" / f"{k:07d}.npz").touch()
+    source = SampleFolder(tmp_path)
+    before = {source.number(k) for k in stream.trained_on(source)}
+    (tmp_path / "samples" / "0000005.npz").unlink()
+    source.refresh()
+    assert {source.number(k) for k in stream.trained_on(source)} == before - {5}
+    assert not {39, 79} & before
+
+
+def test_samples_kept_aside_that_cannot_be_read_are_left_out(tmp_path, caplog):
+    source = SampleFolder(made_samples.write_set(tmp_path, 3))
+    (tmp_path / "samples" / "0000001.npz").write_bytes(b"no sample")
+    assert len(stream.kept_aside(source, 3)) == 2 and "0000001.npz" in caplog.text
+    trainer = made_runs.trainer(tmp_path, tmp_path / "run", steps=1)
+    for path in (tmp_path / "samples").iterdir():
+        path.write_bytes(b"no sample")
+    assert stream.kept_aside(source, 3) == [] and trainer.score() == {}
+
+
+def test_the_error_of_a_loading_worker_is_one_sentence_and_ends_them(tmp_path):
+    """Not the worker's traceback; and nothing is left that could keep the command from ending."""
+    import multiprocessing
+
+    source = SampleFolder(made_samples.write_set(tmp_path, 4))
+    for path in (tmp_path / "samples").iterdir():
+        path.write_bytes(b"no sample")
+    with pytest.raises(InputError, match="cannot be read") as caught:
+        list(stream.epoch(source, BundledTask(), number=1, size=32, seed=0, workers=1, batch=2))
+    assert "Traceback" not in str(caught.value)
+    del caught
+    assert not multiprocessing.active_children()
 
 
 def test_the_rate_rises_falls_and_is_restarted():

@@ -22,6 +22,8 @@ from materialist.errors import MaterialistError
 from materialist.plain import plain
 
 OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+KEEPING = frozenset({"train", "batch", "bench", "models", "studio"})
+"""Commands that write as they go; the others write whole results, or nothing."""
 GRACE = 5.0
 """Seconds in which a command that is told to end may take its unfinished files away."""
 
@@ -38,7 +40,8 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     except MaterialistError as error:
         return _fail(type(error).__name__, str(error), error.exit_code, wants_json)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail("Interrupted", "Interrupted; nothing was written.", INTERRUPTED, wants_json)
+        done = "what was finished is kept" if KEEPING.intersection(arguments[:1]) else "nothing was written"
+        return _fail("Interrupted", f"Interrupted; {done}.", INTERRUPTED, wants_json)
     except _Terminated:
         os.kill(os.getpid(), signal.SIGTERM)
         return BUG  # not reached

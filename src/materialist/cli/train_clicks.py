@@ -22,6 +22,7 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
+from materialist.errors import Interrupted
 
 
 def register(app: typer.Typer) -> None:
@@ -53,13 +54,19 @@ def clicks(
 
     budget = Budget(steps=steps, minutes=40 if steps is None and minutes is None else minutes)
     recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
+    note = (lambda _: None) if as_json else lambda text: typer.echo(text, err=True)
+    if init is not None and resume and checkpoint.there(output):
+        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
+        init = None
     checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
     with StageProgress(quiet=as_json) as progress:
         produce(data, output / "views", progress)
         trainer = Trainer(
             output, output / "views", budget=budget, recipe=recipe, seed=seed, every=every, resume=resume, init=init,
-            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
+            note=note, device=device.value,
         )  # fmt: skip
         figures = trainer.run(progress)
+    if trainer.interrupted:
+        raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
     lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
     report_success("train clicks", as_json, lines, run=str(output), step=trainer.clock.step, **figures)

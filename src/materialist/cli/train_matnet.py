@@ -21,6 +21,7 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
+from materialist.errors import Interrupted
 
 
 class Config(StrEnum):
@@ -66,6 +67,7 @@ def matnet(
     budget = Budget(steps=steps, minutes=minutes)
     chosen = recipe(config.value, batch=batch, size=size, rate=rate)
     from materialist.cli.progress import StageProgress
+    from materialist.train import checkpoint
     from materialist.train.launch import join
     from materialist.train.sources import open_source
     from materialist.train.tasks import task
@@ -73,19 +75,26 @@ def matnet(
 
     processes = join(device.value)
     quiet = as_json or not processes.first
+    note = (lambda _: None) if quiet else lambda text: typer.echo(text, err=True)
+    if init is not None and resume and checkpoint.there(output):
+        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
+        init = None
     habits = Habits(checkpoint_seconds=every, score_samples=score_samples, workers=workers, seed=seed)
     try:
         with StageProgress(quiet=quiet) as progress:
             trainer = Trainer(
                 chosen, task(chosen, {"init": init} if init else None), open_source(data), output,
                 budget=budget, habits=habits, processes=processes, resume=resume,
-                note=(lambda _: None) if quiet else lambda text: typer.echo(text, err=True),
+                note=note,
             )  # fmt: skip
             figures = trainer.run(progress)
     finally:
         processes.leave()
     if processes.first:
-        lines = [f"{output}: step {trainer.clock.step}.", f"Look at {output / 'sheet.png'}"]
+        if trainer.interrupted:
+            raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
+        sheet = output / "sheet.png"
+        lines = [f"{output}: step {trainer.clock.step}.", *([f"Look at {sheet}"] if sheet.is_file() else [])]
         if trainer.scored_on:
             lines.insert(1, f"The figures are of {trainer.scored_on}.")
         facts = {"run": str(output), "step": trainer.clock.step, "scored_on": trainer.scored_on or None}

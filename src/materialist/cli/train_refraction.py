@@ -22,6 +22,7 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
+from materialist.errors import Interrupted
 
 
 def register(app: typer.Typer) -> None:
@@ -75,5 +76,7 @@ def refraction(
             note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
         )  # fmt: skip
         figures = trainer.run(progress)
+    if trainer.interrupted:
+        raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
     lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
     report_success("train refraction", as_json, lines, run=str(output), step=trainer.clock.step, **figures)

@@ -46,7 +46,7 @@ class InteriorVerse:
         self.pictures: list[Path] = []
         self.missing: list[str] = []
         self.bare = 0
-        """Pictures of scenes that are there, without an albedo."""
+        """Pictures of scenes that are there, without one of their maps."""
         self.refresh()
         if not self.pictures:
             raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
@@ -60,7 +60,7 @@ class InteriorVerse:
         for part in parts(self.folder):
             for scene in _scenes(part / f"{self.split}.txt"):
                 found = sorted((part / scene).glob("*_im.exr"))
-                whole = [path for path in found if _sibling(path, "albedo").is_file()]
+                whole = [path for path in found if all(_sibling(path, name).is_file() for name in MAPS)]
                 self.pictures += whole
                 self.bare += len(found) - len(whole)
                 if not found:
@@ -73,7 +73,7 @@ class InteriorVerse:
             names = ", ".join(self.missing[:3])
             found.append(f"{len(self.missing)} scenes of the split '{self.split}' are not there ({names} ...).")
         if self.bare:
-            found.append(f"{self.bare} pictures of the split '{self.split}' have no albedo, and are left out.")
+            found.append(f"{self.bare} pictures of the split '{self.split}' lack a map, and are left out.")
         return found
 
     def validation(self) -> InteriorVerse | None:

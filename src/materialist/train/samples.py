@@ -87,6 +87,10 @@ class SampleFolder:
         """Sample number `index` in the order of names."""
         return read_sample(self.paths[index])
 
+    def number(self, index: int) -> int:
+        """The number in the name of sample number `index`."""
+        return int(self.paths[index].stem)
+
     def refresh(self) -> None:
         """List the folder again."""
         self.paths = sorted((self.folder / "samples").glob("[0-9]*.npz"))

@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from materialist.errors import InputError
 from materialist.train import checkpoint
 from materialist.train.budget import Budget, Clock
+from materialist.train.ending import Ending
 from materialist.train.launch import place_of
 
 CURVE = "curve.jsonl"
@@ -49,6 +50,8 @@ class Run(ABC):
 
     kind: ClassVar[str]
     """What checkpoints call such a run: the name of its command."""
+    interrupted = False
+    """Whether Ctrl-C ended it."""
 
     def __init__(
         self, folder: Path, network: Callable[[], nn.Module], recipe: Recipe, *, budget: Budget, seed: int = 0,
@@ -88,7 +91,16 @@ class Run(ABC):
         """The averaged weights as the package reads them."""
 
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
-        """Train until the budget is spent; returns the last figures."""
+        """Train until the budget is spent, or SIGTERM or Ctrl-C comes; returns the last figures.
+
+        Always leaves a checkpoint.
+        """
+        with Ending() as ending:
+            self._train(ending, progress)
+            self.interrupted = ending.interrupted
+            return self.save()
+
+    def _train(self, ending: Ending, progress: Callable[[str, int, int], None]) -> None:
         total: dict[str, float] = {}
         count = 0
         since = saved = time.monotonic()
@@ -104,14 +116,13 @@ class Run(ABC):
                 checkpoint.append_line(self.folder / CURVE, {k: float(f"{v:.5g}") for k, v in line.items()})
                 progress("train", round(1000 * self.clock.progress), 1000)
                 total, count, since, scoring = {}, 0, time.monotonic(), 0.0
-            if self.clock.done:
+            if self.clock.done or ending.asked:
                 break
             if time.monotonic() - saved > self.every:
                 start = time.monotonic()
                 self.save()
                 saved = time.monotonic()
                 scoring += saved - start
-        return self.save()
 
     def save(self) -> dict[str, float]:
         """Write the checkpoint, the scores of the averaged weights, and these as float16."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import signal
 from collections.abc import Generator
+from typing import Any
 
 import cv2
 import numpy as np
 import torch
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader, Dataset, default_collate
 
 from materialist.errors import InputError
 from materialist.train.samples import Sample, Source
@@ -19,6 +20,8 @@ ATTEMPTS = 4
 """Samples tried in place of one that cannot be read, before the run ends with its error."""
 KEPT_ASIDE = 40
 """Every how-manieth sample is never trained on, but looked at."""
+GRACE = 20
+"""Seconds for which a loading worker goes on that is told to end: the trainer may be waiting for its batch."""
 
 
 class _Variants(Dataset):
@@ -27,14 +30,18 @@ class _Variants(Dataset):
     def __init__(self, source: Source, task: Task, size: int):
         self.source, self.task, self.size = source, task, size
 
-    def __getitem__(self, key: tuple[int, tuple[int, ...]]) -> dict[str, torch.Tensor]:
+    def __getitem__(self, key: tuple[int, tuple[int, ...]]) -> dict[str, torch.Tensor] | str:
+        """A variant, or the sentence why there is none: an error of a worker would arrive as its traceback."""
         index, seed = key
         rng = np.random.default_rng(seed)
-        return tensors(self.task.prepare(self._read(index, rng), self.size, rng))
+        try:
+            return tensors(self.task.prepare(self._read(index, rng), self.size, rng))
+        except InputError as error:
+            return str(error)
 
     def _read(self, index: int, rng: np.random.Generator) -> Sample:
         """Sample number `index`, or another one where it cannot be read: one bad file must not end a night's run."""
-        chosen = trained_on(len(self.source))
+        chosen = trained_on(self.source)
         for attempt in range(ATTEMPTS):
             try:
                 return self.source.read(index)
@@ -54,10 +61,10 @@ def epoch(
 
     The order and the variants depend on (seed, number) alone, for any number of workers; of `world` processes each
     gets a share of its own and all get equally many batches. A small set is gone through several times, so that a pass
-    has at least one batch.
+    has at least one batch. Raises InputError where ATTEMPTS samples in a row cannot be read.
     """
     source.refresh()
-    chosen = trained_on(len(source))
+    chosen = trained_on(source)
     order = np.random.default_rng((seed, number)).permutation(chosen)
     repeats = -(-batch * world // len(order))
     order = np.tile(order, repeats)
@@ -69,15 +76,34 @@ def epoch(
         num_workers=workers,
         worker_init_fn=_quiet_worker,
         prefetch_factor=4 if workers else None,
+        collate_fn=_batch,
     )
-    yield from loader
+    batches = iter(loader)
+    try:
+        for found in batches:
+            if isinstance(found, str):
+                raise InputError(found)
+            yield found
+    finally:
+        del batches  # ends the workers
 
 
-def trained_on(count: int) -> list[int]:
-    """Numbers of the samples to train on, of `count`; the others are kept aside. All, when there are too few."""
-    if count < KEPT_ASIDE:
-        return list(range(count))
-    return [k for k in range(count) if k % KEPT_ASIDE != KEPT_ASIDE - 1]
+def _batch(items: list[Any]) -> Any:
+    """The items as a batch; a sentence where one of them is one."""
+    return next((item for item in items if isinstance(item, str)), None) or default_collate(items)
+
+
+def trained_on(source: Source) -> list[int]:
+    """Places of the samples to train on; the others are kept aside. All, when there are too few."""
+    count = len(source)
+    return [k for k in range(count) if count < KEPT_ASIDE or not _is_aside(source, k)]
+
+
+def _is_aside(source: Source, place: int) -> bool:
+    """Whether the sample at that place is never trained on: its own number says, where it has one, so that a sample
+    that goes or comes moves no other one."""
+    number = getattr(source, "number", lambda k: k)(place)
+    return number % KEPT_ASIDE == KEPT_ASIDE - 1
 
 
 def none_aside(source: Source) -> bool:
@@ -88,19 +114,27 @@ def none_aside(source: Source) -> bool:
 def kept_aside(source: Source, most: int) -> list[Sample]:
     """Up to `most` samples that are not trained on, spread over those that there are (the first, of a tiny set).
 
-    They are those of the source's own validation split, where it has one.
+    They are those of the source's own validation split, where it has one. Those that cannot be read are left out.
     """
     validation = getattr(source, "validation", lambda: None)()
     if validation is not None:
-        return [validation.read(k) for k in np.unique(np.linspace(0, len(validation) - 1, most).astype(int))]
-    count = len(source)
-    chosen = list(range(KEPT_ASIDE - 1, count, KEPT_ASIDE)) or list(range(min(count, most)))
-    return [source.read(chosen[k]) for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int))]
+        chosen, source = list(range(len(validation))), validation
+    else:
+        aside = set(range(len(source))) - set(trained_on(source))
+        chosen = sorted(aside) or list(range(min(len(source), most)))
+    found = []
+    for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
+        try:
+            found.append(source.read(chosen[k]))
+        except InputError as error:
+            logging.getLogger(__name__).warning("%s It is left out of the figures.", error)
+    return found
 
 
 def _quiet_worker(_: int) -> None:
-    """One thread a worker: the training itself has the others. A SIGTERM to the whole group is the trainer's to act on:
-    workers end with it."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    """One thread a worker: the training itself has the others. A SIGTERM or Ctrl-C to the whole group is the trainer's
+    to act on: workers end with it, or GRACE later."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: signal.alarm(GRACE))
     torch.set_num_threads(1)
     cv2.setNumThreads(0)

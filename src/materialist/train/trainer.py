@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from torch import Tensor, nn
 from materialist.errors import InputError
 from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
+from materialist.train.ending import Ending
 from materialist.train.launch import Processes
 from materialist.train.recipes import Recipe
 from materialist.train.samples import Source
@@ -57,6 +56,8 @@ class Trainer:
 
     scored_on = ""
     """What the last figures are of: KEPT_ASIDE or TRAINED_ON."""
+    interrupted = False
+    """Whether Ctrl-C ended it."""
 
     def __init__(
         self, recipe: Recipe, task: Task, source: Source, folder: Path, *, budget: Budget, habits: Habits | None = None,
@@ -82,17 +83,27 @@ class Trainer:
             self.note(text)
 
     def run(self, progress: Callable[[str, int, int], None] = lambda *_: None) -> dict[str, float]:
-        """Train until the budget is spent or SIGTERM comes; returns the last scores. Always leaves a checkpoint."""
+        """Train until the budget is spent, or SIGTERM or Ctrl-C comes; returns the last scores.
+
+        Always leaves a checkpoint.
+        """
+        with Ending() as ending:
+            self._train(ending, progress)
+            if self.processes.first:
+                self.save()
+            self.interrupted = ending.interrupted
+        return self.score() if self.processes.first and not ending.asked else {}
+
+    def _train(self, ending: Ending, progress: Callable[[str, int, int], None]) -> None:
         losses: dict[str, float] = {}
         count, since = 0, time.monotonic()
         saved = time.monotonic()
-        terminated = _Termination()
         for batch in self._batches():
             found = self._step(batch)
             for name, value in found.items():
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
-            stop = self.processes.agree(self.clock.done or terminated.asked)
+            stop = self.processes.agree(self.clock.done or ending.asked)
             if count == REPORT_STEPS or stop:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses, count, since = {}, 0, time.monotonic()
@@ -104,10 +115,6 @@ class Trainer:
                 self.score()
                 saved = time.monotonic()
                 since += saved - start  # the curve tells the speed of training alone
-        if self.processes.first:
-            self.save()
-        terminated.restore()
-        return self.score() if self.processes.first and not terminated.asked else {}
 
     def save(self) -> None:
         """Write the checkpoint."""
@@ -135,6 +142,9 @@ class Trainer:
         from materialist.train.sheets import score_and_draw
 
         samples = stream.kept_aside(self.source, self.habits.score_samples)
+        if not samples:
+            self.note("No sample that is kept aside can be read: no figures.")
+            return {}
         network = self.averaged if self.recipe.ema else self.network.eval()
         figures = score_and_draw(self.task, network, samples, self.folder / "sheet.png")
         self.network.train()
@@ -213,24 +223,6 @@ class Trainer:
         self.epoch = state["epoch"]
         self.clock = Clock(budget, step=state["step"], seconds=state["seconds"])
         self.note(f"Resumed at step {self.clock.step}, after {self.clock.seconds / 60:.0f} minutes.")
-
-
-class _Termination:
-    """Notes a SIGTERM, so that the run can end with a checkpoint; outside the main thread nothing is noted."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._before: Any = None
-        if threading.current_thread() is threading.main_thread():
-            self._before = signal.signal(signal.SIGTERM, self._note)
-
-    def restore(self) -> None:
-        """Back to what was before."""
-        if self._before is not None:
-            signal.signal(signal.SIGTERM, self._before)
-
-    def _note(self, *_: Any) -> None:
-        self.asked = True
 
 
 def _groups(parameters: list[nn.Parameter], decay: float) -> list[dict[str, Any]]:

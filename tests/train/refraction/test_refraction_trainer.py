@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ import torch
 from typer.testing import CliRunner
 
 from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.train import checkpoint
 from materialist.train.budget import Budget
 from materialist.train.refraction import lessons, scores, trainer
 from materialist.train.refraction.trainer import Recipe, Trainer
@@ -25,6 +28,20 @@ def views(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lessons")
     lessons.produce(folder, lessons.Plan(shapes=2, views=3))
     return folder
+
+
+def test_ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on(views, tmp_path, monkeypatch):
+    monkeypatch.setattr(Trainer, "_step", lambda self, batch: os.kill(os.getpid(), signal.SIGINT) or {"loss": 0.0})
+    plan = ["--data", str(views.parent / "set"), "--shapes", "1", "--views", "2", "--heldout", "1", "--batch", "1"]
+    code = run_to_exit_code(app, ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "9", *plan])
+    assert code == 130 and checkpoint.load(tmp_path / "run")["step"] == 0
+
+
+def test_a_damaged_description_is_no_crash(tmp_path):
+    lessons.produce(tmp_path / "set", lessons.Plan(shapes=1, views=1))
+    (tmp_path / "set" / lessons.DESCRIPTION).write_text("")
+    with pytest.raises(InputError, match="name another folder"):
+        lessons.produce(tmp_path / "set", lessons.Plan(shapes=1, views=1))
 
 
 def test_it_learns_resumes_and_leaves_weights(views, tmp_path):

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -88,10 +89,21 @@ def _open(folder: Path, plan: Plan) -> None:
     file, described = folder / DESCRIPTION, {"format": FORMAT, **asdict(plan)}
     try:
         if folder.is_dir() and any(folder.iterdir()):
-            old = json.loads(file.read_text("utf-8")) if file.is_file() else None
+            old = _described(file)
             if old is None or any(old.get(k) != described[k] for k in ("format", "views", "split", "seed")):
                 raise InputError(f"{folder} holds other things than this set of views; name another folder.")
         folder.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
+        partial = file.with_suffix(".part")
+        partial.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
+        partial.replace(file)
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+
+
+def _described(file: Path) -> dict[str, Any] | None:
+    """What a folder says of its set; None where it says nothing, or that is damaged."""
+    try:
+        found = json.loads(file.read_text("utf-8"))
+    except (FileNotFoundError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
