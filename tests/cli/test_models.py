@@ -56,6 +56,27 @@ def test_verify(run, tmp_path):
     assert code == 2 and "damaged" in err and json.loads(out.splitlines()[-1])["error"] == "WeightsError"
 
 
+def test_files_that_were_fetched_elsewhere_are_taken(run, tmp_path):
+    source = tmp_path / "fetched"
+    source.mkdir()
+    code, _, err = run("models", "download", "depth-anything", "--from", source)
+    assert code == 2 and "lacks config.json" in err
+    for name, content in (("config.json", b"{}"), ("model.safetensors", b"weights"), ("notes.md", b"no")):
+        (source / name).write_bytes(content)
+    code, _, _ = run("models", "download", "depth-anything", "--from", source)
+    folder = tmp_path / "models" / "depth-anything--Depth-Anything-V2-Small-hf"
+    assert code == 0 and sorted(p.name for p in folder.iterdir()) == ["SHA256SUMS", "config.json", "model.safetensors"]
+    code, out, _ = run("models", "list")
+    assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("here")
+
+
+def test_models_by_hub_id_are_verified_too(run, tmp_path):
+    put(tmp_path)
+    (tmp_path / "models" / "Lez--MatNet").rename(tmp_path / "models" / "me--mine")
+    code, out, _ = run("models", "verify", "--json")
+    assert code == 0 and list(json.loads(out.splitlines()[-1])["digests"]) == ["me/mine"]
+
+
 def test_download_without_a_hub_and_of_nothing(run):
     code, _, err = run("models", "download", "matnet")
     assert code == 2 and "cannot be reached" in err and "maps:DIR" in err

@@ -129,3 +129,35 @@ def test_the_built_in_predictor_warns_of_its_own_maps_only(photo, other):
     assert "geometry" in note and "neutral" not in note
     (note,) = get_predictor(other[0], metallic="classical").predict(photo).warnings
     assert "metallic is neutral" in note and "roughness" not in note
+
+
+def test_normals_that_are_unknown_come_from_the_chosen_depth(photo, other, tmp_path):
+    """And need no depth beside them."""
+    spec, theirs = other
+    (tmp_path / "normals").mkdir()
+    normal = theirs["normal"].copy()
+    normal[:5] = 0
+    write_exr(tmp_path / "normals" / "normal.exr", normal)
+    mixed = get_predictor(spec, normal=f"maps:{tmp_path / 'normals'}").predict(photo)
+    derived = normals_from_depth(theirs["depth"], photo.camera, radius=2)
+    assert np.allclose(mixed.normal[:5], derived[:5], atol=1e-6)
+    assert np.allclose(mixed.normal[5:], normal[5:], atol=1e-6)
+
+
+def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeypatch):
+    """Where the rest saw sky, and the depth is someone else's, its placeholder is no normal, and its note is void."""
+    from materialist.predict.base import SKY_NOTE
+    from materialist.predict.bundled.predictor import BundledPredictor
+    from materialist.types import Materials, Prediction
+
+    spec, theirs = other
+    depth, up = theirs["depth"].copy(), np.zeros((H, W, 3), np.float32)
+    depth[:8], up[..., 1] = 0, 1
+    up[:8] = [0, 0, 1]
+    maps = Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"])
+    seen = Prediction(maps, up, depth, "seen", (f"40% {SKY_NOTE}", "Something else."))
+    monkeypatch.setattr(BundledPredictor, "predict", lambda self, photo, seed=0: seen)
+    mixed = get_predictor("bundled", depth=spec).predict(photo)
+    assert np.allclose(mixed.normal[8:], [0, 1, 0]) and mixed.warnings == ("Something else.",)
+    assert np.allclose(mixed.normal[:8], normals_from_depth(theirs["depth"], photo.camera, radius=2)[:8], atol=1e-6)
+    assert any(SKY_NOTE in note for note in get_predictor("bundled", albedo=spec).predict(photo).warnings)

@@ -28,6 +28,17 @@ def test_normals_reveal_the_shift(convert, relative):
     assert np.std(np.log(depth / true)) < 0.05
 
 
+@pytest.mark.parametrize("share", [0.3, 0.55, 0.7])
+def test_a_wall_that_faces_the_camera_may_be_most_of_the_picture(share):
+    """Its normals are right at any ratio; the floor before it tells, however little of it is seen."""
+    rows = np.arange(72)[:, None] + 0.5
+    horizon, foot = 0.15 * 72, share * 72
+    inverse = np.maximum(rows - horizon, foot - horizon) * np.ones((1, 96))
+    true = (60 / inverse).astype(np.float32)
+    _, ratio = from_inverse((1 / true).astype(np.float32), CAMERA, normals_from_depth(true, CAMERA))
+    assert ratio == pytest.approx(np.percentile(true, 99.5) / np.percentile(true, 0.5), rel=0.12)
+
+
 def test_without_normals_the_ratio_is_the_documented_one():
     true = room()
     for convert, relative in ((from_inverse, 3 / true + 0.7), (from_affine, 0.1 * true - 4)):

@@ -47,13 +47,21 @@ def list_models(as_json: Json = False) -> None:
 def download_model(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A name of the list, or a hub id as owner/name.")],
     force: Annotated[bool, typer.Option("--force", help="Fetch every file again.")] = False,
+    source: Annotated[
+        Path | None, typer.Option("--from", metavar="FOLDER", help="Take files that were fetched elsewhere.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Fetch a model and check it against the hub's checksums; an interrupted download is taken up again."""
     from materialist.cli.progress import StageProgress
-    from materialist.predict.download import download
+    from materialist.predict.download import adopt, download
     from materialist.predict.models import hub_model
 
+    if source is not None:
+        folder, taken = adopt(hub_model(name), source)
+        lines = [f"{name}: {taken / 1e6:.0f} MB taken from {source}; it lies in {folder}"]
+        report_success("models download", as_json, lines, folder=str(folder), bytes=taken)
+        return
     with StageProgress(quiet=as_json) as progress:
         folder, fetched = download(hub_model(name), force=force, progress=progress)
     lines = [f"{name}: {fetched / 1e6:.0f} MB fetched; checksums are right; it lies in {folder}"]
@@ -68,14 +76,10 @@ def verify_model(
     as_json: Json = False,
 ) -> None:
     """Compute the checksums of downloaded models again and compare them with those written at the download."""
-    from materialist.predict.models import KNOWN, folder_of, hub_model, is_complete, models_folder, require
+    from materialist.predict.models import downloaded, hub_model, models_folder, require
     from materialist.predict.weights import verify_folder
 
-    folders: dict[str, Path] = (
-        {name: require(hub_model(name)) for name in names}
-        if names
-        else {model.name: folder_of(model) for model in KNOWN if is_complete(model)}
-    )
+    folders = {name: require(hub_model(name)) for name in names} if names else downloaded()
     if not folders:
         raise InputError(f"No model is in {models_folder()}; fetch one with: materialist models download NAME")
     damaged, digests = [], {}

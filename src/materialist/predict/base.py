@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 from materialist.errors import InputError
 from materialist.types import Photo, Prediction
 
+SKY_NOTE = "of the picture was taken for sky and has no surface."
 NEUTRAL_ROUGHNESS = 0.5
 """The paper's neutral start where nothing is known (section "Predicted Material Properties on Envmap Estimation")."""
 NEUTRAL_METALLIC = 0.1

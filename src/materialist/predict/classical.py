@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS
+from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, SKY_NOTE
 from materialist.predict.layout import guess_depth
 from materialist.predict.mix import MAPS, Part
 from materialist.predict.normals import normals_from_depth
@@ -59,6 +59,6 @@ class ClassicalPredictor:
         )
         warnings = [warning] if self.note is None else [self.note, warning]
         if "depth" in wanted and (depth == 0).any():
-            warnings.append(f"{(depth == 0).mean():.0%} of the picture was taken for sky and has no surface.")
+            warnings.append(f"{(depth == 0).mean():.0%} {SKY_NOTE}")
         normal = normals_from_depth(depth, photo.camera, radius=2)
         return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import os
+import shutil
 import urllib.error
 import urllib.parse
 import urllib.request
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from materialist.errors import OutputError, WeightsError
+from materialist.errors import InputError, OutputError, WeightsError
 from materialist.predict.models import CHECKSUMS, INSTEAD, HubModel, folder_of
 from materialist.predict.weights import read_checksums, sha256
 
@@ -71,6 +72,36 @@ def download(
             f"{folder} cannot be written ({error.strerror or error}); free space, or set MATERIALIST_MODELS."
         ) from error
     return folder, fetched
+
+
+def adopt(model: HubModel, source: Path) -> tuple[Path, int]:
+    """As `download`, of files that were fetched elsewhere into the folder `source`; the hub is not asked.
+
+    Raises InputError where the folder lacks the model's files, OutputError when the disk is full or read-only.
+    """
+    if not source.is_dir():
+        raise InputError(f"There is no folder {source}; give the one that holds the files of {model.repo}.")
+    there = [path for path in sorted(source.rglob("*")) if path.is_file()]
+    wanted = chosen([Remote(path.relative_to(source).as_posix(), path.stat().st_size, None) for path in there])
+    names = {remote.name for remote in wanted}
+    if not any(name.endswith(WEIGHTS) for name in names) or (model.main_file and model.main_file not in names):
+        raise InputError(f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again.")
+    folder, sums = folder_of(model), {}
+    try:
+        for remote in wanted:
+            target = folder / remote.name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if not (target.is_file() and target.samefile(source / remote.name)):
+                partial = target.with_name(target.name + ".partial")
+                shutil.copyfile(source / remote.name, partial)
+                partial.replace(target)
+            sums[remote.name] = sha256(target)
+        (folder / CHECKSUMS).write_text("".join(f"{s}  {n}\n" for n, s in sorted(sums.items())), "utf-8")
+    except OSError as error:
+        raise OutputError(
+            f"{folder} cannot be written ({error.strerror or error}); free space, or set MATERIALIST_MODELS."
+        ) from error
+    return folder, sum(remote.size for remote in wanted)
 
 
 def chosen(listing: list[Remote]) -> list[Remote]:
@@ -166,5 +197,6 @@ def _open(model: HubModel, url: str, headers: dict[str, str] | None = None):
             f"{endpoint()} cannot be reached ({reason}); {by_hand} and give the file with --predictor matnet:FILE, "
             f"or {INSTEAD}."
             if model.name == "matnet"
-            else f"{endpoint()} cannot be reached ({reason}); {by_hand} into {folder_of(model)}, or {INSTEAD}."
+            else f"{endpoint()} cannot be reached ({reason}); {by_hand} into a folder, and take them from there: "
+            f"materialist models download {model.name} --from FOLDER; or {INSTEAD}."
         ) from error

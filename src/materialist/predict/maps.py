@@ -27,7 +27,7 @@ class MapsPredictor:
     def __init__(self, folder: str | Path):
         if not str(folder):
             raise InputError("maps: needs a folder, as in --predictor maps:my_maps.")
-        self.folder = Path(folder)
+        self.folder = Path(folder).expanduser()
         if not self.folder.is_dir():
             raise InputError(f"There is no folder {self.folder} to read maps from.")
 
@@ -64,12 +64,14 @@ class MapsPredictor:
         """Only the wanted maps, as `predict`; the folder need not hold any other. Raises InputError as `predict`."""
         size, maps = photo.linear.shape[:2], {}
         warnings: list[str] = []
-        for name in wanted:
+        for name in sorted(wanted, key=lambda name: name == "normal"):  # which may need the depth
             if name in ("roughness", "metallic"):
                 neutral = NEUTRAL_ROUGHNESS if name == "roughness" else NEUTRAL_METALLIC
                 maps[name] = self._scalar(name, neutral, size, warnings)
             elif name == "normal":
-                maps[name] = self._normal(photo, maps.get("depth"), warnings)
+                own = None if "depth" in maps else self._fitted(name, size, warnings)
+                # Beside another depth, what is unknown is for that to tell.
+                maps[name] = self._normal(photo, maps.get("depth"), warnings) if own is None else own
             else:
                 maps[name] = self._needed(name, size, warnings)
         return Part(maps, dict.fromkeys(wanted, self.name), tuple(warnings))

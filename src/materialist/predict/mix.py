@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.predict.base import Predictor, open_source
+from materialist.predict.base import SKY_NOTE, Predictor, open_source
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Materials, Photo, Prediction
 
@@ -91,7 +91,8 @@ class MixedPredictor:
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """The maps of all sources together.
 
-        Normals of a source that derives them from its own depth are derived from the chosen depth instead.
+        Normals of a source that derives them from its own depth are derived from the chosen depth instead, and so are
+        those that their source does not know.
         """
         derived = self.normal_spec != self.depth_spec and _follows_depth(self.sources[self.normal_spec])
         # The source of the depth comes last: a measured normal map helps to scale a relative depth.
@@ -113,6 +114,7 @@ class MixedPredictor:
             maps["normal"] = normals_from_depth(maps["depth"], photo.camera, radius=FOLLOW_DEPTH)
             sources["normal"] = f"derived from the depth of {self.sources[self.depth_spec].name}"
         _check_sizes(maps, photo)
+        maps["normal"] = _filled(maps["normal"], maps["depth"], photo)
         materials = Materials(maps["albedo"], maps["roughness"], maps["metallic"])
         ordered = {name: sources[name] for name in MAPS}
         return Prediction(materials, maps["normal"], maps["depth"], self.name, tuple(warnings), ordered)
@@ -133,7 +135,19 @@ def _parts(source, photo: Photo, wanted: list[str], seed: int, normal: Array | N
     found = source.predict(photo, seed=seed)
     maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
     sources = {name: found.sources.get(name, found.predictor) for name in wanted}
-    return Part({name: maps[name] for name in wanted}, sources, found.warnings)
+    warnings = found.warnings
+    if "depth" not in wanted:  # what it took for sky may be a surface of the source of the depth
+        maps["normal"] = np.where((found.depth > 0)[..., None], found.normal, 0).astype(np.float32)
+        warnings = tuple(note for note in warnings if not note.endswith(SKY_NOTE))
+    return Part({name: maps[name] for name in wanted}, sources, warnings)
+
+
+def _filled(normal: Array, depth: Array, photo: Photo) -> Array:
+    """[H, W, 3] unit normals; where they are unknown (zero), those of the depth."""
+    unknown = np.linalg.norm(normal, axis=-1, keepdims=True) < 0.5
+    if not unknown.any():
+        return normal
+    return np.where(unknown, normals_from_depth(depth, photo.camera, radius=FOLLOW_DEPTH), normal)
 
 
 def _follows_depth(source) -> bool:

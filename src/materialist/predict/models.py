@@ -80,6 +80,13 @@ def is_complete(model: HubModel) -> bool:
     return (folder_of(model) / CHECKSUMS).is_file()
 
 
+def downloaded() -> dict[str, Path]:
+    """The folders of all finished downloads here, by the model's name or hub id."""
+    found = {file.parent.name: file.parent for file in sorted(models_folder().glob(f"*/{CHECKSUMS}"))}
+    known = {folder_of(model).name: model.name for model in KNOWN}
+    return {known.get(name, name.replace("--", "/", 1)): folder for name, folder in found.items()}
+
+
 def require(model: HubModel) -> Path:
     """The folder of a finished download. Raises WeightsError that says how to get it."""
     if is_complete(model):

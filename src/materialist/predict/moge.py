@@ -64,7 +64,8 @@ class MogeFolder:
         check_aspect(depth, size, path)
         mask = self.folder / "mask.png"
         if mask.is_file():
-            pixels = cv2.imdecode(np.frombuffer(mask.read_bytes(), np.uint8), cv2.IMREAD_GRAYSCALE)
+            data = np.frombuffer(mask.read_bytes(), np.uint8)
+            pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
             if pixels is None or pixels.shape != depth.shape:
                 raise InputError(f"{mask} is damaged or of another size than depth.exr; {HOW}")
             depth = np.where(pixels > 127, depth, 0)

@@ -65,7 +65,10 @@ def _scaled(t: Array, depth, camera: Camera, normal: Array | None) -> tuple[Arra
 
 
 def _best_ratio(t: Array, depth, camera: Camera, normal: Array) -> float:
-    """The ratio whose surface agrees best with the normals: least median angle, on a small copy."""
+    """The ratio whose surface agrees best with the normals: least mean angle, on a small copy.
+
+    Not the median: a wall that faces the camera has its normals at every ratio, and may be most of the picture.
+    """
     scale = min(1.0, TRIAL_SIZE / max(t.shape))
     size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
     small_t = cv2.resize(t, size, interpolation=cv2.INTER_AREA)
@@ -79,6 +82,6 @@ def _best_ratio(t: Array, depth, camera: Camera, normal: Array) -> float:
 
     def error(ratio: float) -> float:
         found = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]
-        return float(np.median(1 - (found * target).sum(-1)))
+        return float(np.arccos(np.clip((found * target).sum(-1), -1, 1)).mean())
 
     return float(min(RATIOS, key=error))

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
+from materialist.predict.base import SKY_NOTE
 from materialist.predict.bundled import WEIGHTS, weights
 from materialist.predict.bundled.inference import infer, rays_of
 from materialist.predict.device import on_gpu
@@ -28,7 +29,7 @@ class BundledPredictor:
     """
 
     def __init__(self, where: str | Path = "", *, device: str = "auto"):
-        path = Path(where) if str(where) else WEIGHTS
+        path = Path(where).expanduser() if str(where) else WEIGHTS
         if not path.is_file():
             raise WeightsError(
                 f"There are no weights of the bundled network at {path}; train and export some (materialist train "
@@ -58,5 +59,5 @@ class BundledPredictor:
         notes = []
         sky = float((found.depth == 0).mean())
         if sky > 0:
-            notes.append(f"{sky:.0%} of the picture was taken for sky and has no surface.")
+            notes.append(f"{sky:.0%} {SKY_NOTE}")
         return Prediction(m, found.normal, found.depth, predictor=self.name, warnings=tuple(notes))

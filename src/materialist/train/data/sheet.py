@@ -22,6 +22,8 @@ def write_sheet(folder: str | Path, path: str | Path, *, count: int = 24, seed: 
     """
     import cv2
 
+    if Path(path).suffix.lower() != ".png":
+        raise OutputError(f"{path} is no .png; a contact sheet is one.")
     files = sorted((Path(folder) / "samples").glob("*.npz"))
     if not files:
         raise InputError(f"{folder} holds no samples; make some: materialist train data -o {folder}.")
