@@ -51,6 +51,28 @@ def test_a_perfect_predictor_scores_perfectly(folder, tmp_path):
     assert (tmp_path / "report" / "sheet.png").is_file()
 
 
+def test_maps_that_are_not_there_are_no_truth(folder, tmp_path):
+    """What stands in their place (0.5, 0.1, normals of the depth) is scored against by nobody."""
+    for name in ("roughness", "metallic", "normal"):
+        (folder / "plane" / "maps" / f"{name}.exr").unlink()
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor="classical", procedural=0)
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    (row,) = report["rows"]
+    assert {"albedo_psnr", "depth_order"} <= set(row)
+    assert not [key for key in row if key.startswith(("roughness", "metallic", "normal"))]
+    assert report["settings"]["no true roughness"] is True
+
+
+def test_a_picture_that_cannot_be_read_costs_only_itself(folder, tmp_path):
+    broken = folder / "broken"
+    (broken / "maps").mkdir(parents=True)
+    (broken / "photo.png").write_bytes(b"no picture")
+    (broken / "maps" / "albedo.exr").write_bytes(b"no map")
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor="classical, classical", procedural=0)
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert len(report["rows"]) == 1 and "photo.png" in report["settings"]["left out"]
+
+
 def test_a_folder_of_its_own_is_found(folder):
     assert materials.photo_folders(folder / "plane") == [folder / "plane"]
     (_, photo, truth), *others = materials.labelled(folder)

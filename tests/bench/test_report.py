@@ -76,10 +76,33 @@ def test_unknown_benchmarks_and_options_are_refused(tmp_path):
     [({"scenes": "abc"}, "--scenes is 'abc'; give a whole number"), ({"scenes": 2.5}, "--scenes is 2.5"),
      ({"scenes": -1}, "--scenes is -1; give at least 0"), ({"size": 0}, "--size is 0; give at least 1"),
      ({"seed": -1}, "--seed is -1; give at least 0"),
-     ({"photographic": 3}, "--photographic is 3; give true or false")],
+     ({"photographic": 3}, "--photographic is 3; give true or false"),
+     ({"scenes": float("nan")}, "--scenes is nan; give a whole number"), ({"size": float("inf")}, "--size is inf"),
+     ({"procedural": "abc"}, "--procedural is 'abc'; give a whole number"), ({"procedural": 2.5}, "--procedural is 2"),
+     ({"predictor": True}, "--predictor is True; give a value"), ({"predictor": " ,"}, "--predictor is empty")],
 )  # fmt: skip
 def test_options_of_another_kind_are_refused(tmp_path, options, words):
-    name = "materials" if "photographic" in options else "select"
+    name = "materials" if {"photographic", "procedural", "predictor"} & set(options) else "select"
     with pytest.raises(InputError, match=words):
         bench.run(name, output=tmp_path / "report", **options)
-    assert not (tmp_path / "report").exists()
+    assert not list((tmp_path / "report").glob("*"))
+
+
+def test_options_are_brought_to_the_kind_that_is_taken():
+    """A whole number may be written with a point, and a name may read as a number."""
+    checked = bench._checked
+    assert isinstance(checked("size", 64.0, "int"), int) and checked("procedural", None, "int | None") is None
+    assert checked("meshes", 2024, "str") == "2024" and checked("iors", 1.5, "str | float") == 1.5
+    assert isinstance(checked("goal", 1, "float"), int | float)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [("light", {"methods": 5}, "no method '5'"), ("glass", {"iors": "abc"}, "--iors is 'abc'"),
+     ("studio", {"photo": "/nope.jpg"}, "no photo at /nope.jpg"), ("thickness", {"data": "."}, "no folder 'meshes'"),
+     ("select", {"data": "."}, "meshes")],
+)  # fmt: skip
+def test_values_that_cannot_be_are_told_at_once(tmp_path, monkeypatch, name, options, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=words):
+        bench.run(name, output=tmp_path / "report", **options)

@@ -96,3 +96,19 @@ def test_what_is_no_data_set(tmp_path):
     (tmp_path / "1.json").write_text("[]")
     with pytest.raises(InputError, match="IIW's layout"):
         bench.run("whdr", data=tmp_path, output=tmp_path / "report2", predictor="classical")
+
+
+def test_a_picture_that_cannot_be_judged_costs_only_itself(tmp_path):
+    data = tmp_path / "iiw"
+    data.mkdir()
+    judged = {"intrinsic_points": _points((0.25, 0.5), (0.75, 0.5)), "intrinsic_comparisons": [_says(0, 1, "1")]}
+    lame = {**judged, "intrinsic_points": [{"id": k, "x": 0.1, "y": 0.1} for k in range(2)]}
+    picture = np.tile(np.linspace(60, 200, 60).astype(np.uint8)[None, :, None], (40, 1, 3))
+    for name, content in (("1", judged), ("2", lame), ("3", judged)):
+        cv2.imwrite(str(data / f"{name}.png"), picture)
+        (data / f"{name}.json").write_text(json.dumps(content))
+    (data / "3.png").write_bytes(b"no picture")
+    bench.run("whdr", data=data, output=tmp_path / "report", predictor="classical", size=60)
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert {row["sample"] for row in report["rows"]} == {"1"} and report["settings"]["pictures"] == 1
+    assert "2.json" in report["settings"]["unreadable"] and "3.png" in report["settings"]["unreadable"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -45,21 +46,34 @@ def run(name: str, *, output: str | Path, data: str | Path | None = None, force:
     for option, value in options.items():
         if option not in known:
             raise InputError(f"Benchmark '{name}' has no option '{option}'; it takes {', '.join(known)}.")
-        _check(option, value, parameters[option].default)
+        options[option] = _checked(option, value, str(parameters[option].annotation))
     folder = claim(Path(output), force=force)
     benchmark(data=None if data is None else Path(data), output=folder, **options)
     return folder
 
 
-def _check(option: str, value: Any, usual: Any) -> None:
-    """Raises InputError where an option is no number, or no yes or no, and its usual value is one."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if isinstance(usual, bool) and not isinstance(value, bool):
-        raise InputError(f"--{option} is {value!r}; give true or false.")
-    if isinstance(usual, int) and not isinstance(usual, bool) and not (number and value == int(value)):
-        raise InputError(f"--{option} is {value!r}; give a whole number.")
+def _checked(option: str, value: Any, kind: str) -> Any:
+    """The value as the benchmark takes it; `kind` is the annotation of its parameter, as in "int | None".
+
+    Raises InputError where it is of another kind, not finite, or too small.
+    """
+    kinds, shown = set(kind.split(" | ")), value if isinstance(value, str | Path) else repr(value)
+    if "None" in kinds and value is None:
+        return value
+    if isinstance(value, bool) != ("bool" in kinds):
+        raise InputError(f"--{option} is {value!r}; give {'true or false' if 'bool' in kinds else 'a value'}.")
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int | float) and not kinds & {"int", "float"}:
+        return str(shown)  # a name that reads as a number
+    number = isinstance(value, int | float) and math.isfinite(value)
+    if not number and "str" not in kinds:
+        raise InputError(f"--{option} is {value!r}; give a {'whole ' if 'int' in kinds else ''}number.")
+    if number and "int" in kinds:
+        if value != int(value) and "float" not in kinds:
+            raise InputError(f"--{option} is {value!r}; give a whole number.")
+        value = int(value) if value == int(value) else value
     least = 1 if option in AT_LEAST_ONE else 0
-    if isinstance(usual, int) and not isinstance(usual, bool) and value < least:
+    if number and kinds <= {"int", "None"} and value < least:
         raise InputError(f"--{option} is {value}; give at least {least}.")
-    if isinstance(usual, float) and not number:
-        raise InputError(f"--{option} is {value!r}; give a number.")
+    return value

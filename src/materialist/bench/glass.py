@@ -88,9 +88,12 @@ def run(
     """
     from materialist.render.variant import setup
 
-    refraction = [float(x) for x in str(iors).split(",")]
     if full:
-        shapes, envmaps, refraction = 10, 30, [1.1, 1.3]
+        shapes, envmaps, iors = 10, 30, "1.1,1.3"
+    try:
+        refraction = [float(x) for x in str(iors).split(",")]
+    except ValueError:
+        raise InputError(f"--iors is {iors!r}; give indices of refraction such as 1.1,1.3.") from None
     if (
         shapes < (not latency)
         or min(envmaps, spp, reference) < 1

@@ -8,8 +8,9 @@ the predictor as photographs (clipped to [0, 1]; the procedural ones with tone, 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
+from materialist.predict.mix import MAPS
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 COLUMNS = (
@@ -70,28 +72,41 @@ def run(
     `pictures` of each kind are drawn into sheet.png. `procedural` is HELD_OUT unless `data` is a set of `train data`
     itself; they have `size` pixels a side and use the files of `meshes` and `envmaps` that are kept aside, if given.
     """
-    from materialist.bench.predictors import opened
+    from materialist.bench.predictors import opened, specs_of
 
     own_set = data is not None and (data / "samples").is_dir()
     count = (0 if own_set else HELD_OUT) if procedural is None else procedural
     if data is None and count < 1:
         raise InputError("There is nothing to score; give --data DIR (docs/training.md), or --procedural above 0.")
-    specs = predictor.split(",")
+    specs = specs_of(predictor)
     sources = {spec: opened(spec, device) for spec in specs}
     rows: list[dict[str, Any]] = []
     strips: dict[tuple[str, int], list] = {}
+    settings: dict[str, Any] = {
+        "data": str(data), "split": split, "photographic": photographic, "procedural": count, "seed": seed
+    }  # fmt: skip
+
+    def tell() -> None:
+        report = Report("Predicted maps", NOTE, settings, COLUMNS, _with_pooled(rows), ("albedo_psnr", "normal_angle"))
+        write(report, output)
 
     def add(folder: Path, kind: str, most: int) -> None:
         for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
-            for k, (name, photo, truth) in enumerate(
-                labelled(folder, split=split, limit=most, photographic=photographic)
-            ):
+            unreadable: list[str] = []
+            samples = labelled(folder, split=split, limit=most, photographic=photographic, unreadable=unreadable)
+            for k, (name, photo, truth) in enumerate(samples):
                 prediction, row = _scored(sources[spec], photo, truth, seed)
                 rows.append({"method": spec + kind, "sample": name, **row})
                 if k < pictures:
                     strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
+                absent = absent_maps(truth)
+                settings.update({f"no true {which}": True for which in absent})
+                tell()
+            if unreadable:
+                settings["left out"] = "; ".join(unreadable)
+        if not rows:
+            raise InputError(settings.get("left out") or f"{folder} holds nothing to score.")
 
-    settings = {"data": str(data), "split": split, "photographic": photographic, "procedural": count, "seed": seed}
     if data is not None:
         add(data, "", limit)
         settings |= lost(data, split)
@@ -101,8 +116,7 @@ def run(
         settings["procedural content"] = CONTENT["heldout"]
         with tempfile.TemporaryDirectory() as place:
             add(held_out(Path(place) / "set", count, size, seed, meshes, envmaps, device), ", procedural", 0)
-    rows = _with_pooled(rows)
-    write(Report("Predicted maps", NOTE, settings, COLUMNS, rows, plotted=("albedo_psnr", "normal_angle")), output)
+    tell()
     _draw(list(strips.values()), output / "sheet.png")
 
 
@@ -129,13 +143,28 @@ def lost(data: Path, split: str) -> dict[str, Any]:
 
 
 def labelled(
-    data: Path, *, split: str = "test", limit: int = 0, photographic: bool = True
+    data: Path, *, split: str = "test", limit: int = 0, photographic: bool = True, unreadable: list[str] | None = None
 ) -> Iterator[tuple[str, Photo, Prediction]]:
-    """(name, photo, truth) of every sample; see the module for what `data` may be. Raises InputError."""
+    """(name, photo, truth) of every sample; see the module for what `data` may be. Raises InputError.
+
+    Samples that cannot be read are left out, and told in `unreadable`, if given.
+    """
+    for name, read in _samples(data, split, limit, photographic):
+        try:
+            yield name, *read()
+        except InputError as error:
+            if unreadable is None:
+                raise
+            unreadable.append(str(error))
+
+
+def _samples(
+    data: Path, split: str, limit: int, photographic: bool
+) -> Iterator[tuple[str, Callable[[], tuple[Photo, Prediction]]]]:
+    """(name, what reads it) of every sample."""
     folders = photo_folders(data)
     if folders:
-        for folder in _spread(folders, limit):
-            yield folder.name, *_read_folder(folder)
+        yield from ((folder.name, partial(_read_folder, folder)) for folder in _spread(folders, limit))
         return
     from materialist.train.samples import SampleFolder
     from materialist.train.sources import open_source
@@ -143,14 +172,22 @@ def labelled(
 
     source = open_source(data, split=split)
     procedural = isinstance(source, SampleFolder)
-    for index in _spread(list(range(len(source))), limit):
+
+    def read(index: int) -> tuple[Photo, Prediction]:
         sample = source.read(index)
         seen = as_photo(sample, np.random.default_rng((11, index))) if procedural and photographic else sample
         linear = np.clip(seen.image, 0, 1).astype(np.float32)
         height, width = linear.shape[:2]
         fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
         photo = Photo(linear=linear, camera=Camera(width, height, float(fov)), original=linear, fov_source="option")
-        yield f"{index:07d}", photo, sample.truth()
+        return photo, sample.truth()
+
+    yield from ((f"{index:07d}", partial(read, index)) for index in _spread(list(range(len(source))), limit))
+
+
+def absent_maps(truth: Prediction) -> list[str]:
+    """Names of the maps that a truth lacks; what stands in their place is no truth."""
+    return [name for name in MAPS if truth.sources and name not in truth.sources]
 
 
 def photo_folders(data: Path) -> list[Path]:
@@ -175,7 +212,9 @@ def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     path, maps = _photo(folder), _maps(folder)
     assert path is not None and maps is not None
     photo = read_photo(str(path), size=1024)
-    return replace(photo, linear=np.clip(photo.linear, 0, 1)), MapsPredictor(maps).predict(photo)
+    truth = MapsPredictor(maps).predict(photo)
+    there = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
+    return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=there)
 
 
 def _spread(things: list, limit: int) -> list:
@@ -196,6 +235,8 @@ def _scored(source: Any, photo: Photo, truth: Prediction, seed: int) -> tuple[Pr
     if surface.any():
         found["depth_order"] = ordinal_accuracy(prediction.depth, truth.depth)
         found |= _perceptual(prediction.materials, truth.materials, surface)
+    absent = tuple(f"{name}_" for name in absent_maps(truth))
+    found = {key: value for key, value in found.items() if not key.startswith(absent)} if absent else found
     return prediction, {**found, "seconds": seconds}
 
 

@@ -42,12 +42,12 @@ def run(
 
     if threads:
         torch.set_num_threads(threads)
-    from materialist.bench.predictors import opened
+    from materialist.bench.predictors import opened, specs_of
 
     noise = np.random.default_rng(seed).random((size, size, 3), dtype=np.float32)
     photo = Photo(linear=noise, camera=Camera(size, size), original=noise)
     rows = []
-    for spec in predictor.split(","):
+    for spec in specs_of(predictor):
         source = opened(spec, device)
         network = getattr(source, "network", None)
         weights = {} if network is None else {"parameters_m": sum(p.numel() for p in network.parameters()) / 1e6}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.report import Column, Report, write
+from materialist.bench.scenes import arrangement
 from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.errors import InputError
 from materialist.types import Array, Prediction, Scene
@@ -32,7 +33,7 @@ SPP = 100
 
 
 def run(
-    *, data: Path | None, output: Path, scenes: int = 12, size: int = 256, seed: int = 3, device: str = "auto"
+    *, data: Path | None, output: Path, scenes: int = 12, size: int = 256, seed: int = 0, device: str = "auto"
 ) -> None:
     """Score one click on the objects of `scenes` pictures, and of as many with captured meshes where DATA is given.
 
@@ -44,6 +45,8 @@ def run(
     from materialist.render.variant import setup
 
     setup(device)
+    if data is not None:
+        arrangement(0, seed=seed, data=data)  # that there are meshes
     rows: list[dict[str, Any]] = []
     settings = {"scenes": scenes, "size": size, "seed": seed, "data": data is not None}
     report = Report("Objects by one click", NOTE, settings, COLUMNS, rows, plotted=("iou",))
@@ -55,7 +58,7 @@ def run(
             for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
                 for method in METHODS:
                     rows += _rows(sample, _scene(sample, found), maps, method, f"{kind} {sample.name}", k)
-    write(report, output)
+            write(report, output)
 
 
 def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[int, int]]:

@@ -277,7 +277,10 @@ def _browser() -> Iterator[Any]:
 def _photo(photo: str) -> Path:
     from materialist.io.examples import PREFIX, example_path
 
-    return example_path(photo) if photo.startswith(PREFIX) else Path(photo)
+    path = example_path(photo) if photo.startswith(PREFIX) else Path(photo)
+    if not path.is_file():
+        raise InputError(f"There is no photo at {photo}.")
+    return path
 
 
 def _share(text: str) -> tuple[float, float]:

@@ -35,6 +35,8 @@ def run(
     """
     if min(shapes, views, mesh_views) < 1:
         raise InputError(f"shapes is {shapes}, views {views}, mesh_views {mesh_views}; give at least 1 each.")
+    if data is not None and not (data / "meshes").is_dir():
+        raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
     from materialist.predict.refraction import WEIGHTS
     from materialist.predict.refraction.weights import load
     from materialist.render.variant import setup

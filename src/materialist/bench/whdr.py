@@ -31,8 +31,8 @@ COLUMNS = (
 )
 NOTE = (
     "Part of the human judgements of Intrinsic Images in the Wild (weighted by their confidence) that the albedo "
-    "contradicts; delta = 0.1; brightness is the mean of linear red, green and blue; mean over pictures. `constant` "
-    "and `photo` are the albedo that is the same everywhere and the photo itself."
+    "contradicts; delta = {delta:g}; brightness is the mean of linear red, green and blue; mean over pictures. "
+    "`constant` and `photo` are the albedo that is the same everywhere and the photo itself."
 )
 
 
@@ -49,14 +49,25 @@ def run(
         raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
     pairs = find(data)[:: max(1, every)]
     pairs = pairs[:limit] if limit else pairs
-    from materialist.bench.predictors import opened
+    from materialist.bench.predictors import opened, specs_of
 
+    sources = {spec: opened(spec, device) for spec in specs_of(predictor)}
     rows: list[dict[str, Any]] = []
-    for spec in (*BASELINES, *predictor.split(",")):
-        source = None if spec in BASELINES else opened(spec, device)
-        rows += [_row(spec, source, picture, judged, size, delta, seed) for picture, judged in pairs]
-    settings = {"pictures": len(pairs), "size": size, "delta": delta, "every": every, "seed": seed}
-    write(Report("WHDR", NOTE, settings, COLUMNS, rows, plotted=("whdr",)), output)
+    lost: dict[str, str] = {}
+    settings: dict[str, Any] = {"pictures": len(pairs), "size": size, "delta": delta, "every": every, "seed": seed}
+    report = Report("WHDR", NOTE.format(delta=delta), settings, COLUMNS, rows, plotted=("whdr",))
+    for spec in (*BASELINES, *sources):
+        for picture, judged in pairs:
+            if picture.name in lost:
+                continue
+            try:
+                rows.append(_row(spec, sources.get(spec), picture, judged, size, delta, seed))
+            except InputError as error:
+                lost[picture.name] = str(error)
+                settings |= {"pictures": len(pairs) - len(lost), "unreadable": "; ".join(lost.values())}
+            write(report, output)
+    if not rows:
+        raise InputError(next(iter(lost.values())))
 
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
@@ -118,6 +129,9 @@ def _read(path: Path) -> dict[str, Any]:
             for name in ("point1", "point2"):
                 if comparison[name] not in known:
                     raise InputError(f"{path}: a comparison is of point {comparison[name]}, which is not in the file.")
+            _ = comparison["darker"], comparison["darker_score"]
+        for point in content["intrinsic_points"]:
+            _ = float(point["x"]), float(point["y"]), point["opaque"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} does not hold judgements in IIW's layout ({error}).") from error
     return content
