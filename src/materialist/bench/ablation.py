@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from materialist import metrics
 from materialist.bench.report import Column, Report, write
@@ -23,6 +22,9 @@ from materialist.fit.losses import l1_l2, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage
 from materialist.types import Array, Materials, Prediction
+
+if TYPE_CHECKING:
+    import torch
 
 NOTE = """The paper's ablations, its protocol on our synthetic photos: `--preset paper` with cached transport in place
 of PRB, materials from the predictor under the light that the paper's fit finds for them. PSNR, SSIM and MSE compare the
@@ -107,6 +109,8 @@ class _Bench:
     ):  # fmt: skip
         self.sample, self.predictor, self.number, self.data = sample, predictor, number, data
         self.spp, self.longest, self.goal, self.seed, self.device = spp, longest, goal, seed, device
+        import torch
+
         self.camera = sample.photo.camera
         self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
 
@@ -141,6 +145,8 @@ class _Bench:
         self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False
     ) -> dict[str, Any]:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
+        import torch
+
         begun, envmap = self.fitted
         engine: Any = begun.fit.engine
         prior = _maps(self.prior.materials, engine.pixels)
@@ -253,12 +259,16 @@ TABLES: dict[str, Callable[[_Bench], Iterator[dict[str, Any]]]] = {
 
 def _maps(materials: Materials, pixels: torch.Tensor) -> torch.Tensor:
     """[P, 5] of the pixels."""
+    import torch
+
     parts = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
     return torch.from_numpy(np.concatenate(parts, -1).reshape(-1, 5).astype(np.float32))[pixels]
 
 
 def _materials(maps: torch.Tensor, pixels: torch.Tensor, prior: Prediction) -> Materials:
     """Maps [P, 5] in their pixels; elsewhere the prior's."""
+    import torch
+
     shape = prior.depth.shape
     every = _maps(prior.materials, torch.arange(shape[0] * shape[1]))
     image = every.index_copy(0, pixels, maps).numpy().reshape(*shape, 5)

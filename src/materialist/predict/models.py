@@ -99,13 +99,16 @@ def require(model: HubModel) -> Path:
     )
 
 
-def weights_file(folder: Path) -> Path:
-    """The one file of weights in a folder, safetensors before pickles. Raises WeightsError when there is none."""
+def weights_file(folder: Path, main: str = "") -> Path:
+    """The one file of weights in a folder, safetensors before pickles, else the one named `main`, else the first.
+
+    Raises WeightsError when there is none.
+    """
     found = sorted(path for path in folder.glob("*") if path.is_file() and _is_weights_name(path.name))
     safe = [path for path in found if path.suffix == ".safetensors"]
     if not found:
         raise WeightsError(f"{folder} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}.")
-    return (safe or found)[0]
+    return min(safe or found, key=lambda path: path.name != main)
 
 
 def _is_weights_name(name: str) -> bool:

@@ -169,9 +169,11 @@ class Run(ABC):
         loss = sum(terms.values(), torch.zeros((), device=self.device))
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(self.network.parameters(), recipe.clip)
-        self.optimizer.step()
+        norm = torch.nn.utils.clip_grad_norm_(self.network.parameters(), recipe.clip)
         self.clock.step += 1
+        if not bool(torch.isfinite(norm)):
+            return {"loss": loss.item(), **{k: v.item() for k, v in terms.items()}}
+        self.optimizer.step()
         decay = min(recipe.ema, (1 + self.clock.step) / (10 + self.clock.step))
         with torch.no_grad():
             torch._foreach_lerp_(list(self.averaged.parameters()), list(self.network.parameters()), 1 - decay)

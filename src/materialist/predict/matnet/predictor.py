@@ -82,7 +82,7 @@ def _trained_here(content: object, path: Path) -> bool:
 def _locate(where: str) -> Path:
     """The file of weights that `where` means. Raises WeightsError."""
     if not where:
-        return weights_file(require(hub_model("matnet")))
+        return weights_file(require(hub_model("matnet")), hub_model("matnet").main_file)
     path = Path(where).expanduser()
     if path.is_dir():
         return weights_file(path)
