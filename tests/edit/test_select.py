@@ -154,3 +154,24 @@ def test_a_click_on_the_last_row_of_an_odd_size():
     scene = flat_scene(341, 512)
     assert select(scene, click=(60, 340), method="grabcut").any()
     assert select(scene, click=(511, 340), method="grabcut").any()
+
+
+def test_a_likelihood_counts_only_where_it_is_sure():
+    """A disc on a plate: a map that is sure gets the plate, one that says "perhaps" does not outdo the disc's edge."""
+    from materialist.edit.objects import certainty, object_around
+    from materialist.edit.select import Features
+
+    y, x = np.mgrid[:96, :96] - 47.5
+    disc, plate = np.hypot(x, y) < 14, np.hypot(x, y) < 36
+    colour = np.where(disc[..., None], [0.7, 0.2, 0.1], np.where(plate[..., None], [0.5, 0.45, 0.4], [0.4, 0.45, 0.5]))
+    normal = np.broadcast_to(np.float32([0, 0, 1]), (96, 96, 3)).copy()
+    features = Features(colour.astype(np.float32), np.full((96, 96), 2, np.float32), normal)
+
+    def found(likely):
+        return object_around(features, [(48, 48)], likely.astype(np.float32))
+
+    iou = lambda a, b: (a & b).sum() / (a | b).sum()  # noqa: E731
+    sure, perhaps = np.where(plate, 0.98, 0.02), np.where(plate, 0.6, 0.35)
+    assert certainty(sure) > 0.9 and certainty(perhaps) < 0.6
+    assert iou(found(sure), plate) > 0.85
+    assert iou(found(perhaps), disc) > 0.85
