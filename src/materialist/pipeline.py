@@ -100,6 +100,8 @@ def invert(
         prior = _predict(picture, source, seed)
         stages.append({"name": "predict", "seconds": round(time.perf_counter() - begun, 3)})
     _check_mask(mask, picture)
+    if mask is not None and not (mask & (prior.depth > 0)).any():
+        raise InputError("The mask lies wholly where there is no surface (sky); mark an object.")
     found("prior", prior)
 
     from materialist.render.variant import setup
@@ -164,7 +166,7 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
 def _report(
     picture: Photo, prior: Prediction, found: Attempt, stages: tuple[dict, ...], told: tuple[str, ...], start: float
 ) -> FitReport:
-    materials, rerender = found.materials, found.rerender
+    materials, rerender = found.materials, np.nan_to_num(found.rerender, posinf=0)
     surface = prior.depth > 0
     distance = {
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
@@ -174,6 +176,10 @@ def _report(
     white = HDR_CLIP if picture.hdr else 0.99
     clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings, *told]
+    if lost := int((~np.isfinite(found.rerender).all(-1)).sum()):
+        notes.append(
+            f"{lost} pixels of the re-rendering are no numbers; look for wild values in the depth and normals."
+        )
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
     measured = next((s for s in stages if "prior_trust" in s), {"prior_trust": None})

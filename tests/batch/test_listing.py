@@ -121,3 +121,13 @@ def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
     shuffled = list(texts)
     random.shuffle(shuffled)
     assert unique_names(shuffled) == names
+
+
+def test_linked_folders_are_followed_once(tmp_path):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "a.png").touch()
+    (tmp_path / "other" / "b.png").touch()
+    (tmp_path / "photos" / "more").symlink_to(tmp_path / "other")
+    (tmp_path / "other" / "back").symlink_to(tmp_path / "photos")
+    assert ids(tmp_path / "photos") == ["a.png", "more/b.png"]

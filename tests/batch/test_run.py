@@ -214,3 +214,18 @@ def test_a_file_name_that_is_no_utf8_is_a_photo_like_any_other(tmp_path):
     outcome = run(source, tmp_path / "runs", workers=1)
     assert outcome.exit_code == 0, reasons(outcome)
     assert outcome.rows[0]["id"] == "caf\\udce9.png" and "caf" in (tmp_path / "runs/index.html").read_text()
+
+
+def test_a_scene_that_came_after_a_failure_is_not_the_batch_s(tmp_path):
+    """The photo could not be read; what its owner then puts there is left alone, as often as the batch is resumed."""
+    source = photos(tmp_path / "in", "a")
+    good = (source / "a.png").read_bytes()
+    (source / "a.png").write_bytes(good[:60])
+    assert run(source, tmp_path / "runs").exit_code == 2
+    (tmp_path / "runs" / "a.scene").mkdir()
+    (tmp_path / "runs" / "a.scene" / "mine.txt").write_text("mine")
+    (source / "a.png").write_bytes(good)
+    for _ in range(2):
+        outcome = run(source, tmp_path / "runs", resume=True)
+        assert "exists" in reasons(outcome)["a"] or "not replaced" in reasons(outcome)["a"]
+        assert (tmp_path / "runs" / "a.scene" / "mine.txt").read_text() == "mine"

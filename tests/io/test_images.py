@@ -202,3 +202,41 @@ def test_deep_tiffs_of_odd_layouts(tmp_path):
     black, white = (decode(tiff(tmp_path / f"{k}.tif", ramp, photometric=k)).linear for k in (1, 0))
     np.testing.assert_allclose(black, white[::-1, ::-1], atol=1e-3)
     assert white[0, 0, 0] > 0.99, "white is zero there"
+
+
+def _exr(path, **channels):
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {name: np.full((9, 12), v, np.float32) for name, v in channels.items()}) as file:
+        file.write(str(path))
+
+
+def test_a_photo_is_the_layer_with_colours_whatever_lies_beside_it(tmp_path):
+    """A depth beside the picture, or before it as a part of its own, is none; as a map it is what is asked for."""
+    import OpenEXR
+
+    layered = {"beauty.R": 0.2, "beauty.G": 0.4, "beauty.B": 0.6, "Z": 7.0}
+    _exr(tmp_path / "layers.exr", **layered)
+    assert np.allclose(read_exr(tmp_path / "layers.exr", photo=True), [0.2, 0.4, 0.6])
+    assert np.allclose(read_exr(tmp_path / "layers.exr"), 7) and read_exr(tmp_path / "layers.exr").ndim == 2
+    pixels = lambda value: np.full((9, 12), value, np.float32)  # noqa: E731
+    parts = [OpenEXR.Part({}, {"Z": pixels(7)}, "depth"),
+             OpenEXR.Part({}, {"R": pixels(0.2), "G": pixels(0.4), "B": pixels(0.6)}, "rgb")]  # fmt: skip
+    with OpenEXR.File(parts) as file:
+        file.write(str(tmp_path / "parts.exr"))
+    assert np.allclose(read_exr(tmp_path / "parts.exr", photo=True), [0.2, 0.4, 0.6])
+    _exr(tmp_path / "depth.exr", Z=7.0)
+    with pytest.raises(InputError, match="RGB or Y is needed"):
+        read_exr(tmp_path / "depth.exr", photo=True)
+    _exr(tmp_path / "grey.exr", Y=0.3, A=0.5)
+    assert np.allclose(read_exr(tmp_path / "grey.exr", photo=True), [0.3, 0.3, 0.3, 0.5])
+
+
+def test_what_is_transparent_is_outside_of_a_mask(tmp_path):
+    pixels = np.full((20, 30, 4), 255, np.uint8)
+    pixels[..., 3] = 0
+    pixels[5:15, 10:20, 3] = 255
+    cv2.imwrite(str(tmp_path / "m.png"), pixels)
+    assert read_mask(tmp_path / "m.png", (20, 30)).sum() == 100
+    assert read_map(tmp_path / "m.png").min() == 1, "a map has no alpha"

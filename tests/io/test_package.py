@@ -351,3 +351,14 @@ def test_mesh_file_header_is_what_other_tools_expect(scene, tmp_path):
     (tmp_path / "m.ply").write_bytes((tmp_path / "m.ply").read_bytes()[:-1])
     with pytest.raises(SceneError, match="truncated"):
         read_ply(tmp_path / "m.ply")
+
+
+def test_what_comes_to_the_target_in_the_meantime_is_not_replaced(tmp_path):
+    from materialist.io.target import whole_folder
+
+    with pytest.raises(OutputError, match="exists"), whole_folder(tmp_path / "k.scene") as folder:
+        (folder / "scene.json").write_text("{}")
+        (tmp_path / "k.scene").mkdir()
+        (tmp_path / "k.scene" / "precious.txt").write_text("mine")
+    assert [p.name for p in tmp_path.iterdir()] == ["k.scene"]
+    assert (tmp_path / "k.scene" / "precious.txt").read_text() == "mine"

@@ -14,7 +14,7 @@ from PIL import Image, ImageCms
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError
 from materialist.io.exr import write_exr
-from materialist.io.photo import exposed, read_photo
+from materialist.io.photo import decode_photo, exposed, read_photo
 from materialist.types import Camera, Photo
 
 
@@ -427,3 +427,63 @@ def test_places_that_cannot_be_asked_for(tmp_path):
         read_photo(str(name))
     with pytest.raises(SceneError, match="cannot be read: file name too long"):
         load_scene(name)
+
+
+@pytest.mark.parametrize("mode", ["L", "RGBA", "CMYK", "RGB"])
+def test_turned_tiffs_are_upright(tmp_path, mode):
+    """Pillow maps some of them into memory, and gets the rows of turned ones wrong."""
+    pixels = np.random.default_rng(0).integers(0, 256, (20, 30, len(mode)), np.uint8)
+    pixels[..., 3:] = 255 if mode == "RGBA" else pixels[..., 3:]
+    image = Image.fromarray(pixels[..., 0] if mode == "L" else pixels, mode)
+    image.save(tmp_path / "a.tif")
+    image.save(tmp_path / "b.tif", tiffinfo={274: 6})
+    plain, turned = (decode_photo(tmp_path / name).linear for name in ("a.tif", "b.tif"))
+    assert turned.shape == (30, 20, 3)
+    np.testing.assert_array_equal(turned, plain.swapaxes(0, 1)[:, ::-1])
+
+
+def test_alpha_that_colours_are_multiplied_by(tmp_path):
+    """ExtraSamples 1, in 16 bits and in floats: the same picture as with straight alpha."""
+    import tifffile
+
+    rng = np.random.default_rng(1)
+    alpha = rng.uniform(0.3, 1, (12, 16, 1))
+    for kind, scale in ((np.uint16, 65535), (np.float32, 1)):
+        colour = rng.uniform(0.1, 0.9, (12, 16, 3))
+        found = []
+        for extra, pixels in ((["unassalpha"], colour), (["assocalpha"], colour * alpha)):
+            data = np.concatenate([pixels, alpha], -1) * scale
+            data = np.rint(data).astype(kind) if kind is np.uint16 else data.astype(kind)
+            tifffile.imwrite(tmp_path / "a.tif", data, photometric="rgb", extrasamples=extra)
+            found.append(decode_photo(tmp_path / "a.tif").linear)
+        assert np.abs(found[0] - found[1]).max() < 2e-4
+
+
+def test_transparent_float_tiffs_of_any_unit_are_laid_over_white(tmp_path):
+    import tifffile
+
+    pixels = np.full((16, 24, 4), 0.4, np.float32)
+    pixels[..., 3] = 1
+    pixels[4:8, 4:8, 3] = 0
+    for unit in (1, 1024, 1 / 1024):
+        data = pixels * np.float32([unit, unit, unit, 1])
+        tifffile.imwrite(tmp_path / "a.tif", data, photometric="rgb", extrasamples=["unassalpha"])
+        photo = read_photo(tmp_path / "a.tif")
+        assert photo.linear[5, 5] == pytest.approx(1), unit
+
+
+def test_float_tiffs_with_channels_apart_are_refused(tmp_path):
+    import tifffile
+
+    tifffile.imwrite(tmp_path / "a.tif", np.zeros((3, 12, 16), np.float32), photometric="rgb", planarconfig="separate")
+    with pytest.raises(InputError, match="one after the other"):
+        decode_photo(tmp_path / "a.tif")
+
+
+def test_a_part_of_a_frame_is_told(tmp_path):
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, "pixelAspectRatio": 2.0,
+              "displayWindow": (np.array([0, 0], np.int32), np.array([99, 49], np.int32))}  # fmt: skip
+    with OpenEXR.File(header, {"RGB": np.full((20, 30, 3), 0.5, np.float32)}) as file:
+        file.write(str(tmp_path / "a.exr"))
+    told = " ".join(decode_photo(tmp_path / "a.exr").warnings)
+    assert "a part of its frame" in told and "not square" in told

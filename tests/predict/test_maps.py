@@ -210,3 +210,14 @@ def test_normals_without_a_negative_value_are_normals_when_they_have_unit_length
     maps["normal"] = normal
     read = get_predictor(write(tmp_path, **maps)).predict(photo())
     assert (read.normal >= -1e-6).all()
+
+
+@pytest.mark.parametrize("far", [1e10, 3.4e38])
+def test_depths_that_no_scene_has_are_sky(tmp_path, far):
+    """Renderers write such numbers for rays that meet nothing; most of the picture may be such."""
+    depth = np.full((H, W), far, np.float32)
+    depth[H // 2 :] = 3
+    depth[-1] = 4000
+    found = get_predictor(write(tmp_path, **{**good_maps(), "depth": depth})).predict(photo())
+    assert (found.depth[: H // 2] == 0).all() and (found.depth[H // 2 :] == depth[H // 2 :]).all()
+    assert any("taken as sky" in note for note in found.warnings)

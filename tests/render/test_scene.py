@@ -6,6 +6,7 @@ from render_scenes import empty, uniform, wall, with_floor
 
 from materialist.camera import pixel_rays, unproject
 from materialist.errors import InputError
+from materialist.geometry.build import build_geometry
 from materialist.render import brdf
 from materialist.render.scene import RenderScene
 from materialist.types import Camera, Materials
@@ -256,3 +257,18 @@ def test_bad_maps_and_options_are_refused():
         scene.render(spp=0)
     with pytest.raises(InputError, match="max_depth is 0"):
         scene.render(spp=1, max_depth=0)
+
+
+def test_normals_along_the_picture_s_x_are_normals_like_others():
+    """Of a wall seen edge on, on facets that face the camera: u runs along them, where a shading frame needs others."""
+    from materialist.render.scene import _beside_u
+
+    side = np.float32([[1, 0, 0], [-1, 0, 0], [0.9999, 0.01, 0], [0, 0, 1]])
+    found = _beside_u(side)
+    assert np.allclose(np.linalg.norm(found, axis=-1), 1, atol=1e-4) and np.abs(found - side).max() < 2e-3
+    assert (np.abs(found[:2, 0]) < 1 - 1e-7).all() and np.array_equal(found[2:], side[2:])
+    normal = np.zeros((*SIZE, 3), np.float32)
+    normal[..., 0] = 1
+    scene = scene_of(build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none"))
+    for integrator in (scene.render, scene.render_path):
+        assert np.isfinite(integrator(spp=4)).all()

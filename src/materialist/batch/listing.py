@@ -63,10 +63,13 @@ def _of_folder(folder: Path, runs: Path) -> list[Listed]:
     if os.path.realpath(folder) == own:
         raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
     try:
-        for place, below, files in os.walk(folder, onerror=_raise):
-            if MARKER in files or LEDGER in files or os.path.realpath(place) == own:
+        seen = set[str]()
+        for place, below, files in os.walk(folder, onerror=_raise, followlinks=True):
+            real = os.path.realpath(place)
+            if MARKER in files or LEDGER in files or real == own or real in seen:
                 below.clear()
                 continue
+            seen.add(real)
             below[:] = sorted(name for name in below if not name.startswith("."))
             for name in files:
                 if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:

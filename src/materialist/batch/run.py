@@ -210,6 +210,9 @@ class _Run:
         before = self._ledger.last.get(job.id, {})
         kind = DONE if news.kind == DONE else FAILED
         known = {key: before[key] for key in (*_OF_THE_SCENE, *_OWN) if key in before}
+        if kind == FAILED:  # where it left nothing, what is there next time is somebody else's
+            known |= {key: known[key] and place.exists() for key, place in zip(_OWN, (job.scene, job.picture))
+                      if key in known}  # fmt: skip
         self._ledger.append(kind, id=job.id, name=job.name, attempts=self._tries[job.id], **{**known, **facts})
         self._through += 1
         self._failed += kind == FAILED

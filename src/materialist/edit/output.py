@@ -49,4 +49,4 @@ def is_deep(photo: Photo) -> bool:
         return len(head) > 24 and head[24] == 16
     if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
         return True
-    return head.startswith((b"II*\0", b"MM\0*"))
+    return head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"))

@@ -40,7 +40,7 @@ def decode(path: Path, over: float = 1.0) -> Decoded:
         if head.startswith((b"#?RADIANCE", b"#?RGBE")):
             return _hdr(path)
         if head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")) and _is_float_tiff(path):
-            return _float_tiff(path)
+            return _float_tiff(path, over)
         return _picture(path)
     except MaterialistError:
         raise
@@ -56,9 +56,10 @@ def _picture(path: Path) -> Decoded:
     from pillow_heif import register_heif_opener
 
     register_heif_opener()
-    with _pixel_limit_lifted():
+    # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
+    with _pixel_limit_lifted(), path.open("rb") as file:
         try:
-            image = Image.open(path)
+            image = Image.open(file)
         except UnidentifiedImageError as error:
             raise InputError(f"{path} is not an image this program can read; give it a {FORMATS} file.") from error
         with image:
@@ -143,6 +144,8 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
         scene_linear = False
         if _tiff_tag(image, PHOTOMETRIC, 1) == 0:  # white is zero
             colour = scale - colour
+        if alpha is not None and _tiff_tag(image, EXTRA, 2) == 1:  # multiplied by it
+            colour = np.clip(np.rint(colour / np.maximum(alpha, 1e-6)), 0, scale).astype(pixels.dtype)
         profile = image.info.get("icc_profile") or b""
         matrix = matrix_profile(profile)
         if profile and matrix is None:
@@ -153,13 +156,15 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
 
 
-PHOTOMETRIC, PLANAR = 262, 284
-"""Tags of TIFF: what values mean, and whether channels lie apart."""
+PHOTOMETRIC, PLANAR, EXTRA = 262, 284, 338
+"""Tags of TIFF: what values mean, whether channels lie apart, and what those beyond colour are (1: alpha that colours
+are multiplied by)."""
 
 
 def _tiff_tag(image: Any, tag: int, usual: int) -> int:
     """The value of a tag of a TIFF, `usual` where it has none or the image is no TIFF."""
-    return int((getattr(image, "tag_v2", None) or {}).get(tag, usual))
+    found = (getattr(image, "tag_v2", None) or {}).get(tag, usual)
+    return int(found[0] if isinstance(found, tuple) else found)
 
 
 def _require_interleaved(image: Any, path: Path) -> None:
@@ -179,35 +184,50 @@ def _is_float_tiff(path: Path) -> bool:
         return True
 
 
-def _float_tiff(path: Path) -> Decoded:
+def _float_tiff(path: Path, over: float) -> Decoded:
     """Float RGB TIFF, scene-linear; OpenCV applies the orientation itself."""
     import cv2
+    from tifffile import TiffFile
 
+    with TiffFile(path) as file:
+        tags = file.pages[0].tags  # type: ignore[union-attr]
+        apart = int(tags.valueof(PLANAR, 1))
+        extra = np.atleast_1d(tags.valueof(EXTRA, 2))
+    if apart == 2:
+        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
     pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3 or pixels.dtype.kind != "f":
         raise InputError(f"{path} is a damaged TIFF, or one of an unusual layout; save it as 8- or 16-bit RGB.")
     check_size(pixels.shape[1], pixels.shape[0], path)
-    warnings: list[str] = []
-    colour = np.ascontiguousarray(pixels[..., 2::-1], np.float32)
+    colour, laid = np.ascontiguousarray(pixels[..., 2::-1], np.float32), False
     if pixels.shape[2] == 4:
-        colour = _over_white(colour, pixels[..., 3:].astype(np.float32), warnings)
-    return Decoded(colour, True, {}, warnings)
+        alpha = np.clip(pixels[..., 3:].astype(np.float32), 0, 1)
+        laid = over > 0 and bool(np.any(alpha < 1))
+        colour = (colour if extra[0] == 1 else colour * alpha) + np.float32(over) * (1 - alpha)
+    return Decoded(colour, True, {}, ["Transparent parts are laid over white."] * laid, laid)
 
 
 def _exr(path: Path, over: float) -> Decoded:
     """OpenEXR; alpha is premultiplied there."""
     import OpenEXR
 
+    warnings: list[str] = []
     with OpenEXR.File(str(path), header_only=True) as file:
-        low, high = file.header()["dataWindow"]
+        header = dict(file.header())
+    low, high = (np.asarray(corner) for corner in header["dataWindow"])
     check_size(int(high[0] - low[0] + 1), int(high[1] - low[1] + 1), path)
-    pixels, laid = read_exr(path), False
+    first, last = (np.asarray(corner) for corner in header.get("displayWindow", (low, high)))
+    if (low != first).any() or (high != last).any():
+        warnings.append("The file holds a part of its frame, taken for the whole photo; give --fov for that part.")
+    if abs(float(header.get("pixelAspectRatio", 1)) - 1) > 1e-3:
+        warnings.append("The file says that its pixels are not square; they are taken as square.")
+    pixels, laid = read_exr(path, photo=True), False
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
     if pixels.shape[-1] == 4:
         laid = over > 0 and bool(np.any(pixels[..., 3] < 1))
         pixels = pixels[..., :3] + over * np.clip(1 - pixels[..., 3:], 0, 1)
-    warnings = ["Transparent parts are laid over white."] * laid
+    warnings += ["Transparent parts are laid over white."] * laid
     return Decoded(np.ascontiguousarray(pixels), True, {}, warnings, laid)
 
 

@@ -11,13 +11,17 @@ from materialist.plain import is_utf8
 from materialist.types import Array
 
 _GREY = ("Y", "V", "L", "Z", "y", "depth")
+_LIGHT = ("Y", "L", "y")
+"""Those of them that may be a photo."""
 _PICTURES = ("beauty", "combined", "rgba", "rgb", "image", "final")
 """Names of the layer that is the picture, where there are several."""
 
 
-def read_exr(path: str | Path) -> Array:
+def read_exr(path: str | Path, *, photo: bool = False) -> Array:
     """The picture in an EXR: [H, W, C] float32 for colour channels, [H, W] float32 for a single one.
 
+    As a `photo` it is the first part and layer with colours, whatever lies beside them, else grey, with alpha as RGBA;
+    a depth is none. As a map it is the first part's, and a lone channel goes before layers.
     Half and float pixels are both returned as float32; values are as stored (linear, unclipped, NaN kept).
     Raises InputError when the file is missing, is not an EXR, is damaged, or holds no picture we know how to read.
     """
@@ -30,12 +34,19 @@ def read_exr(path: str | Path) -> Array:
         raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: channel.pixels for name, channel in file.channels().items()}
+            parts = [
+                {name: channel.pixels for name, channel in file.channels(k).items()}
+                for k in range(len(file.parts) if photo else 1)
+            ]
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(
             f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
         ) from error
-    array = _pick(channels, path)
+    if photo:
+        coloured = [part for part in parts if _coloured(_layers(part))]
+        array = _pick_photo((coloured or parts)[0], path)
+    else:
+        array = _pick(parts[0], path)
     return np.ascontiguousarray(array, np.float32)
 
 
@@ -61,24 +72,62 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
         raise OutputError(f"{path} cannot be written: {error}") from error
 
 
-def _pick(channels: dict[str, Array], path: Path) -> Array:
-    """The picture among the channels: plain RGB(A), then grey, then a layer with RGB(A), the one named so first."""
-    odd = [name for name, pixels in channels.items() if pixels.dtype not in (np.float16, np.float32)]
-    layers: dict[str, dict[str, Array]] = {}
+def _odd(channels: dict[str, Array]) -> list[str]:
+    """Names of channels that hold no half or float."""
+    return [name for name, pixels in channels.items() if pixels.dtype not in (np.float16, np.float32)]
+
+
+def _layers(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
+    """Layer -> channel -> pixels; "" is what has no layer."""
+    odd, layers = _odd(channels), dict[str, dict[str, Array]]()
     for name in [name for name in channels if name not in odd]:
         layer, _, part = name.rpartition(".")
         layers.setdefault(layer, {})[part.upper() if len(part) == 1 else part] = channels[name]
-    coloured = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
-    named = sorted(coloured, key=lambda layer: layer.rpartition(".")[2].lower() not in _PICTURES)
+    return layers
+
+
+def _coloured(layers: dict[str, dict[str, Array]]) -> list[str]:
+    """Names of the layers with RGB, the plain one first, then those that are named as pictures are."""
+    found = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
+    return sorted(found, key=lambda layer: (layer != "", layer.rpartition(".")[2].lower() not in _PICTURES))
+
+
+def _stacked(parts: dict[str, Array], names: str) -> Array:
+    """[H, W, C] float32, with alpha where there is one."""
+    return np.stack([parts[c].astype(np.float32) for c in (names + "A" if "A" in parts else names)], -1)
+
+
+def _pick_photo(channels: dict[str, Array], path: Path) -> Array:
+    """The photo among the channels: RGB(A), else grey, with its alpha."""
+    layers, odd = _layers(channels), _odd(channels)
+    for layer in _coloured(layers):
+        return _stacked(layers[layer], "RGB")
+    for name in _LIGHT:
+        if name in channels and name not in odd:
+            plain = layers[""]
+            return _stacked(plain, 3 * name.upper()) if "A" in plain else channels[name]
+    lone = next(iter(channels), "")
+    if len(channels) == 1 and not odd and lone not in _GREY:
+        return channels[lone]
+    return _refused(channels, odd, path)
+
+
+def _pick(channels: dict[str, Array], path: Path) -> Array:
+    """The map among the channels: plain RGB(A), then grey, then a layer with RGB(A), the one named so first."""
+    layers, odd = _layers(channels), _odd(channels)
+    coloured = _coloured(layers)
     if "" not in coloured:
         for name in _GREY:
             if name in channels and name not in odd:
                 return channels[name]
-    for layer in ["", *named] if "" in coloured else named:
-        parts = layers[layer]
-        return np.stack([parts[c].astype(np.float32) for c in ("RGBA" if "A" in parts else "RGB")], -1)
+    for layer in coloured:
+        return _stacked(layers[layer], "RGB")
     if len(channels) == 1 and not odd:
         return next(iter(channels.values()))
+    return _refused(channels, odd, path)
+
+
+def _refused(channels: dict[str, Array], odd: list[str], path: Path) -> Array:
     if odd:
         raise InputError(f"{path} holds {channels[odd[0]].dtype} pixels; save it as half or float.")
     raise InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")

@@ -77,10 +77,16 @@ def read_map(path: str | Path) -> Array:
     An 8-bit albedo that another tool saved sRGB-encoded is for the caller to decode: the file does not say.
     Alpha is dropped. Raises InputError when the file is missing or unreadable.
     """
+    return _with_alpha(path)[0]
+
+
+def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
+    """The values as `read_map` has them, and alpha [H, W] in [0, 1] where there is one."""
     path = Path(path)
     if path.suffix.lower() == ".exr":
         array = read_exr(path)
-        return array[..., :3] if array.ndim == 3 else array
+        alpha = array[..., 3] if array.ndim == 3 and array.shape[-1] == 4 else None
+        return (array[..., :3] if array.ndim == 3 else array), alpha
     import cv2
 
     if not path.is_file():
@@ -92,10 +98,11 @@ def read_map(path: str | Path) -> Array:
     if decoded is None:
         raise InputError(f"{path} is not a readable image (use EXR, or 8- or 16-bit PNG).")
     array = np.asarray(decoded)
+    scale = np.float32({"uint8": 255, "uint16": 65535}.get(array.dtype.name, 1))
+    alpha = array[..., -1] / scale if array.ndim == 3 and array.shape[2] in (2, 4) else None
     if array.ndim == 3:
         array = array[..., 2::-1] if array.shape[2] >= 3 else array[..., 0]
-    scale = {"uint8": 255, "uint16": 65535}.get(array.dtype.name, 1)
-    return np.ascontiguousarray(array, np.float32) / np.float32(scale)
+    return np.ascontiguousarray(array, np.float32) / scale, alpha
 
 
 def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
@@ -107,17 +114,18 @@ def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
 
 
 def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None) -> Array:
-    """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside.
+    """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside, what is transparent is outside.
 
     The file may have the working size `shape`, or the photo's `native` (H0, W0), or any size of that aspect ratio;
     it is area-averaged to `shape`. Raises InputError for another aspect ratio, an empty mask, or a colour photo.
     """
     import cv2
 
-    mask = read_map(path)
+    mask, alpha = _with_alpha(path)
     if mask.ndim == 3 and ((np.ptp(mask, axis=-1) > 0.05) & (np.abs(mask.max(-1) - 0.5) < 0.4)).mean() > COLOURED:
         raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")
     mask = mask.max(-1) if mask.ndim == 3 else mask
+    mask = mask if alpha is None else mask * np.float32(alpha)
     if mask.shape != shape:
         sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
         if not same_aspect(mask.shape, shape):

@@ -72,7 +72,7 @@ def load_scene(path: str | Path) -> Scene:
             lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
             bodies=read_bodies(folder, meta.get("bodies", [])),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise SceneError(f"{folder / MARKER} is incomplete or damaged ({error}); save the scene again.") from error
 
 

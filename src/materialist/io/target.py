@@ -58,6 +58,8 @@ def whole_folder(path: str | Path, force: bool = False) -> Iterator[Path]:
     try:
         temporary.mkdir()
         yield temporary
+        if target.is_symlink() or target.exists():  # it may have come in the meantime
+            _require_replaceable(path, target, force)
         _put_in_place(temporary, target)
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {_reason(error)}.") from error

@@ -17,6 +17,8 @@ from materialist.types import Array, Materials, Photo, Prediction
 
 SLIGHT = 0.1
 """How far outside its range a value may be and still be clipped with a warning."""
+BEYOND = 1e5
+"""How many times the nearest surfaces' depth is no surface: renderers write large numbers for what they do not hit."""
 WILD_FRACTION = 0.01
 """Above this fraction of pixels further outside, the map is in another unit and refused."""
 
@@ -212,6 +214,11 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
     if negative.any():
         warnings.append(f"{path.name} has {int(negative.sum())} negative depths: taken as no surface.")
     values = np.maximum(values, 0)
+    if (values > 0).any():
+        far = values > BEYOND * np.percentile(values[values > 0], 5)
+        if far.any():
+            warnings.append(f"{path.name} has depths of up to {values.max():.3g}: taken as sky (no surface).")
+            values = np.where(far, 0, values).astype(np.float32)
     if not (values > 0).any():
         raise InputError(f"{path} is 0 everywhere, so there is no surface to reconstruct; depth must be positive.")
     if path.suffix == ".png" and np.unique(values).size <= 256:
