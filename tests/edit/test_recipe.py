@@ -147,3 +147,19 @@ def test_a_given_background_is_seen_in_the_light_of_the_photo(tmp_path):
         (tmp_path / f"{k}.yaml").write_text(text)
         found.append(apply(scene, read_recipe(tmp_path / f"{k}.yaml")).materials.albedo[block_mask(36, 48)].mean())
     assert found[0] == pytest.approx(found[1], rel=0.02) and found[1] == pytest.approx(found[2], rel=0.02)
+
+
+@pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",
+                                    "glass: {mask: block.png, model: two-interface}"])  # fmt: skip
+def test_what_was_taken_away_is_in_no_later_region(folder, second):
+    with pytest.raises(InputError, match=r"Step 2 .*took away what is there"):
+        replay(folder, f"- remove: {{mask: block.png}}\n- {second}\n")
+    wide = np.zeros(MASK.shape, bool)
+    rows = np.nonzero(MASK)[0]
+    wide[rows.min() :, :] = True
+    Image.fromarray((wide * 255).astype(np.uint8)).save(folder / "wide.png")
+    removed = replay(folder, "- remove: {mask: block.png}\n")
+    got = replay(folder, "- remove: {mask: block.png}\n- edit: {mask: wide.png, albedo: [0, 0, 1]}\n")
+    gone = removed.depth != SCENE.depth
+    assert gone.any() and np.array_equal(got.materials.albedo[gone], removed.materials.albedo[gone])
+    assert np.allclose(got.materials.albedo[wide & ~gone], [0, 0, 1])

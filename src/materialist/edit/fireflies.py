@@ -13,10 +13,16 @@ TIMES = 3.0
 """A pixel may be this many times as bright as the second brightest of its eight neighbours."""
 
 
-def without_fireflies(picture: Array, where: Array | None = None) -> Array:
+WIDE = 10.0
+"""Standard deviation, pixels, over which lone light is spread where it must not be lost."""
+
+
+def without_fireflies(picture: Array, where: Array | None = None, *, spread: bool = False) -> Array:
     """[H, W, 3] linear with lone bright pixels brought down, their colour kept; a highlight of two pixels stays.
 
-    `where` [H, W] bool: pixels that may change; all by default. No pixel becomes brighter.
+    `where` [H, W] bool: pixels that may change; all by default. No pixel becomes brighter, unless `spread`: what is
+    taken away then lies about it, as wide as WIDE. So it is with lamps beside glass, through which no path
+    can aim at them: what is seen there is lit by lone paths alone.
     """
     from scipy.ndimage import rank_filter
 
@@ -29,4 +35,14 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     if where is not None:
         lone &= where
     factor = np.where(lone, limit / np.maximum(light, 1e-9), 1)
-    return (picture * factor[..., None]).astype(np.float32)
+    found = (picture * factor[..., None]).astype(np.float32)
+    return found + _spread(picture - found, np.ones(light.shape, bool) if where is None else where) if spread else found
+
+
+def _spread(light: Array, where: Array) -> Array:
+    """[H, W, 3] the light of each pixel of `where`, shared out to those of `where` around it; its sum stays."""
+    import cv2
+
+    blurred = lambda v: cv2.GaussianBlur(v, (0, 0), WIDE, borderType=cv2.BORDER_CONSTANT)  # noqa: E731
+    own = where.astype(np.float32)
+    return blurred(np.float32(light) * (own / np.maximum(blurred(own), 1e-6))[..., None]) * own[..., None]

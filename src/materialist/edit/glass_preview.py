@@ -9,6 +9,8 @@ import numpy as np
 
 from materialist.edit.fireflies import without_fireflies
 from materialist.edit.glass import glass, glass_surface
+from materialist.edit.layers import focused
+from materialist.edit.lights import add_lamps
 from materialist.errors import InputError
 from materialist.types import Array, Scene, Surface
 
@@ -69,7 +71,9 @@ class GlassPreview:
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
         traced = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
-        return self._in_photo(denoised(without_fireflies(spread(traced)), self._guides[size]), surface)
+        return self._in_photo(
+            denoised(without_fireflies(spread(traced), spread=focused(self._edited)), self._guides[size]), surface
+        )
 
     @property
     def edited(self) -> Scene:
@@ -148,6 +152,8 @@ class GlassPreview:
         edited = self._edited
         bodies = (*edited.bodies[:-1], replace(edited.bodies[-1], surface=surface))
         target = RenderScene(edited.geometry, edited.camera, bodies=bodies, device=self._device)
+        if edited.lamps:
+            add_lamps(target, edited.lamps)
         target.set_materials(edited.materials)
         target.set_envmap(edited.envmap)
         return target, target.mi.traverse(target.mi_scene)

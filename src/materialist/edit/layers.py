@@ -63,8 +63,19 @@ def render_layers(
         if clean and anything.any():
             albedo, normal = studio.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
-    layers = difference(base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress)
+    layers = difference(
+        base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress,
+        focused=focused(edited),
+    )  # fmt: skip
     return replace(layers, relit=relit, portrait=alone, covered=covered)
+
+
+def focused(scene: Scene) -> bool:
+    """Whether small lights of the scene's own stand beside glass, through which no path can aim at them."""
+    from materialist.render.bodies import is_glowing, is_transparent
+
+    lit = bool(scene.lamps) or any(is_glowing(body.surface) for body in scene.bodies)
+    return lit and any(is_transparent(body.surface) for body in scene.bodies)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:
@@ -92,7 +103,7 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 def difference(
     base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
-    clean: bool = True, begun: tuple[Begun, Begun] | None = None, progress=None,
+    clean: bool = True, begun: tuple[Begun, Begun] | None = None, progress=None, focused: bool = False,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
 
@@ -106,6 +117,7 @@ def difference(
             another one, of the edited scene.
         clean: denoise both pictures before they are compared, where the denoiser is installed.
         begun: the same two renderings in shares, to trace all paths only where noise would be seen.
+        focused: whether small lights stand beside glass, so that lone bright pixels are what lights the rest.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
@@ -129,7 +141,7 @@ def difference(
         return Layers(b, b, differs, changed & differs, raw)
     gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
     if clean:
-        b, e = denoised(b, without_fireflies(e, changed), guides)
+        b, e = denoised(b, without_fireflies(e, changed, spread=focused), guides)
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached, raw)

@@ -16,7 +16,7 @@ from materialist.edit.relight import lamp, read_envmap, relight
 from materialist.edit.select import select
 from materialist.edit.thickness import METHODS
 from materialist.errors import InputError, OutputError
-from materialist.types import Scene
+from materialist.types import Array, Scene
 
 REGION = ("mask", "click", "box", "with")
 MATERIAL = (
@@ -149,9 +149,19 @@ def _region(scene: Scene, step: Step):
     return select(scene, method=given.get("with", "network"), **where)
 
 
+def _left(scene: Scene, edited: Scene, region: Array) -> Array:
+    """[H, W] bool: what of a region chosen on the original photo earlier steps have not taken away."""
+    gone = region & (edited.depth != scene.depth)
+    if 2 * gone.sum() > region.sum():
+        raise InputError(
+            "An earlier step took away what is there; leave this one out, or save the scene (--save) and edit that one."
+        )
+    return region & ~gone
+
+
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    region = _region(scene, step)
+    region = _left(scene, edited, _region(scene, step))
     options: dict[str, Any] = {
         k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
     }
@@ -230,7 +240,7 @@ def _thing(step: Step) -> dict[str, Any]:
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return without(edited, _region(scene, step), **_removal(step), fitted=scene)
+    return without(edited, _left(scene, edited, _region(scene, step)), **_removal(step), fitted=scene)
 
 
 def _removal(step: Step) -> dict[str, Any]:
@@ -252,7 +262,7 @@ def _removal(step: Step) -> dict[str, Any]:
 
 def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
     region, options = glass_arguments(scene, step)
-    return glass(edited, region, **options, fitted=scene)
+    return glass(edited, _left(scene, edited, region), **options, fitted=scene)
 
 
 def glass_arguments(scene: Scene, step: Step):

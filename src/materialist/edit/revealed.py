@@ -38,7 +38,7 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if scene.bodies:
         filled &= placed(scene) < 1
     bare = _bare(studio, edited, layers, spp, seed, clean)
-    if not _given(edited):
+    if not _given(scene, edited):
         factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
         change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
         bare = np.maximum(bare - change, 0)  # filled places may be far brighter than what is rendered there
@@ -63,9 +63,10 @@ def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: boo
     return denoised(picture, picture, guides)[0] if clean else picture
 
 
-def _given(edited: Scene) -> bool:
-    """Whether the filled photo is a picture of what is there, and not made from its surroundings."""
-    return any(step.get("filled_by") == "background" for step in edited.provenance.get("edits", ()))
+def _given(scene: Scene, edited: Scene) -> bool:
+    """Whether the photo was filled by a picture of what is there, and not from its surroundings, since `scene`."""
+    steps = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    return any(step.get("filled_by") == "background" for step in steps)
 
 
 def _continued(change: Array, filled: Array, plane: Array) -> Array:
