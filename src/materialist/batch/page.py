@@ -79,11 +79,8 @@ def _card(runs: Path, row: Row) -> str:
     if row["status"] == "open":
         return f"<article class=open>{head}<p>Not reached.</p></article>"
     notes = "".join(f"<li>{html.escape(text)}</li>" for text in row["warnings"] or ())
-    folded = (
-        f"<details><summary>{len(row['warnings'])} note{'s' * (len(row['warnings']) > 1)}</summary><ul>{notes}</ul></details>"
-        if notes
-        else ""
-    )
+    count = f"{len(row['warnings'] or ())} note{'s' * (len(row['warnings'] or ()) > 1)}"
+    folded = f"<details><summary>{count}</summary><ul>{notes}</ul></details>" if notes else ""
     return f"<article>{_strip(runs, row)}{head}<p>{_figures(row)}</p>{_places(runs, row)}{folded}</article>"
 
 
