@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.report import Column, Report, write
+from materialist.bench.report import Column, Pace, Report, write
 from materialist.errors import InputError
 from materialist.predict.mix import MAPS
 from materialist.types import Array, Camera, Materials, Photo, Prediction
@@ -90,6 +90,8 @@ def run(
         report = Report("Predicted maps", NOTE, settings, COLUMNS, _with_pooled(rows), ("albedo_psnr", "normal_angle"))
         write(report, output)
 
+    pace = Pace()
+
     def add(folder: Path, kind: str, most: int) -> None:
         for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
             unreadable: list[str] = []
@@ -101,7 +103,8 @@ def run(
                     strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
                 absent = absent_maps(truth)
                 settings.update({f"no true {which}": True for which in absent})
-                tell()
+                if pace.due():
+                    tell()
             if unreadable:
                 settings["left out"] = "; ".join(unreadable)
         if not rows:

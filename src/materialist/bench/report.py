@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,22 @@ class Report:
     """Keys of the columns in the plot."""
     draw: Callable[[Report, Path], None] | None = None
     """Draws the plot to a path instead: draw(report, path)."""
+
+
+class Pace:
+    """Says when a report that grows is to be written again: at first, then every SECONDS."""
+
+    SECONDS = 20.0
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def due(self) -> bool:
+        """Whether it is time; the next time is counted from here."""
+        if time.monotonic() < self._next:
+            return False
+        self._next = time.monotonic() + self.SECONDS
+        return True
 
 
 def claim(folder: Path, *, force: bool = False) -> Path:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.report import Column, Report, write
+from materialist.bench.report import Column, Pace, Report, write
 from materialist.errors import InputError
 from materialist.types import Array
 
@@ -54,6 +54,7 @@ def run(
     sources = {spec: opened(spec, device) for spec in specs_of(predictor)}
     rows: list[dict[str, Any]] = []
     lost: dict[str, str] = {}
+    pace = Pace()
     settings: dict[str, Any] = {"pictures": len(pairs), "size": size, "delta": delta, "every": every, "seed": seed}
     report = Report("WHDR", NOTE.format(delta=delta), settings, COLUMNS, rows, plotted=("whdr",))
     for spec in (*BASELINES, *sources):
@@ -65,9 +66,11 @@ def run(
             except InputError as error:
                 lost[picture.name] = str(error)
                 settings |= {"pictures": len(pairs) - len(lost), "unreadable": "; ".join(lost.values())}
-            write(report, output)
+            if pace.due():
+                write(report, output)
     if not rows:
         raise InputError(next(iter(lost.values())))
+    write(report, output)
 
 
 def find(folder: Path) -> list[tuple[Path, Path]]:

@@ -84,7 +84,8 @@ def adopt(model: HubModel, source: Path) -> tuple[Path, int]:
     there = [path for path in sorted(source.rglob("*")) if path.is_file()]
     wanted = chosen([Remote(path.relative_to(source).as_posix(), path.stat().st_size, None) for path in there])
     names = {remote.name for remote in wanted}
-    if not any(name.endswith(WEIGHTS) for name in names) or (model.main_file and model.main_file not in names):
+    needed = {model.main_file} - {""} if not model.main_file.endswith(WEIGHTS) else set()
+    if not any(name.endswith(WEIGHTS) for name in names) or not needed <= names:
         raise InputError(f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again.")
     folder, sums = folder_of(model), {}
     try:

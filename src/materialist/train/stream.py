@@ -108,7 +108,7 @@ def _is_aside(source: Source, place: int) -> bool:
 
 def none_aside(source: Source) -> bool:
     """Whether `kept_aside` has to take samples that are trained on."""
-    return len(source) < KEPT_ASIDE and getattr(source, "validation", lambda: None)() is None
+    return len(trained_on(source)) == len(source) and getattr(source, "validation", lambda: None)() is None
 
 
 def kept_aside(source: Source, most: int) -> list[Sample]:
