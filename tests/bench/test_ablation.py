@@ -1,6 +1,7 @@
 """`bench ablation` on one tiny photo."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -50,6 +51,15 @@ def test_the_true_field_of_view_is_the_reference(rows):
 def test_seconds_are_told_only_where_the_goal_was_reached(rows):
     lights = [row for name, row in rows.items() if name.startswith("light")]
     assert all(("reached" in row) == (row["loss"] <= 0.2) for row in lights) and any("reached" in row for row in lights)
+
+
+def test_captured_objects_and_light(mitsuba, tmp_path):
+    data = Path(__file__).parents[3] / "shared" / "data"
+    if not data.is_dir():
+        pytest.skip("needs ../shared")
+    bench.run("ablation", data=data, output=tmp_path / "out", tables="fov", scenes=1, size=24, spp=4, device="cpu")
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert len(report["rows"]) == 3 and report["settings"]["data"] == "data"
 
 
 def test_unknown_tables_are_refused(tmp_path):

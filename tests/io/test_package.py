@@ -362,3 +362,14 @@ def test_what_comes_to_the_target_in_the_meantime_is_not_replaced(tmp_path):
         (tmp_path / "k.scene" / "precious.txt").write_text("mine")
     assert [p.name for p in tmp_path.iterdir()] == ["k.scene"]
     assert (tmp_path / "k.scene" / "precious.txt").read_text() == "mine"
+
+
+def test_json_that_no_scene_has_is_damage(tmp_path):
+    save_scene(make_scene(), tmp_path / "a.scene")
+    file = tmp_path / "a.scene" / "scene.json"
+    content = json.loads(file.read_text())
+    content["camera"]["width"] = float("inf")
+    for text in ("[" * 200_000, json.dumps(content)):
+        file.write_text(text)
+        with pytest.raises(SceneError, match="damaged"):
+            load_scene(tmp_path / "a.scene")

@@ -86,7 +86,7 @@ def run(
     setup(device)
     settings = {
         "tables": ",".join(wanted), "scenes": scenes, "size": size, "predictor": predictor, "longest": longest,
-        "goal": goal, "spp": spp, "seed": seed, "device": device, "data": data,
+        "goal": goal, "spp": spp, "seed": seed, "device": device, "data": None if data is None else data.name,
     }  # fmt: skip
     rows: list[dict[str, Any]] = []
     report = Report("Ablations", NOTE, settings, COLUMNS, rows, ("psnr", "loss"))

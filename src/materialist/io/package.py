@@ -246,7 +246,7 @@ def _read_json(path: Path) -> dict[str, Any]:
         content = json.loads(path.read_text("utf-8"))
     except OSError as error:
         raise SceneError(f"{path} is missing; this is not a whole scene package.") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SceneError(f"{path} is damaged ({error}); save the scene again.") from error
     if not isinstance(content, dict):
         raise SceneError(f"{path} is damaged (not an object); save the scene again.")
