@@ -1,5 +1,7 @@
 """A batch's list of edits for one photo of it: names put in, and a key that knows the files behind them."""
 
+import json
+
 import numpy as np
 import pytest
 from made_batch import photos
@@ -34,6 +36,30 @@ def test_the_key_changes_with_a_mesh_and_with_nothing_else(recipe):
     assert edits_key(recipe, "a", 8) == key
     (recipe.parent / "ball.ply").write_text("another ball")
     assert edits_key(recipe, "a", 8) != key
+
+
+@pytest.mark.parametrize("changed", ["look/ball.mtl", "wood grain.png", "rough.png"])
+def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
+    (tmp_path / "look").mkdir()
+    (tmp_path / "look" / "ball.mtl").write_text("newmtl a\nmap_Kd wood grain.png\nmap_Ns -s 2 2 2 rough.png\n")
+    (tmp_path / "ball.obj").write_text("mtllib look/ball.mtl\nv 0 0 0\n")
+    (tmp_path / "edits.yaml").write_text("- insert: {mesh: ball.obj, at: [3, 4]}\n")
+    for name in ("wood grain.png", "rough.png", "nobody's.png"):
+        (tmp_path / name).write_text(name)
+    key = edits_key(tmp_path / "edits.yaml", "a", 8)
+    (tmp_path / "nobody's.png").write_text("new")
+    assert edits_key(tmp_path / "edits.yaml", "a", 8) == key
+    (tmp_path / changed).write_text((tmp_path / changed).read_text() + " new\n")
+    assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
+
+
+def test_the_key_knows_what_a_gltf_refers_to(tmp_path):
+    uris = ["data:image/png;base64,AA==", "wood%20grain.png", "../outside.png"]
+    (tmp_path / "ball.gltf").write_text(json.dumps({"images": [{"uri": uri} for uri in uris], "buffers": [{}]}))
+    (tmp_path / "edits.yaml").write_text("- insert: {mesh: ball.gltf, at: [3, 4]}\n")
+    key = edits_key(tmp_path / "edits.yaml", "a", 8)
+    (tmp_path / "wood grain.png").write_text("grain")
+    assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
 
 
 def test_files_that_are_missing_are_found_step_by_step(recipe):

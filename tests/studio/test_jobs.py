@@ -14,7 +14,7 @@ import json, os, sys, time
 spec = json.loads(sys.stdin.readline())
 tell = lambda **entry: print(json.dumps(entry), flush=True)
 tell(stage="light", done=1, total=4)
-open(os.path.join(spec["out"], f".partial-{os.getpid()}.png"), "w").close()
+open(os.path.join(spec["out"], f".partial-{os.getpid()}-host.png"), "w").close()
 if spec["how"] == "wait":
     time.sleep(60)
 if spec["how"] == "fail":

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.batch.packages import file_hash
+from materialist.edit.mesh_folder import files_beside
 from materialist.edit.recipe import Step, read_recipe
 from materialist.edit.thickness import METHODS
 
@@ -27,7 +28,9 @@ def edits_key(path: str | Path, name: str, spp: int) -> str:
     described = []
     for step in edits_for(path, name):
         files = {
-            key: [_content(step, file) for file in _list(step.options[key])] for key in FILES if key in step.options
+            key: [_content(step, key, file) for file in _list(step.options[key])]
+            for key in FILES
+            if key in step.options
         }
         described.append([step.kind, step.options, files])
     return hashlib.sha256(json.dumps([described, spp], sort_keys=True).encode()).hexdigest()
@@ -52,9 +55,12 @@ def _named(options: dict, name: str) -> dict:
     return {**options, **named}
 
 
-def _content(step: Step, file: Any) -> str | None:
+def _content(step: Step, key: str, file: Any) -> str | list[str] | None:
+    """What tells one content of a file from another: of a mesh, its materials and textures, too."""
+    path = step.folder / str(file)
     try:
-        return file_hash(step.folder / str(file))
+        beside = [file_hash(other) for other in files_beside(path)] if key == "mesh" else []
+        return [file_hash(path), *beside] if beside else file_hash(path)
     except OSError:
         return None
 

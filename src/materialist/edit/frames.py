@@ -14,6 +14,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.edit.relight import relight, triple
 from materialist.errors import InputError, OutputError, SetupError
+from materialist.io.beside import partial
 from materialist.io.image import probe_beside, write_png_bytes
 from materialist.types import Array, Lamp, Scene
 
@@ -82,7 +83,7 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
     """
     path = Path(path)
     ensure_video_writable(path, force=force)
-    temporary = path.with_name(f".partial-{os.getpid()}{path.suffix.lower()}")
+    temporary = partial(path)
     try:
         count = (_to_video if path.suffix else _to_folder)(temporary, pictures, fps)
         if path.is_dir():

@@ -25,6 +25,8 @@ OPTIONS = re.compile(
 """A texture of an .mtl up to its name, which may hold spaces, with the options of the format before it."""
 OTHERS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*\r?$")
 """The same with options that the format does not know: the name is the last word."""
+MAPS = re.compile(rb"(?im)^[ \t]*(?:map_|norm|bump|disp|refl)\S*[ \t]+([^\r\n]+)")
+"""What an .mtl says of a texture: options and a name."""
 
 
 class MeshFolder:
@@ -93,6 +95,35 @@ class MeshFolder:
     def write(self, name: str, data: bytes) -> None:
         """Nothing is written beside a mesh."""
         raise InputError("A mesh's folder is only read.")
+
+
+def files_beside(path: Path) -> list[Path]:
+    """Files that an .obj, .gltf or .glb refers to, themselves or through an .mtl, and that are there in its folder."""
+    folder, data = MeshFolder(path.parent), path.read_bytes()
+    if path.suffix.lower() == ".obj":
+        libraries = _named(folder, re.findall(rb"(?im)^[ \t]*mtllib[ \t]+([^\r\n]+)", data))
+        lines = [line for file in libraries for line in MAPS.findall(file.read_bytes())]
+        return [*libraries, *_named(folder, lines)]
+    if path.suffix.lower() not in (".gltf", ".glb"):
+        return []
+    try:
+        header = gltf_header(data)
+        parts = [*header.get("buffers", []), *header.get("images", [])]
+        return _named(folder, [str(part["uri"]).encode() for part in parts if "uri" in part])
+    except (ValueError, TypeError, AttributeError, struct.error):
+        return []
+
+
+def _named(folder: MeshFolder, references: list[bytes]) -> list[Path]:
+    """Of references, whole or their last word, the files that are there and that may be opened."""
+    found = []
+    for reference in references:
+        name = reference.decode("utf-8", "replace").strip()
+        for spelled in (name, name.rpartition(" ")[2]):
+            if not name.startswith("data:") and (file := folder._inside(spelled)) and file.is_file():
+                found.append(file)
+                break
+    return found
 
 
 def _is_picture(data: bytes) -> bool:

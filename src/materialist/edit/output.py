@@ -9,6 +9,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
+from materialist.io.beside import partial
 from materialist.io.image import ensure_image_writable, write_image
 from materialist.io.raw import RAW_SUFFIXES
 from materialist.types import Array, Photo
@@ -30,7 +31,7 @@ def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bo
 
     ensure_image_writable(path, force=force)
     pixels = np.round(linear_to_srgb(picture).astype(np.float64) * 65535).astype(np.uint16)
-    temporary = path.with_name(f".partial-{os.getpid()}.png")
+    temporary = partial(path)
     try:
         temporary.write_bytes(cv2.imencode(".png", pixels[..., ::-1])[1].tobytes())
         os.replace(temporary, path)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import OutputError
+from materialist.io.beside import own
 from materialist.io.target import files_below
 
 MARKER = "materialist-export.json"
@@ -97,7 +98,7 @@ def _not_ours(folder: Path) -> str:
 
 
 def _beside(path: Path, kind: str, suffix: str = "") -> Path:
-    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{os.getpid()}{suffix}")
+    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{own()}{suffix}")
 
 
 def _reason(error: OSError) -> str:

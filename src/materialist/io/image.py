@@ -9,6 +9,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
+from materialist.io.beside import partial
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
@@ -38,7 +39,7 @@ def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None
     """
     path = Path(path)
     ensure_image_writable(path, force=force)
-    temporary = path.with_name(f".partial-{os.getpid()}{path.suffix.lower()}")
+    temporary = partial(path)
     try:
         (write_exr if path.suffix.lower() == ".exr" else write_png)(temporary, linear)
         os.replace(temporary, path)
@@ -64,7 +65,7 @@ def probe_beside(path: Path) -> None:
     """Write and remove a file next to PATH, whose folder is made; raises OutputError where that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        probe = path.with_name(f".partial-{os.getpid()}.probe")
+        probe = partial(path, ".probe")
         probe.touch()
         probe.unlink()
     except OSError as error:

@@ -1,7 +1,8 @@
 """Folders that appear whole or not at all: written beside the target, then renamed.
 
-A killed run leaves only `.NAME.HASH.partial-PID` (being written) or `.NAME.HASH.replaced-PID` (the old scene, moved
-aside); both are recognised by name and removed by the next save to the same target, unless their process still runs.
+A killed run leaves only `.NAME.HASH.partial-PID-HOST` (being written) or `.NAME.HASH.replaced-PID-HOST` (the old
+scene, moved aside); both are recognised by name and removed by the next save to the same target, unless their process
+still runs. Of another machine's processes nobody knows here: theirs stay for a day.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import json
 import os
 import re
 import shutil
+import time
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +20,7 @@ from pathlib import Path
 import psutil
 
 from materialist.errors import OutputError
+from materialist.io.beside import host, own
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
@@ -29,6 +32,8 @@ MEMBERS = re.compile(
 """Files of a package, beside the photo as it was given."""
 JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers leave in folders."""
+KEPT_FOR = 24 * 3600
+"""Seconds for which another machine's unfinished folder is left alone."""
 
 
 def ensure_writable(path: str | Path, force: bool = False) -> None:
@@ -124,15 +129,20 @@ def _put_in_place(temporary: Path, target: Path) -> None:
 def _sweep(target: Path) -> None:
     """Remove what killed runs left; an old scene moved aside goes back when nothing has taken its place."""
     for leftover in sorted(target.parent.iterdir()):
-        kind, _, process = leftover.name.removeprefix(_stem(target)).partition("-")
-        if not leftover.name.startswith(_stem(target)) or not process.isdigit():
-            continue
-        if psutil.pid_exists(int(process)) and int(process) != os.getpid():
+        kind, _, owner = leftover.name.removeprefix(_stem(target)).partition("-")
+        process, _, machine = owner.partition("-")
+        if not leftover.name.startswith(_stem(target)) or not process.isdigit() or _in_use(leftover, process, machine):
             continue
         if kind == "replaced" and not target.exists():
             os.rename(leftover, target)
         else:
             shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _in_use(leftover: Path, process: str, machine: str) -> bool:
+    if machine not in ("", host()):
+        return time.time() - leftover.stat().st_ctime < KEPT_FOR
+    return psutil.pid_exists(int(process)) and int(process) != os.getpid()
 
 
 def _stem(target: Path) -> str:
@@ -141,7 +151,7 @@ def _stem(target: Path) -> str:
 
 
 def _sibling(target: Path, kind: str) -> Path:
-    return target.with_name(f"{_stem(target)}{kind}-{os.getpid()}")
+    return target.with_name(f"{_stem(target)}{kind}-{own()}")
 
 
 def _absolute(path: str | Path) -> Path:

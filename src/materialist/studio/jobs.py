@@ -148,7 +148,7 @@ def _sweep(folder: Path, pid: int) -> None:
     """Remove what a stopped worker was writing."""
     import shutil
 
-    for leftover in folder.glob(f".*partial-{pid}*"):
+    for leftover in folder.glob(f".*partial-{pid}-*"):
         if leftover.is_dir():
             shutil.rmtree(leftover, ignore_errors=True)
         else:

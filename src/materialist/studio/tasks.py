@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import SetupError
+from materialist.io.beside import partial
 from materialist.types import Array, Materials, Prediction, Scene
 
 Progress = Any
@@ -163,7 +164,7 @@ def _package(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, 
     result = loaded
     if edited is not loaded:
         result = developed(loaded, edited, composite(loaded, edited, spp=spp, progress=progress))
-    folder = output.with_name(f".partial-{os.getpid()}") / output.with_suffix("").name
+    folder = partial(output, "") / output.with_suffix("").name
     folder.parent.mkdir()
     progress("save", 0, 1)
     save_scene(result, folder)
@@ -178,7 +179,7 @@ def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *,
     if output.suffix != ".zip":
         export(edited, output, to=what, force=True)
         return
-    folder = output.with_name(f".partial-{os.getpid()}") / output.with_suffix("").name
+    folder = partial(output, "") / output.with_suffix("").name
     folder.mkdir(parents=True)
     export(edited, folder / "scene" if what in FOLDERS else folder / f"scene.{what}", to=what)
     _zip(folder, output)
@@ -227,6 +228,6 @@ def write_pixels(path: Path, pixels: Array) -> None:
     made, data = cv2.imencode(path.suffix, np.ascontiguousarray(pixels[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 90])
     if not made:
         raise SetupError(f"The picture {path.name} cannot be encoded.")
-    temporary = path.with_name(f".partial-{os.getpid()}-{path.name}")
+    temporary = partial(path, f"-{path.name}")
     temporary.write_bytes(data.tobytes())
     temporary.replace(path)

@@ -1,0 +1,23 @@
+"""Names of what is being written beside its place: hidden, and nobody else's, on another machine either."""
+
+from __future__ import annotations
+
+import os
+import platform
+import zlib
+from pathlib import Path
+
+
+def own() -> str:
+    """`PID-HOST`: this process among those of all machines (containers) that may share a folder."""
+    return f"{os.getpid()}-{host()}"
+
+
+def host() -> str:
+    """Eight hexadecimal digits for this machine's name."""
+    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
+
+
+def partial(path: Path, suffix: str | None = None) -> Path:
+    """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
+    return path.with_name(f".partial-{own()}{path.suffix.lower() if suffix is None else suffix}")
