@@ -11,7 +11,18 @@ from typing import Any
 
 import numpy as np
 
+from materialist.errors import InputError
+
 Array = np.ndarray
+
+
+def _numbers(value: Any, count: int) -> tuple[float, ...]:
+    """`count` finite numbers as Python's; none where the value is anything else."""
+    try:
+        found = tuple(np.asarray(value, np.float64).ravel().tolist())
+    except (TypeError, ValueError):
+        return ()
+    return found if len(found) == count and all(np.isfinite(found)) else ()
 
 
 @dataclass(frozen=True)
@@ -24,9 +35,14 @@ class Camera:
     """Horizontal field of view, degrees, in (0, 180)."""
 
     def __post_init__(self) -> None:
-        """NumPy's numbers become Python's, as files and other programs need them."""
-        for name, kind in (("width", int), ("height", int), ("fov", float)):
-            object.__setattr__(self, name, kind(getattr(self, name)))
+        """NumPy's numbers become Python's, as files and other programs need them. Raises InputError for others."""
+        width, height, fov = (_numbers(getattr(self, name), 1) for name in ("width", "height", "fov"))
+        if not (width and height and min(*width, *height) >= 1 and all(n % 1 == 0 for n in (*width, *height))):
+            raise InputError(f"A camera of {self.width} x {self.height} pixels: give whole numbers from 1 on.")
+        if not (fov and 0 < fov[0] < 180):
+            raise InputError(f"A camera with a field of view of {self.fov}: give degrees between 0 and 180.")
+        for name, value in (("width", int(width[0])), ("height", int(height[0])), ("fov", fov[0])):
+            object.__setattr__(self, name, value)
 
     @property
     def focal(self) -> float:
@@ -123,10 +139,15 @@ class Lamp:
     """Scene units, > 0."""
 
     def __post_init__(self) -> None:
-        """NumPy's numbers become Python's, as files and other programs need them."""
-        for name in ("position", "power"):
-            object.__setattr__(self, name, tuple(float(v) for v in getattr(self, name)))
-        object.__setattr__(self, "radius", float(self.radius))
+        """NumPy's numbers become Python's, as files and other programs need them. Raises InputError for others."""
+        position, power, radius = _numbers(self.position, 3), _numbers(self.power, 3), _numbers(self.radius, 1)
+        if not position or not power or min(power) < 0 or not radius or radius[0] <= 0:
+            raise InputError(
+                f"A lamp at {self.position} of power {self.power} and radius {self.radius}: give three coordinates, "
+                "three powers of 0 or more, and a radius above 0."
+            )
+        for name, value in (("position", position), ("power", power), ("radius", radius[0])):
+            object.__setattr__(self, name, value)
 
     @property
     def radiance(self) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from materialist import __version__
-from materialist.errors import MaterialistError, OutputError, SceneError
+from materialist.errors import InputError, MaterialistError, OutputError, SceneError
 from materialist.io.bodies import read_bodies, write_bodies
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
@@ -45,8 +45,6 @@ def load_scene(path: str | Path) -> Scene:
     meta = _read_meta(folder)
     try:
         camera = Camera(**meta["camera"])
-        if not 0 < float(camera.fov) < 180:
-            raise ValueError(f"the field of view is {camera.fov}")
         shape = (camera.height, camera.width)
         prior, materials = meta["prior"], _read_materials(folder / "maps", shape)
         label = _read_labels(folder / "plane_label.png", shape)
@@ -72,7 +70,7 @@ def load_scene(path: str | Path) -> Scene:
             lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
             bodies=read_bodies(folder, meta.get("bodies", [])),
         )
-    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+    except (InputError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise SceneError(f"{folder / MARKER} is incomplete or damaged ({error}); save the scene again.") from error
 
 
