@@ -1,0 +1,37 @@
+"""Nouns that people build by hand, in Python: numbers of any kind, and a sentence for what is none."""
+
+import numpy as np
+import pytest
+
+from materialist.errors import InputError
+from materialist.types import Camera, Lamp
+
+
+def test_numbers_of_any_kind_become_pythons():
+    camera = Camera(np.int64(8), 6.0, np.float32(40))
+    assert (camera.width, camera.height, camera.fov) == (8, 6, 40.0)
+    assert [type(value) for value in (camera.width, camera.height, camera.fov)] == [int, int, float]
+    lamp = Lamp(np.float32([0, 1, -2]), [3, 3, 3], np.array(0.5))
+    assert lamp == Lamp((0.0, 1.0, -2.0), (3.0, 3.0, 3.0), 0.5) and type(lamp.radius) is float
+
+
+@pytest.mark.parametrize("values", [(0, 6, 40), (8.5, 6, 40), (8, None, 40), ([8, 6], 6, 40), (np.inf, 6, 40)])
+def test_a_camera_without_pixels(values):
+    with pytest.raises(InputError, match="whole numbers"):
+        Camera(*values)
+
+
+@pytest.mark.parametrize("fov", [0, 180, -3, np.nan, "wide"])
+def test_a_camera_that_sees_nothing_or_all(fov):
+    with pytest.raises(InputError, match="degrees between 0 and 180"):
+        Camera(8, 6, fov)
+
+
+@pytest.mark.parametrize(
+    "position, power, radius",
+    [((0, 0), (1, 1, 1), 1), (None, (1, 1, 1), 1), ((0, 0, 0), 5, 1), ((0, 0, 0), (1, -1, 1), 1),
+     ((0, 0, 0), (1, 1, 1), 0), ((0, 0, np.nan), (1, 1, 1), 1), ((0, 0, 0), (1, 1, 1), "small")],
+)  # fmt: skip
+def test_a_lamp_that_is_none(position, power, radius):
+    with pytest.raises(InputError, match="A lamp at"):
+        Lamp(position, power, radius)
