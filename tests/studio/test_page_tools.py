@@ -169,3 +169,22 @@ def test_an_object_falls_on_the_page(page, running):
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors
+
+
+def test_what_a_mesh_was_refused_for_is_said_and_it_is_not_kept(page, running, tmp_path):
+    """A refused file leaves the field; one that is taken replaces the library's name, and the other way round."""
+    opened(page, running[0])
+    page.get_by_role("tab", name="Objects").click()
+    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
+    page.set_input_files("#own_mesh input[type=file]", str(tmp_path / "empty.obj"))
+    page.wait_for_selector("text=/no faces|no triangles|empty/")
+    page.wait_for_selector("#own_mesh input[type=file]", state="attached")
+    page.wait_for_function("!document.querySelector('#own_mesh').textContent.includes('empty')")
+    (tmp_path / "leaf.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    page.set_input_files("#own_mesh input[type=file]", str(tmp_path / "leaf.obj"))
+    page.wait_for_function("document.body.dataset.tool === 'place'")
+    page.wait_for_function("document.querySelector('#own_mesh').textContent.includes('leaf')")
+    page.get_by_label("Object", exact=True).click()
+    page.get_by_role("option", name="Cube").click()
+    page.wait_for_function("!document.querySelector('#own_mesh').textContent.includes('leaf')")
+    page.errors.clear()

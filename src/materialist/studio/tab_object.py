@@ -27,7 +27,7 @@ def layout(context: Context) -> None:
         gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
         parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
         parts["own_mesh"] = gr.File(
-            label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
+            elem_id="own_mesh", label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
             file_types=[".glb", ".ply", ".obj", ".stl"],
         )  # fmt: skip
         parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
@@ -74,7 +74,7 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
         session = context.session(request)
         if name in LIBRARY:
             session.thing_option("mesh", library_file(session, str(name)))
-        return {**context.picture(session), parts["tool"]: "place"}
+        return {**context.picture(session), parts["tool"]: "place", parts["own_mesh"]: None}
 
     @guarded
     def uploaded(file: str | None, request: gr.Request) -> dict[Any, Any]:
@@ -91,7 +91,7 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
             (session.desk / kept).unlink(missing_ok=True)
             raise
         session.thing_option("mesh", kept)
-        return {**context.picture(session), parts["tool"]: "place"}
+        return {**context.picture(session), parts["tool"]: "place", parts["thing"]: None}
 
     def setter(name: str, text: Callable[[Any], str | None]) -> Any:
         @guarded
@@ -109,8 +109,9 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
         return context.picture(session)
 
     outputs = [*context.picture_parts, parts["tool"]]
-    parts["thing"].input(choose, parts["thing"], outputs, **live)
-    parts["own_mesh"].upload(uploaded, parts["own_mesh"], outputs, **live)
+    parts["thing"].input(choose, parts["thing"], [*outputs, parts["own_mesh"]], **live)
+    sent = parts["own_mesh"].upload(uploaded, parts["own_mesh"], [*outputs, parts["thing"]], **live)
+    sent.failure(lambda: None, None, parts["own_mesh"], **live)  # what was refused is not there
     parts["scale"].input(setter("scale", lambda v: f"{float(v):.4g}"), parts["scale"], context.picture_parts, **live)
     parts["turn"].input(setter("turn", lambda v: f"{float(v):.4g}"), parts["turn"], context.picture_parts, **live)
     for part in (parts["made_of"], parts["thing_colour"]):
