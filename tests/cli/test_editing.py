@@ -203,6 +203,8 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         (["relight", "SCENE", "--rotate", "9", "-o", "out.mp4"], "--frames 48"),
         ([*RELIGHT, "--rotate", "9", "--gain", "2"], "--gain says nothing without --envmap"),
         ([*RELIGHT, "--rotate", "9", "--sun-power", "2"], "--sun-power says nothing without --sun"),
+        ([*RELIGHT, "--rotate", "9", "--fps", "7"], "--fps says nothing without --frames"),
+        ([*EDIT, "--hue", "9", "--texture-scale", "2"], "--texture-scale says nothing without --texture"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--full-render", "--spp", "0", "-o", "OUT"], "--spp"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--fps", "0", "-o", "OUT"], "--fps"),
         (["apply", "SCENE", "bad.yaml", "-o", "OUT.png"], "shininess"),

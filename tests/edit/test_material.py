@@ -70,6 +70,13 @@ def test_set_albedo_in_linear_and_in_srgb():
     np.testing.assert_allclose(parse_colour("0.1,0.2,0.3"), [0.1, 0.2, 0.3], atol=1e-7)
 
 
+def test_an_albedo_may_be_an_array():
+    colour = np.array([0.1, 0.2, 0.3])
+    changed = edit(SCENE, MASK, albedo=colour)
+    assert np.array_equal(changed.materials.albedo, edit(SCENE, MASK, albedo=(0.1, 0.2, 0.3)).materials.albedo)
+    assert changed.provenance["edits"][-1]["albedo"] == (0.1, 0.2, 0.3)
+
+
 def test_the_module_is_the_function():
     import materialist.edit.region
 

@@ -108,3 +108,78 @@ def test_our_own_glass_comes_back_as_glass(tmp_path):
     back = read_model(tmp_path / "scene.glb")
     glass = [part.surface for part in back.parts if part.surface.transmission > 0]
     assert len(glass) == 1 and glass[0].transmission == 1 and glass[0].ior == pytest.approx(1.5)
+
+
+def glass_of(path, **extensions):
+    material = {"pbrMetallicRoughness": {"metallicFactor": 0.0}, "extensions": extensions}
+    return read_model(tetrahedron_glb(path, material))
+
+
+def test_coloured_glass(tmp_path):
+    """KHR_materials_volume: colour ** (thickness / distance), the base colour being white."""
+    volume = {"attenuationColor": [0.25, 1, 0.81], "attenuationDistance": 0.4, "thicknessFactor": 0.2}
+    clear = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    model = glass_of(tmp_path / "a.glb", **clear, KHR_materials_volume=volume)
+    np.testing.assert_allclose(model.parts[0].surface.tint, [0.5, 1, 0.9], rtol=1e-6)
+    thin = {"attenuationColor": [0.25, 1, 0.81], "thicknessFactor": 0.2}  # light is never absorbed
+    np.testing.assert_allclose(
+        glass_of(tmp_path / "b.glb", **clear, KHR_materials_volume=thin).parts[0].surface.tint, [1, 1, 1]
+    )
+
+
+def test_what_is_glass_by_a_texture_stays_opaque_and_that_is_told(tmp_path):
+    windows = {"transmissionFactor": 1.0, "transmissionTexture": {"index": 0}}
+    model = glass_of(tmp_path / "a.glb", KHR_materials_transmission=windows)
+    assert model.parts[0].surface.transmission == 0 and "what is glass in it" in model.warnings[0]
+
+
+def test_what_is_shown_without_light_is_matt(tmp_path):
+    model = read_model(tetrahedron_glb(tmp_path / "a.glb", {"extensions": {"KHR_materials_unlit": {}}}))
+    surface = model.parts[0].surface
+    assert (surface.metallic.max(), surface.roughness.min()) == (0, 1) and "KHR_materials_unlit" in model.warnings[0]
+
+
+@pytest.mark.parametrize(
+    "name, said, told",
+    [("clearcoat", {"clearcoatFactor": 1.0}, True), ("clearcoat", {}, False), ("specular", {"specularFactor": 1}, 0),
+     ("sheen", {"sheenColorFactor": [0.2, 0, 0]}, True), ("dispersion", {"dispersion": 3}, True)],
+)  # fmt: skip
+def test_layers_that_are_not_shown_are_told(tmp_path, name, said, told):
+    model = glass_of(tmp_path / "a.glb", **{f"KHR_materials_{name}": said})
+    assert bool(model.warnings) == told and all(name in note for note in model.warnings)
+
+
+def test_a_transform_of_roughness_alone(tmp_path):
+    from materialist.edit.mesh_gltf import left_out, tiled
+
+    move = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}}
+    alone = {"pbrMetallicRoughness": {"metallicRoughnessTexture": move}}
+    np.testing.assert_allclose(tiled(np.array([[0.5, 1.0]]), alone), [[1, 3]])
+    assert left_out([alone]) == []
+    both = {"pbrMetallicRoughness": {"metallicRoughnessTexture": move, "baseColorTexture": {"index": 0}}}
+    np.testing.assert_allclose(tiled(np.array([[0.5, 1.0]]), both), [[0.5, 1]])
+    assert "turned" in left_out([both])[0]
+
+
+def test_extensions_that_are_no_objects_are_passed_over(tmp_path):
+    odd = {"KHR_materials_transmission": 3, "KHR_materials_volume": None, "KHR_materials_sheen": []}
+    assert glass_of(tmp_path / "a.glb", **odd).parts[0].surface.transmission == 0
+    odd = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"attenuationColor": "red"}}
+    assert glass_of(tmp_path / "b.glb", **odd).parts[0].surface.tint == (1, 1, 1)
+
+
+def test_fans_are_told(tmp_path):
+    import json
+
+    path = tetrahedron_glb(tmp_path / "a.glb", MATT)
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    header = json.loads(data[20 : 20 + length])
+    fan = {**header["meshes"][0]["primitives"][0], "mode": 6}
+    header["meshes"].append({"primitives": [fan]})
+    header["nodes"].append({"mesh": len(header["meshes"]) - 1})
+    header["scenes"][0]["nodes"].append(len(header["nodes"]) - 1)
+    from materialist.edit.mesh_gltf import _with_header
+
+    path.write_bytes(_with_header(data, header))
+    assert any("triangle fans" in note for note in read_model(path).warnings)

@@ -9,6 +9,7 @@ import trimesh
 from made_meshes import box_file, gltf_file, textured_obj
 from PIL import Image
 
+from materialist.color import srgb_to_linear
 from materialist.edit.mesh_shape import creased_normals, edge_faults
 from materialist.edit.meshes import read_model, repainted
 from materialist.errors import InputError
@@ -245,6 +246,42 @@ def test_an_inside_out_mesh_is_turned(tmp_path):
     assert ((body.vertices * body.normals).sum(1) > 0).all()
 
 
+def ball(radius, centre, inwards=False):
+    made = trimesh.creation.icosphere(subdivisions=1, radius=radius).apply_translation(centre)
+    return trimesh.Trimesh(made.vertices, made.faces[:, ::-1] if inwards else made.faces, process=False)
+
+
+@pytest.mark.parametrize("wrong", [(0,), (1,), (0, 1), (2,), (0, 1, 2)])
+def test_each_piece_looks_outwards_and_a_cavity_inwards(tmp_path, wrong):
+    """Two balls apart, the larger with a cavity; what is wound the wrong way in the file is found piece by piece."""
+    balls = [ball(1, (0, 0, 0), 0 in wrong), ball(0.5, (3, 0, 0), 1 in wrong), ball(0.4, (0.2, 0, 0), 2 not in wrong)]
+    together = trimesh.util.concatenate(balls)
+    together.export(tmp_path / "a.ply")
+    (body,) = read_model(tmp_path / "a.ply").parts
+    corners = body.vertices[body.faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    for centre, out in (((0, 0, 0), True), ((3, 0, 0), True), ((0.2, 0, 0), None)):
+        radius = {0: 1, 3: 0.5, 0.2: 0.4}[centre[0]]
+        chosen = (np.abs(np.linalg.norm(corners - np.array(centre), axis=-1) - radius) < 1e-3).all(1)
+        away = ((corners[chosen].mean(1) - centre) * flat[chosen]).sum(-1) > 0
+        normals = ((corners[chosen] - centre) * body.normals[body.faces[chosen]]).sum(-1) > 0
+        assert chosen.any() and (away == away[0]).all() and (normals == away[0]).all()
+        if out is None:  # inside another: with the rest, as the file has it
+            assert away[0] == ((2 in wrong) != (0 in wrong))
+        else:
+            assert away[0]
+
+
+def test_open_pieces_stay_as_they_are(tmp_path):
+    half = ball(1, (0, 0, 0), True)
+    half.update_faces(np.arange(len(half.faces)) > 4)
+    trimesh.util.concatenate([half, ball(0.5, (3, 0, 0), True)]).export(tmp_path / "a.ply")
+    (body,) = read_model(tmp_path / "a.ply").parts
+    far = body.vertices[:, :1] > 2
+    away = ((body.vertices - np.where(far, [3, 0, 0], 0)) * body.normals).sum(1) > 0
+    assert (away == far[:, 0]).all()
+
+
 def test_other_materials(tmp_path):
     model = read_model(box_file(tmp_path / "box.ply"))
     assert repainted(model, "as-is") is model
@@ -301,3 +338,27 @@ def test_a_mesh_far_from_its_origin_keeps_its_shape(tmp_path):
     np.testing.assert_allclose(np.ptp(read_model(tmp_path / "far.obj").vertices, axis=0), [0.2, 0.3, 0.4], atol=1e-3)
     near = read_model(tmp_path / "box.obj").vertices
     np.testing.assert_allclose(near[:, 1].min(), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize("lines", ["", "mtllib none.mtl\nusemtl a\n", "mtllib plain.mtl\nusemtl b\n"])
+def test_coordinates_without_a_texture_are_the_usual_grey(tmp_path, lines):
+    """trimesh makes up a dark picture there."""
+    (tmp_path / "plain.mtl").write_text("newmtl a\nKd 1 0 0\n")
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n" + lines + "f 1/1 2/2 3/3\n"
+    (tmp_path / "a.obj").write_text(text)
+    assert np.unique(read_model(tmp_path / "a.obj").parts[0].surface.albedo) == 0.5
+
+
+@pytest.mark.parametrize("wide", [40, 5000])
+def test_greys_of_16_bits_keep_their_values(tmp_path, wide):
+    values = np.linspace(0, 65535, wide).astype(np.uint16)[None].repeat(4, 0)
+    Image.fromarray(values).save(tmp_path / "rough.png")
+    Image.fromarray(values).save(tmp_path / "colour.png")
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd colour.png\nmap_Pr rough.png\n")
+    (tmp_path / "a.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n"
+    )
+    surface = read_model(tmp_path / "a.obj").parts[0].surface
+    assert surface.roughness.shape[1] == min(wide, 4096)
+    np.testing.assert_allclose(surface.roughness[0], np.linspace(0, 1, surface.roughness.shape[1]), atol=1e-3)
+    np.testing.assert_allclose(surface.albedo[0, :, 1], srgb_to_linear(surface.roughness[0]), atol=2e-3)

@@ -159,6 +159,9 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
     path = [s.lamps[0] for s in moving_light(SCENE, 3, lamps=tuple(ends))]
     np.testing.assert_allclose([path[0].position, path[2].position], [e.position for e in ends])
     np.testing.assert_allclose(path[1].power, np.mean([e.power for e in ends], 0))
+    more = [s.envmap for s in moving_light(SCENE, 4, turn=450)]
+    np.testing.assert_allclose(more[3], rotated(SCENE.envmap, 450), atol=1e-6)  # by as much as was asked
+    np.testing.assert_allclose(more[1], rotated(SCENE.envmap, 150), atol=1e-6)
     suns = list(moving_light(SCENE, 2, suns=((0, 20), (90, 40))))
     np.testing.assert_allclose(suns[1].envmap, relight(SCENE, sun=(90, 40)).envmap, atol=1e-6)
     with pytest.raises(InputError, match="frames is 1"):
@@ -173,6 +176,10 @@ def test_frames_become_a_folder_or_a_video(tmp_path):
         write_frames(tmp_path / "turn", iter(frames))
     with pytest.raises(InputError, match=r"\.mp4"):
         write_frames(tmp_path / "turn.gif", iter(frames))
+    (tmp_path / "link").symlink_to(tmp_path / "turn")
+    with pytest.raises(OutputError, match="is a link"):  # before anything is rendered
+        write_frames(tmp_path / "link", iter(frames), force=True)
+    (tmp_path / "link").unlink()
     video = pytest.importorskip("imageio_ffmpeg", reason="needs the optional extra 'video'")
     assert write_frames(tmp_path / "turn.mp4", iter(frames), fps=10) == 3
     count, seconds = video.count_frames_and_secs(str(tmp_path / "turn.mp4"))

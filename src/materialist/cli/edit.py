@@ -66,6 +66,8 @@ def edit(
     wanted = (hue, saturation, value, albedo, roughness, metallic, texture)
     if not any(v not in (0.0, None) for v in wanted):
         raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
+    if texture is None and texture_scale != 1.0:
+        raise InputError("--texture-scale says nothing without --texture; give that, too, or leave it out.")
     check_before(output, save, spp, force, device=device.value, full_render=full_render)
     loaded = load_scene(scene)
     picture = read_texture(texture) if texture else None

@@ -28,6 +28,9 @@ from materialist.cli.picture import check_before, check_paths, check_video, numb
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
 
+FPS = 24
+"""Frames a second of a video, usually."""
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -55,7 +58,7 @@ def relight(
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
     ] = None,
-    fps: FramesPerSecond = 24,
+    fps: FramesPerSecond = FPS,
     spp: Spp = 256,
     denoise: Denoise = True,
     full_render: FullRender = False,
@@ -74,8 +77,9 @@ def relight(
     if envmap is None and rotate is None and not sun and not lamp and (ambient, dim, frames) == (1.0, None, None):
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
     alone = "--gain" if gain != "auto" and envmap is None else "--sun-power" if sun_power != 1.0 and not sun else ""
+    alone = alone or ("--fps" if fps != FPS and frames is None else "")
     if alone:
-        needed = {"--gain": "--envmap", "--sun-power": "--sun"}[alone]
+        needed = {"--gain": "--envmap", "--sun-power": "--sun", "--fps": "--frames"}[alone]
         raise InputError(f"{alone} says nothing without {needed}; give that, too, or leave {alone} out.")
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]

@@ -43,7 +43,7 @@ def moving_light(
         turn = 360.0
     if dim is not None:
         scene = relight(scene, dim=dim)  # once: finding the lights takes a rendering
-    closed = abs(turn) >= 360 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
+    closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(np.asarray(suns), t)) if suns else None
@@ -71,6 +71,8 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
         raise InputError(f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames.")
     if path.exists() and not (force and _replaceable(path)):
         raise OutputError(f"{path} exists; give {'another name' if force else '--force to replace it'}.")
+    if path.is_symlink():
+        raise OutputError(f"{path} is a link, which --force will not replace; give the file or folder it leads to.")
     if path.suffix:
         _ffmpeg()
     probe_beside(path)

@@ -57,6 +57,9 @@ def edit(
         _mix(materials.roughness, _changed("roughness", materials.roughness, roughness), weight),
         _mix(materials.metallic, _changed("metallic", materials.metallic, metallic), weight),
     )
+    if albedo is not None and not isinstance(albedo, str):
+        red, green, blue = (float(c) for c in albedo)
+        albedo = (red, green, blue)
     entry = {
         "hue": hue, "saturation": saturation, "value": value, "albedo": albedo, "roughness": roughness,
         "metallic": metallic, "texture": None if texture is None else list(np.shape(texture)),

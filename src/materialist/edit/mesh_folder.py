@@ -13,6 +13,8 @@ from materialist.errors import InputError
 MAX_FACES = 2_000_000
 """Triangles of a file that is still read."""
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+TOGETHER = "materialist-libraries.mtl"
+"""Name under which the several .mtl files of an .obj are read."""
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".gif", ".webp")
 
 
@@ -25,6 +27,8 @@ OPTIONS = re.compile(
 """A texture of an .mtl up to its name, which may hold spaces, with the options of the format before it."""
 OTHERS = re.compile(rb"(?im)^([ \t]*map_kd[ \t]+)-[^\r\n]*[ \t]([^\s]+)[ \t]*\r?$")
 """The same with options that the format does not know: the name is the last word."""
+LIBRARY = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^\r\n]+)")
+"""A line of an .obj that names its materials."""
 MAPS = re.compile(rb"(?im)^[ \t]*(?:map_|norm|bump|disp|refl)\S*[ \t]+([^\r\n]+)")
 """What an .mtl says of a texture: options and a name."""
 
@@ -44,10 +48,14 @@ class MeshFolder:
         self.damaged = 0
         self.left_out: set[str] = set()
         """What of its materials is not shown, in words."""
+        self.together: dict[str, list[str]] = {}
+        """Names that stand for several libraries of materials, one after the other."""
 
     def get(self, name: str) -> bytes:
         """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing one."""
         name = str(name).strip()
+        if name in self.together:
+            return b"\n".join(self._there(each) for each in self.together[name])
         path = self._inside(name)
         if path is None:
             self.refused.append(name)
@@ -64,6 +72,28 @@ class MeshFolder:
                 self.left_out.add("the options of its textures, such as -s")
             return plain
         return data
+
+    def _there(self, name: str) -> bytes:
+        """The bytes of a file, none where it is missing, which `missing` says."""
+        try:
+            return self.get(name)
+        except OSError:
+            return b""
+
+    def holds(self, name: str) -> bool:
+        """Whether a file of this name is there, and may be opened."""
+        path = self._inside(name)
+        return path is not None and path.is_file()
+
+    def libraries(self, data: bytes) -> list[str]:
+        """Names of the .mtl files of an .obj: one a line, with spaces perhaps, or several."""
+        names: list[str] = []
+        for line in LIBRARY.findall(data):
+            whole = line.decode("utf-8", "replace").strip()
+            split = whole.split()
+            several = not self.holds(whole) and all(name.lower().endswith(".mtl") for name in split)
+            names += split if several else [whole]
+        return list(dict.fromkeys(names))
 
     def _inside(self, name: str) -> Path | None:
         """The path of a reference, None when it leads outside. Percent-encoding, as of glTF, is taken back."""
@@ -101,7 +131,7 @@ def files_beside(path: Path) -> list[Path]:
     """Files that an .obj, .gltf or .glb refers to, themselves or through an .mtl, and that are there in its folder."""
     folder, data = MeshFolder(path.parent), path.read_bytes()
     if path.suffix.lower() == ".obj":
-        libraries = _named(folder, re.findall(rb"(?im)^[ \t]*mtllib[ \t]+([^\r\n]+)", data))
+        libraries = _named(folder, [name.encode() for name in folder.libraries(data)])
         lines = [line for file in libraries for line in MAPS.findall(file.read_bytes())]
         return [*libraries, *_named(folder, lines)]
     if path.suffix.lower() not in (".gltf", ".glb"):

@@ -18,6 +18,16 @@ NORMALIZED = "MATERIALIST_normalized"
 READ = ("KHR_materials_", "KHR_mesh_quantization", "EXT_texture_webp", "KHR_lights_punctual", "KHR_texture_transform")
 """Extensions that a file may require, by how their names begin; what of them is left out is told."""
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
+GLASS = "KHR_materials_transmission"
+UNLIT = "KHR_materials_unlit"
+LAYERS: dict[str, tuple[Any, ...]] = {
+    "clearcoat": ("clearcoatFactor", 0), "sheen": ("sheenColorFactor", 0, 0, 0), "specular": ("specularFactor", 1),
+    "diffuse_transmission": ("diffuseTransmissionFactor", 0), "anisotropy": ("anisotropyStrength", 0),
+    "iridescence": ("iridescenceFactor", 0), "dispersion": ("dispersion", 0),
+}  # fmt: skip
+"""Extensions that are not shown: the value that says whether they do anything, and the one with which they do not."""
+FAN = 6
+"""The mode of triangle fans, which trimesh passes over."""
 METAL = 0.2
 """Specular reflectance from which such a material is a metal."""
 _MOST = {5120: 127, 5121: 255, 5122: 32767, 5123: 65535}
@@ -34,9 +44,11 @@ def prepared(path: Path, data: bytes) -> tuple[bytes, list[dict[str, Any]]]:
         unread = [name for name in header.get("extensionsRequired", []) if not name.startswith(READ)]
         materials = list(header.get("materials", []))
         for number, material in enumerate(materials):
-            materials[number] = _without_gloss(material)
+            materials[number] = _lit(_without_gloss(material))
             header["materials"][number] = {**materials[number], "name": str(number)}
         _announce(header)
+        primitives = [p for mesh in header.get("meshes", []) for p in mesh["primitives"]]
+        fans = any(p.get("mode") == FAN for p in primitives)
         out = _with_header(data, header)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error):
         return data, []
@@ -45,7 +57,15 @@ def prepared(path: Path, data: bytes) -> tuple[bytes, list[dict[str, Any]]]:
             f"{path} needs the glTF extension {unread[0]}, which is not read; export it without (in Blender, without "
             "compression), or as OBJ or PLY."
         )
-    return out, materials
+    return out, [*materials, {"fans": True}] if fans else materials
+
+
+def _lit(material: dict[str, Any]) -> dict[str, Any]:
+    """A material that is shown without light (photogrammetry) as a matt one of its colour; others as they are."""
+    if UNLIT not in (material.get("extensions") or {}):
+        return material
+    pbr = {**(material.get("pbrMetallicRoughness") or {}), "metallicFactor": 0.0, "roughnessFactor": 1.0}
+    return {**material, "pbrMetallicRoughness": pbr}
 
 
 def _without_gloss(material: dict[str, Any]) -> dict[str, Any]:
@@ -106,15 +126,17 @@ def _with_header(data: bytes, header: dict[str, Any]) -> bytes:
 def extended(surface: Surface, material: dict[str, Any]) -> Surface:
     """The surface with the glass (KHR_materials_transmission, _ior) and the glow of a material of the file.
 
-    What enters is tinted by the base colour, and an emissive strength of 1 is the white of the photo.
+    What enters is tinted by the base colour and by the colour of its volume over its thickness (KHR_materials_volume),
+    and an emissive strength of 1 is the white of the photo. Where a texture says what is glass, nothing is.
     """
     from dataclasses import replace
 
-    said = material.get("extensions") or {}
-    share = _number(said.get("KHR_materials_transmission", {}).get("transmissionFactor"), 0.0)
-    if share > 0:
-        ior = float(np.clip(_number(said.get("KHR_materials_ior", {}).get("ior"), 1.5), 1, 3))
-        red, green, blue = (float(c) for c in np.clip(surface.albedo.mean((0, 1)), 0, 1))
+    entering = _extension(material, GLASS)
+    share = _number(entering.get("transmissionFactor"), 0.0)
+    if share > 0 and "transmissionTexture" not in entering:
+        ior = float(np.clip(_number(_extension(material, "KHR_materials_ior").get("ior"), 1.5), 1, 3))
+        tint = np.clip(surface.albedo.mean((0, 1)), 0, 1) * _attenuation(_extension(material, "KHR_materials_volume"))
+        red, green, blue = (float(c) for c in tint)
         surface = replace(surface, transmission=min(share, 1.0), ior=ior, tint=(red, green, blue))
     glow = _glow(material)
     if glow.any() and "emissiveTexture" not in material:
@@ -124,8 +146,11 @@ def extended(surface: Surface, material: dict[str, Any]) -> Surface:
 
 
 def tiled(uv: Array, material: dict[str, Any]) -> Array:
-    """Texture coordinates [V, 2], v down, scaled and moved as KHR_texture_transform says of the base colour."""
-    move = _transform((material.get("pbrMetallicRoughness") or {}).get("baseColorTexture"))
+    """Texture coordinates [V, 2], v down, scaled and moved as KHR_texture_transform says of the base colour.
+
+    Of roughness, where the base colour has no texture.
+    """
+    move = _moved(material.get("pbrMetallicRoughness") or {})
     if _number(move.get("rotation"), 0.0):
         return uv
     return uv * np.asarray(move.get("scale", [1, 1]), np.float64) + np.asarray(move.get("offset", [0, 0]), np.float64)
@@ -142,15 +167,42 @@ def left_out(materials: list[dict[str, Any]]) -> list[str]:
         found += ["its transparency (taken as opaque)"] * (material.get("alphaMode", "OPAQUE") != "OPAQUE")
         found += ["its second texture coordinates"] * any(m.get("texCoord", 0) for m in maps)
         moves = [_transform(m) for m in maps]
-        odd = any(_number(m.get("rotation"), 0.0) or m != moves[0] for m in moves)
+        odd = any(_number(m.get("rotation"), 0.0) or m != _moved(pbr) for m in moves)
         found += ["how its textures are turned (KHR_texture_transform)"] * odd
+        found += ["what is glass in it (a texture)"] * ("transmissionTexture" in _extension(material, GLASS))
+        found += ["that light does not change it (KHR_materials_unlit)"] * (UNLIT in (material.get("extensions") or {}))
+        for what, (key, *usual) in LAYERS.items():
+            value = _extension(material, f"KHR_materials_{what}").get(key, usual)
+            found += [f"its {what} (KHR_materials_{what})"] * (not np.array_equal(np.ravel(value), np.ravel(usual)))
+        found += ["its triangle fans"] * bool(material.get("fans"))
     return list(dict.fromkeys(found))
+
+
+def _extension(material: dict[str, Any], name: str) -> dict[str, Any]:
+    """What a material says in an extension, nothing where that is no object."""
+    said = (material.get("extensions") or {}).get(name)
+    return said if isinstance(said, dict) else {}
+
+
+def _moved(pbr: dict[str, Any]) -> dict[str, Any]:
+    """The transform of the texture coordinates: the base colour's, or roughness' where that has no texture."""
+    return _transform(pbr.get("baseColorTexture") or pbr.get("metallicRoughnessTexture"))
+
+
+def _attenuation(volume: dict[str, Any]) -> Array:
+    """[3] what a volume leaves of white light over its thickness: colour ** (thickness / distance)."""
+    colour = np.array([_number(c, 1.0) for c in np.ravel(volume.get("attenuationColor", [1, 1, 1]))])
+    if len(colour) != 3:
+        return np.ones(3)
+    distance = _number(volume.get("attenuationDistance"), np.inf)
+    thick = _number(volume.get("thicknessFactor"), 0.0) / distance if distance > 0 else 0.0
+    return np.clip(colour, 0, 1) ** max(thick, 0.0)
 
 
 def _glow(material: dict[str, Any]) -> Array:
     """[3] radiance, as a multiple of the photo's white."""
     factor = np.asarray(material.get("emissiveFactor") or [0, 0, 0], np.float64)
-    strength = (material.get("extensions") or {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
+    strength = _extension(material, "KHR_materials_emissive_strength").get("emissiveStrength", 1)
     return np.clip(np.nan_to_num(factor * _number(strength, 1.0)), 0, 1e6)
 
 

@@ -76,7 +76,8 @@ def _from_mtl(material: Any, folder: Any) -> Surface:
     roughness = sqrt(alpha).
     """
     said = {str(k).lower(): v for k, v in (getattr(material, "kwargs", None) or {}).items()}
-    colour = _pixels(getattr(material, "image", None), folder)
+    image = getattr(material, "image", None)
+    colour = _pixels(image if getattr(image, "format", None) else None, folder)  # trimesh makes one up where none is
     kd = said.get("kd")
     if colour is not None:
         albedo = srgb_to_linear(colour)  # writers leave Kd black, or half, beside a texture
@@ -130,13 +131,28 @@ def _pixels(image: Any, folder: Any) -> Array | None:
     if image is None:
         return None
     try:
-        if max(image.size) > MAX_TEXTURE:
-            image = image.copy()
-            image.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
-        return np.asarray(image.convert("RGB"), np.float32) / 255
+        if image.mode.startswith(("I", "F")):  # greys of 16 bits or floats, which "RGB" would clip at 255
+            image = _shrunk(_grey(image))
+            return np.repeat(np.asarray(image, np.float32)[..., None], 3, -1)
+        return np.asarray(_shrunk(image).convert("RGB"), np.float32) / 255
     except (OSError, ValueError, SyntaxError, MemoryError):
         folder.damaged += 1
         return None
+
+
+def _grey(image: Any) -> Any:
+    """A PIL picture of 16-bit or float greys as floats in [0, 1]."""
+    from PIL import Image
+
+    values = np.asarray(image, np.float32)
+    return Image.fromarray(values / np.float32(1 if image.mode == "F" else 65535))
+
+
+def _shrunk(image: Any) -> Any:
+    if max(image.size) > MAX_TEXTURE:
+        image = image.copy()
+        image.thumbnail((MAX_TEXTURE, MAX_TEXTURE))
+    return image
 
 
 def _clipped(albedo: Array, roughness: Array, metallic: Array) -> Surface:

@@ -8,6 +8,8 @@ from materialist.types import Array
 
 CREASE = np.cos(np.radians(40.0))
 """Faces that meet at a sharper angle than 40 degrees keep an edge between them."""
+MOST_PIECES = 200
+"""Pieces that look inwards for which is asked whether they lie in another; further ones stay."""
 SMOOTH_FROM = 200_000
 """Faces from which normals are smooth throughout: such meshes are scans, and pairs of faces grow many."""
 
@@ -61,6 +63,52 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
     edges = np.sort(place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     _, count = np.unique(edges[:, 0] * (int(place.max(initial=0)) + 1) + edges[:, 1], return_counts=True)
     return int((count == 1).sum()), int((count > 2).sum())
+
+
+def inside_out(vertices: Array, faces: Array) -> Array:
+    """[F] bool: the faces of a mesh (vertices [V, 3], faces [F, 3]) that look inwards, by its closed pieces.
+
+    The largest piece looks outwards, and so does every one that lies in no other. One inside another stays: looking
+    inwards it is a cavity, outwards a thing of its own.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    place = places(vertices)[faces]
+    edges = place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    size = int(place.max()) + 1
+    links = coo_array((np.ones(len(edges), np.int8), edges.T), (size, size))
+    piece = connected_components(links, directed=False)[1][place[:, 0]]  # [F]
+    edges = np.sort(edges[edges[:, 0] != edges[:, 1]], 1)
+    where, count = np.unique(edges, axis=0, return_counts=True)
+    of_place = np.zeros(size, int)
+    of_place[place] = piece[:, None]
+    torn = np.unique(of_place[where[count != 2, 0]])
+    closed = np.setdiff1d(piece, torn)
+    if not len(closed):
+        return np.zeros(len(faces), bool)
+    a, b, c = (vertices[faces[:, k]].astype(np.float64) - vertices.mean(0) for k in range(3))
+    sizes = np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)))
+    turned = sizes[closed[np.abs(sizes[closed]).argmax()]] < 0
+    sizes = -sizes if turned else sizes
+    found = np.isin(piece, closed) & turned
+    for one in closed[sizes[closed] < 0][:MOST_PIECES]:
+        point = vertices[faces[piece == one][0, 0]]
+        if not any(within(point, vertices, faces[piece == other]) for other in closed if other != one):
+            found[piece == one] = not turned
+    return found
+
+
+def within(point: Array, vertices: Array, faces: Array) -> bool:
+    """Whether a point [3] lies inside a closed mesh: its winding number (van Oosterom and Strackee 1983)."""
+    low, high = vertices[faces].min((0, 1)), vertices[faces].max((0, 1))
+    if (point < low).any() or (point > high).any():
+        return False
+    a, b, c = (vertices[faces[:, k]].astype(np.float64) - point for k in range(3))
+    x, y, z = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = x * y * z + (a * b).sum(1) * z + (b * c).sum(1) * x + (c * a).sum(1) * y
+    return bool(abs(np.arctan2(above, below).sum()) > np.pi)
 
 
 def volume(vertices: Array, faces: Array) -> float:

@@ -11,10 +11,10 @@ from typing import Any, cast
 import numpy as np
 
 from materialist.color import srgb_to_linear
-from materialist.edit import mesh_gltf
+from materialist.edit import mesh_gltf, mesh_obj
 from materialist.edit.mesh_folder import FORMATS, MAX_FACES, MeshFolder, claimed_faces
 from materialist.edit.mesh_material import GREY, constant, surface_of, texels
-from materialist.edit.mesh_shape import creased_normals, edge_faults, volume
+from materialist.edit.mesh_shape import creased_normals, edge_faults, inside_out
 from materialist.errors import InputError
 from materialist.types import Array, Body, Surface
 
@@ -62,6 +62,8 @@ def read_model(path: str | Path, *, up: str = "auto") -> Model:
     if path.suffix.lower() in (".gltf", ".glb"):
         data, read.materials = mesh_gltf.prepared(path, data)
         read.linear = True
+    elif path.suffix.lower() == ".obj":
+        data = mesh_obj.prepared(data, folder)
     pieces = list(read.pieces(_parsed(path, data, folder)))
     if folder.refused:
         raise InputError(
@@ -278,10 +280,20 @@ def _checked(model: Model, path: Path, folder: MeshFolder, left_out: list[str]) 
     notes += [f"{path.name}: {', '.join(left_out)} left out."] * bool(left_out)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
-    parts = model.parts
-    if not open_edges and not crowded and volume(vertices, faces) < 0:
-        parts = tuple(replace(p, faces=np.ascontiguousarray(p.faces[:, ::-1]), normals=-p.normals) for p in parts)
+    turned = np.split(inside_out(vertices, faces), np.cumsum([len(part.faces) for part in model.parts])[:-1])
+    parts = tuple(_turned(part, which) for part, which in zip(model.parts, turned))
     return replace(model, parts=parts, warnings=tuple(notes), closed=open_edges == 0)
+
+
+def _turned(body: Body, which: Array) -> Body:
+    """The body with those of its faces [F] the other way round; they share no corner with others."""
+    if not which.any():
+        return body
+    faces, normals = body.faces.copy(), body.normals.copy()
+    faces[which] = faces[which][:, ::-1]
+    corners = np.unique(faces[which])
+    normals[corners] = -normals[corners]
+    return replace(body, faces=np.ascontiguousarray(faces), normals=normals)
 
 
 def _z_up(body: Body) -> Body:
