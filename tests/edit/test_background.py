@@ -119,6 +119,44 @@ def test_a_true_background_is_what_is_seen():
     assert np.sqrt(((picture - truth) ** 2)[MASK].mean()) < 0.04
 
 
+def test_a_background_in_one_place_changes_no_other():
+    """What is filled from its surroundings keeps their light, whatever is given elsewhere."""
+    scene = rendered_scene()
+    other = np.zeros((36, 48), bool)
+    other[4:9, 38:44] = True
+    first = without(scene, MASK)
+    alone, patches, given = (
+        composite(scene, edited, spp=16, denoise=False)
+        for edited in (first, without(first, other), without(first, other, background=0.5 * scene.photo.linear))
+    )
+    near = np.abs(patches - alone)[MASK].mean()  # another scene has other noise
+    assert np.abs(given - alone)[MASK].mean() < 2 * near + 1e-3
+    assert np.abs(given - patches)[other].mean() > 0.05
+
+
+def test_given_places_are_those_of_a_background():
+    from materialist.edit.revealed import _given
+
+    scene = flat_scene()
+    other = np.zeros((36, 48), bool)
+    other[4:9, 38:44] = True
+    edited = without(without(scene, MASK), other, background=0.5 * scene.photo.linear)
+    filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
+    given = _given(scene, edited, filled)
+    assert given[other].all() and not given[MASK].any() and filled[MASK].all()
+    assert not _given(edited, edited, filled).any()
+
+
+def test_what_is_odd_about_a_background_is_told(tmp_path):
+    from PIL import Image
+
+    picture = np.full((36, 48, 4), 120, np.uint8)
+    picture[:, 20:, 3] = 0
+    Image.fromarray(picture).save(tmp_path / "cut.png")
+    (note,) = without(flat_scene(), MASK, background=tmp_path / "cut.png").report.warnings
+    assert "cut.png" in note and "white" in note
+
+
 @pytest.mark.parametrize(
     ("mask", "message"),
     [

@@ -266,3 +266,68 @@ def test_what_is_left_of_the_object_keeps_its_own_roughness():
     assert film.surface.roughness is scene.materials.roughness and film.surface.interface_roughness == 0
     (clear,) = glass(scene, MASK, roughness=0.3, thickness="symmetry").bodies
     assert clear.surface.interface_roughness == pytest.approx(0.3)
+
+
+def test_the_papers_glass_is_the_same_before_and_after_another_light():
+    """Its picture is in the light of the photo, which the light of the scene is not any more."""
+    from dataclasses import replace
+
+    scene = rendered_scene()
+    dimmed = replace(scene, envmap=np.roll(0.2 * scene.envmap, 4, 1))
+    options = {"model": "two-interface", "thickness": "symmetry"}
+    one, other = glass(scene, MASK, **options), glass(dimmed, MASK, fitted=scene, **options)
+    np.testing.assert_allclose(other.photo.linear, one.photo.linear, atol=1e-6)
+
+
+def test_the_papers_glass_is_in_no_full_rendering():
+    from materialist.edit.composite import pictures
+
+    scene = flat_scene()
+    edited = glass(scene, MASK, model="two-interface", thickness="symmetry")
+    with pytest.raises(InputError, match="picture in the photo"):
+        composite(scene, edited, full_render=True)
+    with pytest.raises(InputError, match="picture in the photo"):
+        next(pictures(scene, [edited], full_render=True))
+
+
+@pytest.mark.parametrize("ior", [1.3, 2.0])
+def test_objects_of_the_papers_glass_do_not_light_each_other(ior):
+    scene, number, _ = balls(((-0.9, -0.2, -3), 0.35), ((0.9, -0.3, -3.6), 0.3))
+    options = {"model": "two-interface", "thickness": "symmetry", "shadow": 0.0, "ior": ior}
+    both, one = glass(scene, number >= 0, **options), glass(scene, number == 1, **options)
+    inner = (number == 1) & (one.photo.linear > 0).all(-1)
+    apart = np.abs(both.photo.linear[inner] - one.photo.linear[inner])
+    assert np.percentile(apart, 75) < 1e-5  # a few rays see where the other was
+
+
+@pytest.mark.parametrize("place", [(0, 0), (35, 47), np.s_[15, 12:24], np.s_[0, 5:9]])
+def test_thin_masks_give_no_warnings_of_numpy(place, recwarn):
+    mask = np.zeros(MASK.shape, bool)
+    mask[place] = True
+    glass(flat_scene(), mask, model="two-interface")
+    assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
+
+
+def test_glass_before_the_sky_says_what_is_seen_in_it():
+    from dataclasses import replace
+
+    from materialist.edit.glass import SKY
+
+    scene = flat_scene(sky=26)
+    scene = replace(scene, depth=np.where(MASK, 2, scene.depth).astype(np.float32))
+    assert SKY in glass(scene, MASK, thickness="symmetry").report.warnings
+    assert SKY not in glass(scene, MASK, thickness="symmetry", model="two-interface").report.warnings
+    assert SKY not in glass(flat_scene(), MASK, thickness="symmetry").report.warnings
+
+
+def test_a_note_is_told_again_for_another_object():
+    from materialist.edit.glass import LID
+    from materialist.edit.material import told_since
+
+    scene = flat_scene()
+    first = glass(scene, MASK, hollow="open", thickness="symmetry")
+    right = np.zeros(MASK.shape, bool)
+    right[20:30, 34:44] = True
+    second = glass(first, right, hollow="open", thickness="symmetry")
+    assert told_since(scene, first).count(LID) == 1 and told_since(first, second).count(LID) == 1
+    assert told_since(scene, second).count(LID) == 1

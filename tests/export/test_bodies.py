@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from export_scenes import load_xml, room
 
 from materialist.edit.mesh_material import constant
@@ -52,8 +53,20 @@ def test_glb_has_textures_that_repeat_and_glass():
     assert glass["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 1
     np.testing.assert_allclose(glass["extensions"]["KHR_materials_ior"]["ior"], 1.4)
     np.testing.assert_allclose(glass["pbrMetallicRoughness"]["baseColorFactor"][:3], [0.9, 0.5, 0.4])
-    assert content["extensionsUsed"] == ["KHR_materials_ior", "KHR_materials_transmission"]
+    assert content["extensionsUsed"] == ["KHR_materials_ior", "KHR_materials_transmission"]  # the plates are open
     assert "extensionsUsed" not in document(room())
+
+
+def test_glass_of_a_glb_has_the_mean_way_through_it():
+    """A ball's is 4 r / 3; without any, viewers take glass for a thin wall."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.6)
+    vertices = np.asarray(ball.vertices, np.float32)
+    body = Body(
+        vertices, np.asarray(ball.faces, np.int32), vertices / 0.6, np.zeros((len(vertices), 2), np.float32), GLASS
+    )
+    content = document(replace(room(), bodies=(body,)))
+    thick = content["materials"][-1]["extensions"]["KHR_materials_volume"]["thicknessFactor"]
+    assert thick == pytest.approx(0.8, rel=0.02) and "KHR_materials_volume" in content["extensionsUsed"]
 
 
 def test_glb_colours_coated_glass_by_the_mean_of_tint_and_albedo():

@@ -102,6 +102,7 @@ def _scene(job: Job, tick: Tick) -> tuple[Scene, dict[str, Any]]:
 def _edited(job: Job, scene: Scene, tick: Tick) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
     from materialist.edit.composite import composite
+    from materialist.edit.material import told_since
     from materialist.edit.output import write_composite
     from materialist.edit.recipe import apply
 
@@ -114,7 +115,7 @@ def _edited(job: Job, scene: Scene, tick: Tick) -> tuple[Array, list[str]]:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
     picture = composite(scene, edited, spp=job.spp, seed=seed, device=device, progress=tick)
     write_composite(job.picture, picture, scene.photo, force=True)
-    return picture, [note for note in edited.report.warnings if note not in scene.report.warnings]
+    return picture, told_since(scene, edited)
 
 
 def _hash(source: bytes | None) -> str:

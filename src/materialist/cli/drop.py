@@ -66,6 +66,7 @@ def drop(
     from materialist.edit.drop import drop as simulate
     from materialist.edit.film import filmed
     from materialist.edit.frames import write_frames
+    from materialist.edit.material import told_since
     from materialist.edit.meshes import read_model
     from materialist.io.package import load_scene, save_scene
 
@@ -91,7 +92,7 @@ def drop(
     if save is not None:
         save_scene(developed(loaded, film[-1], last[0], seed=seed, device=device.value), save, force=force)
     shown = [f"Look at {output}", *([f"The edited scene is {save}"] if save is not None else [])]
-    warnings = [note for note in film[-1].report.warnings if note not in loaded.report.warnings]
+    warnings = told_since(loaded, film[-1])
     report_success(
         "drop", as_json, [*(f"Note: {note}" for note in warnings), *shown], video=str(output),
         frames=frames, fps=fps, scene=str(save) if save else None, warnings=warnings,

@@ -81,10 +81,12 @@ def glass(
     from materialist.edit.glass import OPEN, check_glass
     from materialist.edit.glass import glass as change
     from materialist.edit.hole import told_shadow
-    from materialist.edit.material import parse_colour
+    from materialist.edit.material import PICTURED, parse_colour
     from materialist.errors import InputError
     from materialist.io.package import load_scene
 
+    if model is Model.two_interface and full_render:
+        raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
     check_before(output, save, spp, force, device=device.value, full_render=full_render)
     if preview and (save is not None or full_render or not denoise):
         raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
@@ -119,6 +121,7 @@ def _preview(
     from materialist.cli.outcome import report_success
     from materialist.cli.progress import StageProgress
     from materialist.edit.glass_preview import GlassPreview
+    from materialist.edit.material import told_since
     from materialist.edit.output import write_composite
 
     start = time.monotonic()
@@ -129,7 +132,7 @@ def _preview(
         picture = made.picture(**look, spp=spp, seed=options["seed"])
     write_composite(output, picture, loaded.photo, force=force)
     size, source = f"{picture.shape[1]} x {picture.shape[0]}", made.edited.provenance["edits"][-1]["thickness"]
-    warnings = [note for note in made.edited.report.warnings if note not in loaded.report.warnings]
+    warnings = told_since(loaded, made.edited)
     lines = [
         f"{int(region.sum())} pixels are glass; thickness: {source}.",
         f"A preview: {size}, the size that the scene was worked out at, without the shadow and caustics of the glass.",

@@ -109,6 +109,7 @@ def write_result(
     """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
     from materialist.edit.composite import composite, developed
     from materialist.edit.layers import is_relit
+    from materialist.edit.material import told_since
     from materialist.edit.output import write_composite
     from materialist.io.package import save_scene
 
@@ -121,7 +122,7 @@ def write_result(
     write_composite(output, picture, scene.photo, force=force)
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=seed, device=device), save, force=force)
-    warnings = [note for note in edited.report.warnings if note not in scene.report.warnings]
+    warnings = told_since(scene, edited)
     if not full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
         warnings.append(f"The picture looks like the photo: nothing of the edit is to be seen. {unseen}".rstrip())
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]

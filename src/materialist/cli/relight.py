@@ -120,6 +120,7 @@ def _video(
 ) -> None:  # fmt: skip
     from materialist.edit.composite import pictures
     from materialist.edit.frames import moving_light, write_frames
+    from materialist.edit.material import told_since
 
     start = time.monotonic()
     last = scene
@@ -134,7 +135,7 @@ def _video(
     with StageProgress(quiet=as_json) as progress:
         taken = pictures(scene, relit(), progress=progress, count=count, **shared)
         write_frames(output, taken, fps=fps, force=force)
-    warnings = [note for note in last.report.warnings if note not in scene.report.warnings]
+    warnings = told_since(scene, last)
     report_success(
         "relight", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
         frames=count, fps=fps, warnings=warnings, seconds=time.monotonic() - start,

@@ -28,6 +28,7 @@ def render(
     force: Force = False,
 ) -> None:
     """Path-trace a scene package."""
+    from materialist.edit.material import PICTURED, is_pictured
     from materialist.edit.output import write_composite
     from materialist.io.image import ensure_image_writable
     from materialist.io.package import load_scene
@@ -43,4 +44,6 @@ def render(
     with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
         image = pipeline.render_scene(loaded, spp=spp, denoise=denoise, seed=seed, device=device.value)
     write_composite(output, image, loaded.photo, force=force)
-    report_success("render", as_json, [f"Look at {output}"], image=str(output), spp=spp)
+    notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) else []
+    shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
+    report_success("render", as_json, shown, image=str(output), spp=spp, warnings=notes)

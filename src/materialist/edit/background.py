@@ -12,7 +12,7 @@ from materialist.color import linear_to_srgb
 from materialist.edit.behind import Behind, behind
 from materialist.edit.exemplar import Plan, exemplar_plan
 from materialist.edit.hole import GROW, Hole, make_hole
-from materialist.edit.material import noted
+from materialist.edit.material import noted, warned
 from materialist.edit.region import placed
 from materialist.edit.regular import regular_sources
 from materialist.edit.seamless import seamless
@@ -61,7 +61,7 @@ def without(
     usable = placed(photographed) == 0 if photographed.bodies else None
     plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed, usable=usable)
     shown = _denoised(scene)
-    picture = _given(scene, background, inpaint, hole)
+    picture, notes = _given(scene, background, inpaint, hole)
     if picture is None:
         materials, photo, rerender = _continued(scene, plan, hole, shown)
     else:
@@ -72,12 +72,21 @@ def without(
         photo=photo, rerender=rerender,
     )  # fmt: skip
     cast = "auto" if shadow is None else shadow
-    what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast}
+    what = {"filled_by": how, "pixels": int(hole.object.sum()), "grow": grow, "shadow": cast, "at": _middle(hole)}
     if photographed.bodies:
         removed = _with_bodies(removed, photographed, hole)
     if picture is not None:
         removed = _matched(removed, hole, picture, fitted or scene)
-    return noted(removed, "remove", what)
+    return noted(warned(removed, *notes), "remove", what)
+
+
+def _middle(hole: Hole) -> list[int]:
+    """[x, y] a pixel of the hole, as far from its border as there is one: it tells this hole from others."""
+    from scipy.ndimage import distance_transform_edt
+
+    far = distance_transform_edt(np.pad(hole.painted, 1))[1:-1, 1:-1]
+    y, x = np.unravel_index(int(far.argmax()), far.shape)
+    return [int(x), int(y)]
 
 
 def looks(albedo: Array, photo: Array) -> Array:
@@ -251,18 +260,20 @@ def _native_sources(plan: Plan, hole: Array, rows: Array, columns: Array, native
     return np.clip(rows + moved[:, 0], 0, native[0] - 1), np.clip(columns + moved[:, 1], 0, native[1] - 1)
 
 
-def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Array | None:
-    """[h, w, 3] linear picture of what is behind, if there is one."""
+def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> tuple[Array | None, list[str]]:
+    """([h, w, 3] linear picture of what is behind, if there is one; what is to be said of it)."""
+    notes: list[str] = []
     if background is None and inpaint is None:
-        return None
+        return None, notes
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
     if inpaint is not None:
-        return np.asarray(inpaint(scene.photo.linear, hole.painted), np.float32)
+        return np.asarray(inpaint(scene.photo.linear, hole.painted), np.float32), notes
     if isinstance(background, str | Path):
         from materialist.io.photo import decode_photo
 
         decoded = decode_photo(Path(background))
+        notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
         background = decoded.linear * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
     picture = np.asarray(background, np.float32)
     shape = hole.painted.shape
@@ -273,7 +284,7 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> Arr
         )
     if not (np.isfinite(picture).all() and picture.min() >= 0):
         raise InputError("The background has negative or infinite values; give a linear or sRGB picture.")
-    return picture
+    return picture, notes
 
 
 def _geometry(scene: Scene, found: Behind):

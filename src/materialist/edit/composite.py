@@ -9,6 +9,7 @@ import numpy as np
 from materialist.edit.glows import KEY, explained
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio, rendered
+from materialist.edit.material import PICTURED, is_pictured
 from materialist.edit.portrait import Portrait
 from materialist.edit.revealed import revealed
 from materialist.edit.upsample import GuidedUpsample, matte, strips
@@ -60,10 +61,12 @@ def composite(
         with `upscale` as well.
 
     Raises:
-        InputError: `upscale` without `full_render`, or a result of it that is not a picture of native size.
+        InputError: `upscale` without `full_render`, or a result of it that is not a picture of native size;
+            `full_render` of glass of the two-interface model, which only the photo shows.
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
+    _check_rendered(edited, full_render)
     scene = explained(scene, edited)
     studio = Studio(scene, device=device)
     if full_render:
@@ -86,6 +89,7 @@ def pictures(
     studio, lights = Studio(scene, device=device), None
     for k, edited in enumerate(edits):
         tick("frames", k, total)
+        _check_rendered(edited, full_render)
         if edited.provenance.get(KEY) != lights:  # frames of one film share their lights, and so their base picture
             studio, lights = Studio(explained(scene, edited), device=device), edited.provenance.get(KEY)
         if full_render:
@@ -94,6 +98,11 @@ def pictures(
             layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
             yield into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
     tick("frames", total, total)
+
+
+def _check_rendered(edited: Scene, full_render: bool) -> None:
+    if full_render and is_pictured(edited):
+        raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
 
 
 def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:

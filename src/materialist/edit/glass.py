@@ -26,6 +26,9 @@ OPEN = "open"
 SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
+SKY = "What is seen of the sky through this glass is the fitted light; --model two-interface shows the photo's sky."
+SEEN_SKY = 0.05
+"""Part of the object behind which there must be sky for that to be said."""
 IOR = (1.0, 3.0)
 NAME = "photo glass"
 
@@ -72,14 +75,15 @@ def glass(
     ]  # fmt: skip
     if model == "two-interface":
         look = {"ior": ior, "transmission": transmission, "tint": tint, "roughness": roughness}
-        edited = _two_interface(scene, removed, each, look, smooth)
+        edited = _two_interface(scene, removed, each, look, smooth, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if hollow else edited
     else:
         surface = glass_surface(scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
         shells = [_shell(scene, removed, part, found, hollow, smooth) for part, found in each]
         shell = joined(shells)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, NAME)
-        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *_unlike(each, shells, hollow))
+        notes = [SKY] * bool((removed.depth[own] == 0).mean() > SEEN_SKY) + _unlike(each, shells, hollow)
+        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *notes)
     methods = list(dict.fromkeys(found.method for _, found in each))
     what = {
         "ior": ior, "transmission": transmission, "tint": list(tint), "roughness": roughness, "hollow": hollow,
@@ -122,28 +126,25 @@ def glass_surface(
 
 
 def _two_interface(
-    scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], look: dict[str, Any], smooth: float
-) -> Scene:
-    """The removed scene with the paper's picture of the glass in its photo."""
+    scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], look: dict[str, Any], smooth: float,
+    envmap: Array,
+) -> Scene:  # fmt: skip
+    """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
     from materialist.edit.background import resized
     from materialist.edit.two_interface import back_of, two_interface
 
     own = np.zeros(scene.depth.shape, bool)
-    maps: list[Array] = []
+    photo, picture = removed.photo, np.zeros(scene.photo.linear.shape, np.float32)
     for part, found in each:
         seen, front, facing = _front(scene, part, found, smooth)
         factor = room(front, found.solid, seen, removed.depth, scene.camera)
         front, thick = factor * front, factor * found.solid
-        new = [front, thick, facing, back_of(front, seen, thick, found.back, scene.camera)]
-        # The first says what is just outside of the masks, too.
-        maps = [np.where(seen if a.ndim == 2 else seen[..., None], a, b) for a, b in zip(new, maps)] if maps else new
+        one = two_interface(
+            scene.camera, facing, front, seen, thick, removed.depth, photo.linear, envmap,
+            back=back_of(front, seen, thick, found.back, scene.camera), **{**look, "transmission": 1.0},
+        )  # fmt: skip
+        picture = np.where(seen[..., None], one, picture)
         own |= seen
-    depth, solid, normal, back = maps
-    picture = two_interface(
-        scene.camera, normal, depth, own, solid, removed.depth, removed.photo.linear, scene.envmap, back=back,
-        **{**look, "transmission": 1.0},
-    )  # fmt: skip
-    photo = removed.photo
     if look["transmission"] < 1:
         # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.
         clear = look["transmission"]

@@ -80,10 +80,22 @@ def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
 
 
 def warned(scene: Scene, *notes: str) -> Scene:
-    """The scene with further warnings in its report, each once."""
-    known = scene.report.warnings
-    new = dict.fromkeys(note for note in notes if note not in known)
-    return replace(scene, report=replace(scene.report, warnings=(*known, *new)))
+    """The scene with further warnings in its report; one that an earlier edit gave comes again."""
+    return replace(scene, report=replace(scene.report, warnings=(*scene.report.warnings, *dict.fromkeys(notes))))
+
+
+PICTURED = "Glass of the two-interface model is a picture in the photo: "
+"""The beginning of what is said where the photo is not shown."""
+
+
+def is_pictured(scene: Scene) -> bool:
+    """Whether the photo of an edited scene shows glass that no rendering of the scene has."""
+    return any(step.get("model") == "two-interface" for step in scene.provenance.get("edits", ()))
+
+
+def told_since(scene: Scene, edited: Scene) -> list[str]:
+    """The warnings of the edits that led from one scene to another, each once."""
+    return list(dict.fromkeys(edited.report.warnings[len(scene.report.warnings) :]))
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:

@@ -38,10 +38,12 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if scene.bodies:
         filled &= placed(scene) < 1
     bare = _bare(studio, edited, layers, spp, seed, clean)
-    if not _given(scene, edited):
+    given = _given(scene, edited, filled)
+    if (filled & ~given).any():
         factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
         change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
-        bare = np.maximum(bare - change, 0)  # filled places may be far brighter than what is rendered there
+        # Filled places may be far brighter than what is rendered there.
+        bare = np.where(given[..., None], bare, np.maximum(bare - change, 0))
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
@@ -63,10 +65,21 @@ def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: boo
     return denoised(picture, picture, guides)[0] if clean else picture
 
 
-def _given(scene: Scene, edited: Scene) -> bool:
-    """Whether the photo was filled by a picture of what is there, and not from its surroundings, since `scene`."""
+def _given(scene: Scene, edited: Scene, filled: Array) -> Array:
+    """[H, W] bool: the parts of `filled` that show a picture of what is there, and not their surroundings."""
+    from scipy.ndimage import distance_transform_edt, label
+
     steps = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
-    return any(step.get("filled_by") == "background" for step in steps)
+    places = [step["at"] for step in steps if step.get("filled_by") == "background"]
+    given = np.zeros(filled.shape, bool)
+    if not places or not filled.any():
+        return given
+    parts, _ = label(filled, np.ones((3, 3)))
+    nearest = distance_transform_edt(~filled, return_distances=False, return_indices=True)
+    for x, y in places:
+        row, column = nearest[:, y, x]
+        given |= parts == parts[row, column]
+    return given
 
 
 def _continued(change: Array, filled: Array, plane: Array) -> Array:

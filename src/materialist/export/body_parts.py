@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from materialist.edit.mesh_shape import edge_faults, volume
 from materialist.export.parts import Part
 from materialist.types import Array, Body, Materials, Mesh, Scene, Surface
 
@@ -52,6 +53,15 @@ def _one_size(surface: Surface) -> Materials:
         return np.ascontiguousarray(values[np.ix_(rows, columns)])
 
     return Materials(*(grown(values) for values in maps))
+
+
+def mean_chord(part: Part) -> float:
+    """Mean way through a closed part, scene units: 4 volume / area (Cauchy); 0 for an open one."""
+    mesh = part.mesh
+    open_edges, _ = edge_faults(mesh.vertices, mesh.faces)
+    a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(np.float64) for k in range(3))
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=-1).sum() / 2)
+    return 0.0 if open_edges or area == 0 else 4 * abs(volume(mesh.vertices, mesh.faces)) / area
 
 
 def one_roughness(part: Part) -> Materials:

@@ -17,7 +17,7 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import OutputError
-from materialist.export.body_parts import one_roughness
+from materialist.export.body_parts import mean_chord, one_roughness
 from materialist.export.parts import Part
 from materialist.export.textures import base_color, metallic_roughness, png
 from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface
@@ -138,16 +138,22 @@ class _Document:
             material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
-            material.setdefault("extensions", {}).update(self._glass(part.surface))
+            material.setdefault("extensions", {}).update(self._glass(part.surface, mean_chord(part)))
         return self._add("materials", material)
 
-    def _glass(self, surface: Surface) -> dict:
-        """KHR_materials_transmission and KHR_materials_ior; the base colour tints what passes, see `_passing`."""
-        self.extensions |= {"KHR_materials_transmission", "KHR_materials_ior"}
-        return {
+    def _glass(self, surface: Surface, thick: float) -> dict:
+        """KHR_materials_transmission, _ior and _volume; the base colour tints what passes, see `_passing`.
+
+        Without a thickness glass is a thin wall by the specification, and bends nothing.
+        """
+        glass: dict[str, dict] = {
             "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
             "KHR_materials_ior": {"ior": float(surface.ior)},
         }
+        if thick > 0:
+            glass["KHR_materials_volume"] = {"thicknessFactor": thick}
+        self.extensions |= set(glass)
+        return glass
 
     def _texture(self, name: str, pixels: Array, sampler: int) -> int:
         view = self._view(png(pixels))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from materialist.edit.material import PICTURED, is_pictured
 from materialist.errors import InputError
 from materialist.export.body_parts import body_parts, left_out
 from materialist.export.parts import Part, scene_parts
@@ -74,6 +75,8 @@ def export(
     if scene.lamps and to == "html":
         count = len(scene.lamps)
         note = (*note, f"html has none of the scene's {count} lamp{'s' * (count != 1)}; the other formats have.")
+    if is_pictured(scene) and to != "html":
+        note = (*note, f"{PICTURED}{to} shows the scene without it.")
     if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
         note = (*note, f"Mitsuba has no {COATED}.")
     parts = [*scene_parts(scene, max_triangles), *bodies]

@@ -189,7 +189,7 @@ class Fit:
         foot = centre + self.size * np.array([values[0], 0, -values[1]])
         height = self.points @ up
         low = float(np.percentile(height, 1))
-        bottom = height < low + 0.06 * np.ptp(height)
+        bottom = height <= low + 0.06 * np.ptp(height)
         base = bool(np.median(self.facing[self.inside][bottom]) > EDGED)
         return Axis(up, foot + (low - foot @ up) * up, base)
 

@@ -263,7 +263,7 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 
 def _report_to_json(report: FitReport) -> dict[str, Any]:
     """report.json: the metrics lie flat beside `stages` and `warnings`."""
-    return {**report.metrics, "stages": list(report.stages), "warnings": list(report.warnings)}
+    return {**report.metrics, "stages": list(report.stages), "warnings": list(dict.fromkeys(report.warnings))}
 
 
 def _report_from_json(content: dict[str, Any]) -> FitReport:

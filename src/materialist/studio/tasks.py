@@ -89,6 +89,7 @@ def _materials(before: str, maps: Materials) -> dict[str, Array]:
 def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edit.composite import composite
+    from materialist.edit.material import told_since
     from materialist.edit.output import write_composite
 
     loaded, edited = _edited(progress, scene, edits)
@@ -97,7 +98,7 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
     write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
-    notes = [note for note in edited.report.warnings if note not in loaded.report.warnings]
+    notes = told_since(loaded, edited)
     return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 
 
