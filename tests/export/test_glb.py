@@ -5,15 +5,19 @@ import json
 import shutil
 import struct
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from export_scenes import room
+from made_meshes import box_file
 from PIL import Image
 
 from materialist.camera import project
 from materialist.color import linear_to_srgb
+from materialist.edit.meshes import read_model, repainted
+from materialist.export.body_parts import body_parts
 from materialist.export.glb import glb_bytes, write_hdr
 from materialist.export.parts import scene_parts
 
@@ -112,9 +116,9 @@ def test_official_validator(tmp_path):
         pytest.skip("needs the npm package gltf-validator (npm install -g gltf-validator)")
     file = tmp_path / "room.glb"
     environment = os.environ | {"NODE_PATH": os.pathsep.join(path for path in paths if path)}
-    for completion in ("planes", "none"):
-        scene = room(completion=completion)
-        file.write_bytes(glb_bytes(scene, scene_parts(scene)))
+    glass = repainted(read_model(box_file(tmp_path / "box.ply")), "glass")
+    for scene in (room(completion="planes"), room(completion="none"), replace(room(), bodies=glass.parts)):
+        file.write_bytes(glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)]))
         done = subprocess.run(["node", "-e", VALIDATE, str(file)], capture_output=True, text=True, env=environment)
         issues = json.loads(done.stdout)
         assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]

@@ -138,7 +138,9 @@ class _Document:
             material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
-            material.setdefault("extensions", {}).update(self._glass(part.surface, mean_chord(part)))
+            thick = mean_chord(part)
+            material.setdefault("extensions", {}).update(self._glass(part.surface, thick))
+            material["doubleSided"] = thick == 0
         return self._add("materials", material)
 
     def _glass(self, surface: Surface, thick: float) -> dict:

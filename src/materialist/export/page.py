@@ -59,7 +59,9 @@ def page(scene: Scene, parts: list[Part]) -> str:
         "envmap": _image(pictures.light(scene.envmap)),
         "light_note": f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
         "metrics": _metrics(scene.report.metrics),
-        "stages": _table((s.get("name", ""), f"{s.get('seconds', 0):.1f} s") for s in scene.report.stages),
+        "stages": _table(
+            (s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–") for s in scene.report.stages
+        ),
         "provenance": _table(_options(scene)),
         "scene": json.dumps(_packed(camera, scene.depth, parts)),
         "style": (assets / "page.css").read_text("utf-8"),
