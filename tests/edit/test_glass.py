@@ -308,18 +308,6 @@ def test_thin_masks_give_no_warnings_of_numpy(place, recwarn):
     assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
 
 
-def test_glass_before_the_sky_says_what_is_seen_in_it():
-    from dataclasses import replace
-
-    from materialist.edit.glass import SKY
-
-    scene = flat_scene(sky=26)
-    scene = replace(scene, depth=np.where(MASK, 2, scene.depth).astype(np.float32))
-    assert SKY in glass(scene, MASK, thickness="symmetry").report.warnings
-    assert SKY not in glass(scene, MASK, thickness="symmetry", model="two-interface").report.warnings
-    assert SKY not in glass(flat_scene(), MASK, thickness="symmetry").report.warnings
-
-
 def test_a_note_is_told_again_for_another_object():
     from materialist.edit.glass import LID
     from materialist.edit.material import told_since

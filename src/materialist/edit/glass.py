@@ -26,9 +26,6 @@ OPEN = "open"
 SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
-SKY = "What is seen of the sky through this glass is the fitted light; --model two-interface shows the photo's sky."
-SEEN_SKY = 0.05
-"""Part of the object behind which there must be sky for that to be said."""
 IOR = (1.0, 3.0)
 NAME = "photo glass"
 
@@ -82,8 +79,7 @@ def glass(
         shells = [_shell(scene, removed, part, found, hollow, smooth) for part, found in each]
         shell = joined(shells)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, surface, NAME)
-        notes = [SKY] * bool((removed.depth[own] == 0).mean() > SEEN_SKY) + _unlike(each, shells, hollow)
-        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *notes)
+        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *_unlike(each, shells, hollow))
     methods = list(dict.fromkeys(found.method for _, found in each))
     what = {
         "ior": ior, "transmission": transmission, "tint": list(tint), "roughness": roughness, "hollow": hollow,

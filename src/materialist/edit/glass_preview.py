@@ -38,6 +38,7 @@ class GlassPreview:
     """
 
     def __init__(self, scene: Scene, mask: Array, *, device: str = "auto", **options: Any):
+        from materialist.edit.sky import sky_maps
         from materialist.render.variant import setup
 
         if options.get("model", "closed") != "closed":
@@ -47,6 +48,8 @@ class GlassPreview:
         # The glass itself is exchanged for every picture.
         self._edited = glass(scene, mask, **{**options, "ior": 1.5, "transmission": 1.0})
         self._targets: dict[str, tuple[Any, Any]] = {}
+        as_photographed = np.array_equal((options.get("fitted") or scene).envmap, scene.envmap)
+        self._sky = sky_maps(self._edited) if as_photographed else None
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._look()
 
@@ -60,6 +63,7 @@ class GlassPreview:
         """
         from materialist.edit.glass import check_glass
         from materialist.edit.portrait import denoised, spread
+        from materialist.edit.sky import traced
         from materialist.render.portrait import radiance
         from materialist.render.scene import GLASS_DEPTH
 
@@ -70,9 +74,10 @@ class GlassPreview:
         size, box = self._size(spp)
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
-        traced = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
+        options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": GLASS_DEPTH, "names": [self._name]}
+        seen = traced(lambda: radiance(target, size, box, **options), target, self._edited, self._sky)
         return self._in_photo(
-            denoised(without_fireflies(spread(traced), spread=focused(self._edited)), self._guides[size]), surface
+            denoised(without_fireflies(spread(seen), spread=focused(self._edited)), self._guides[size]), surface
         )
 
     @property

@@ -42,7 +42,32 @@ class Studio:
                 self._base[key] = self._render(self.scene, depth, spp, seed)
             return self._base[key]
 
-        return base, lambda spp, seed: self._render(edited, depth, spp, seed)
+        missing = self._missing_sky(edited)
+        if missing is None:
+            return base, lambda spp, seed: self._render(edited, depth, spp, seed)
+        where, more, less = missing
+
+        def before_sky(spp: int, seed: int) -> Array:
+            sky = self._render(more, depth, spp, seed) - self._render(less, depth, spp, seed)
+            return self._render(edited, depth, spp, seed) + np.where(where, sky, 0)
+
+        return base, before_sky
+
+    def _missing_sky(self, edited: Scene) -> tuple[Array, Scene, Scene] | None:
+        """([H, W, 1] where new glass is seen, the edit under the photo's sky alone, and under what the fit has there).
+
+        None where no new glass stands before sky, or where the light is another than the photo's.
+        """
+        from materialist.edit.sky import only_lit_by, sky_maps
+        from materialist.render.bodies import is_transparent
+
+        old = self.scene.bodies
+        new = [f"body{k}" for k, b in enumerate(edited.bodies) if b not in old and is_transparent(b.surface)]
+        maps = None if not new or is_relit(self.scene, edited) else sky_maps(edited)
+        if maps is None:
+            return None
+        more, less = (only_lit_by(edited, envmap) for envmap in maps)
+        return self._seen(edited, new)[..., None] > 0, more, less
 
     def begun(self, edited: Scene) -> tuple[Begun, Begun] | None:
         """A share of the base and of `edited`, None where the tracer of `twins` knows no shares.

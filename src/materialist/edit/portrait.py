@@ -53,7 +53,9 @@ def portrait(
     target: Any, scene: Scene, edited: Scene, names: list[str], *, spp: int, seed: int, max_depth: int, clean: bool,
 ) -> Portrait | None:  # fmt: skip
     """Trace the named bodies of a `RenderScene` at native size; None where the camera sees none of them."""
+    from materialist.edit.sky import sky_maps, traced
     from materialist.render import portrait as trace
+    from materialist.render.bodies import is_transparent
 
     camera, native = scene.camera, scene.photo.original.shape[:2]
     working = (camera.height, camera.width)
@@ -72,7 +74,10 @@ def portrait(
     # As many paths as a picture of working size has, on the part that the bodies take.
     pixels = (part[1] - part[0]) * (part[3] - part[2])
     paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
-    picture = trace.radiance(target, size, part, spp=paths, seed=seed, max_depth=max_depth, names=names)
+    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": max_depth, "names": names}
+    clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
+    maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
+    picture = traced(lambda: trace.radiance(target, size, part, **options), target, edited, maps)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
     picture = spread(picture)
     if clean:
