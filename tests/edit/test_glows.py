@@ -68,9 +68,10 @@ def test_the_window_is_found_and_a_speck_is_not():
 
 def test_its_radiance_is_found():
     _, fit = rooms()
-    ambient, radiance = _explained(fit, visible_lights(fit), 0, "auto")
+    ambient, radiance, share = _explained(fit, visible_lights(fit), 0, "auto")
     assert 6 <= radiance <= 12
     np.testing.assert_allclose(ambient * fit.envmap.mean(), 0.15, rtol=0.25)
+    assert ambient + share == pytest.approx(1, abs=0.25)  # the two together are the photo
 
 
 @pytest.mark.parametrize("dim", [0.0, 0.5])
@@ -104,7 +105,7 @@ def test_the_window_stays_while_the_rest_turns():
 def test_frames_share_the_dimmed_lights_and_the_picture_that_they_are_compared_with(monkeypatch):
     _, fit = rooms()
     asked = []
-    monkeypatch.setattr(glows, "_explained", lambda *given: asked.append(given) or (0.8, 6.0))
+    monkeypatch.setattr(glows, "_explained", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
     film = list(moving_light(fit, 3, dim=0.25))
     assert len(asked) == 1 and film[0].bodies is film[2].bodies and len(film[0].bodies) == 1
     np.testing.assert_allclose(film[0].bodies[0].surface.emission, 1.5)

@@ -101,6 +101,17 @@ def test_resizing_keeps_the_shape_and_the_mean(height):
     assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(envmap.max())
 
 
+@pytest.mark.parametrize("height", [8, 10, 12, 13])
+def test_shrinking_keeps_the_light_of_every_texel(height):
+    """By any ratio: an average of windows that overlap loses a small sun, or doubles it."""
+    for row, column in ((7, 3), (8, 16), (6, 31)):
+        envmap = torch.zeros(16, 32, 3)
+        envmap[row, column] = 100
+        small = resize_envmap(envmap, height)
+        assert float(small.sum()) * 16 * 32 / (2 * height**2) == pytest.approx(300 * 1, rel=1e-4)
+        np.testing.assert_allclose(small.numpy(), metrics.resample_envmap(envmap.numpy(), height), atol=1e-3)
+
+
 @pytest.mark.parametrize("height", [24, 27, 32, 50])
 def test_enlarging_moves_nothing(height):
     """By any ratio: as the metric's own, in another library."""

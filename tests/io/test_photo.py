@@ -487,3 +487,10 @@ def test_a_part_of_a_frame_is_told(tmp_path):
         file.write(str(tmp_path / "a.exr"))
     told = " ".join(decode_photo(tmp_path / "a.exr").warnings)
     assert "a part of its frame" in told and "not square" in told
+
+
+@pytest.mark.parametrize("size", [16, 32, 48, 64, 400])
+def test_pixels_of_a_long_photo_stay_square(tmp_path, size):
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (100, 800, 3), np.uint8)).save(tmp_path / "long.png")
+    camera = read_photo(tmp_path / "long.png", size=size).camera
+    assert camera.width == 8 * camera.height and camera.width == max(size, 64)

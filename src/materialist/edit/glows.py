@@ -74,8 +74,9 @@ def dimmed(
     masks = visible_lights(known)
     if not masks:
         raise InputError("The photo shows no light: no clipped region on a surface covers a thousandth of it.")
-    ambient, radiance = _explained(known, masks, seed, device)
-    provenance = {**scene.provenance, KEY: {"ambient": ambient, "radiance": radiance, "dim": dim}}
+    ambient, radiance, share = _explained(known, masks, seed, device)
+    found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share}
+    provenance = {**scene.provenance, KEY: found}
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     note = f"Taken for lights, {radiance:g} times as bright as the photo's white: the clipped regions around {places}."
     return warned(replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance), note)
@@ -104,8 +105,11 @@ def _shining(scene: Scene, masks: list[Array], ambient: float, radiance: float) 
     return replace(scene, envmap=scene.envmap * np.float32(ambient), bodies=(*scene.bodies, *lights))
 
 
-def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tuple[float, float]:
-    """(factor on the environment map, radiance of the lights) that together give the photo."""
+def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tuple[float, float, float]:
+    """(factor on the environment map, radiance of the lights) that together give the photo, and the lights' share.
+
+    The share is what the lights bring to the surfaces of the photo, relative to what the whole map brings.
+    """
     from materialist.render.scene import RenderScene
 
     shining = tuple(_patch(scene, mask, 1.0, NAME) for mask in masks)
@@ -116,7 +120,7 @@ def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tupl
     photo = scene.photo.linear
     seen = (scene.depth > 0) & ~np.any(masks, 0) & (photo.max(-1) < CLIPPED)
     if not seen.any():
-        return 1.0, 1.0
+        return 1.0, 1.0, 0.0
     wanted, base, lit = (v[seen].astype(np.float64) for v in (photo, scene.rerender, by_lights))
     weight = 1 / (wanted.mean(-1, keepdims=True) + 0.05)  # errors count relative to the brightness
 
@@ -130,7 +134,7 @@ def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tupl
     found = {radiance: fitted(radiance) for radiance in tried}
     best = min(error for _, error in found.values())
     chosen = max(radiance for radiance, (_, error) in found.items() if error <= WORSE * best)
-    return found[chosen][0], chosen
+    return found[chosen][0], chosen, float(chosen * lit.mean() / max(base.mean(), 1e-6))
 
 
 def _patch(scene: Scene, mask: Array, radiance: float, name: str) -> Body:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from materialist.edit.preview_light import OtherLight
 
 
+LEAST_AMBIENT = 1e-3
+"""Factor on the fitted map below which what is left of it cannot be scaled back."""
+
+
 class Preview:
     """A fitted scene whose rays are traced once; then a change of materials is one shading call.
 
@@ -97,8 +101,11 @@ class Preview:
         if not found or KEY in self.scene.provenance:
             return edited
         ambient, dim = float(found["ambient"]), float(found.get("dim", 1.0))
-        share = (ambient + max(1 - ambient, 0) * dim) / max(ambient, 1e-6)
-        return replace(edited, envmap=(edited.envmap * share).astype(np.float32))
+        lights = float(found.get("share", max(1 - ambient, 0)))
+        brought = (ambient + lights * dim) / max(ambient + lights, 1e-6)  # relative to the photo's light
+        # Without its lights the map may have nothing left to be scaled.
+        light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
+        return replace(edited, envmap=(light * brought).astype(np.float32))
 
     def _light_for(self, edited: Scene):
         """None for the fitted light; the `OtherLight` is kept until there is a third."""

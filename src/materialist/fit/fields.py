@@ -98,15 +98,24 @@ def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
     h = envmap.shape[0]
     if h == height:
         return envmap
-    image = envmap.permute(2, 0, 1)[None]
     if height < h:
-        return functional.interpolate(image, (height, 2 * height), mode="area")[0].permute(1, 2, 0)
+        rows, columns = (_coverage(n, m).to(envmap) for n, m in ((height, h), (2 * height, 2 * h)))
+        return torch.einsum("ij,jkc,lk->ilc", rows, envmap, columns)
+    image = envmap.permute(2, 0, 1)[None]
     image = functional.pad(functional.pad(image, (1, 1, 0, 0), mode="circular"), (0, 0, 1, 1), mode="replicate")
     # Centres of the new texels on the padded map, in [-1, 1].
     y = (2 * ((torch.arange(height) + 0.5) * h / height + 1) / (h + 2) - 1).to(image)
     x = (2 * ((torch.arange(2 * height) + 0.5) * h / height + 1) / (2 * h + 2) - 1).to(image)
     places = torch.stack(torch.meshgrid(y, x, indexing="ij")[::-1], -1)[None]
     return functional.grid_sample(image, places, mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
+
+
+def _coverage(count: int, of: int) -> torch.Tensor:
+    """[count, of] part of each of `count` cells that each of `of` cells covers; both divide the same length."""
+    ends = torch.arange(count + 1, dtype=torch.float64) * of / count
+    cell = torch.arange(of, dtype=torch.float64)
+    overlap = torch.minimum(ends[1:, None], cell + 1) - torch.maximum(ends[:-1, None], cell)
+    return overlap.clamp_min(0) * count / of
 
 
 class MaterialMLP(nn.Module):

@@ -80,7 +80,8 @@ def _picture(path: Path) -> Decoded:
 def _is_deep(image: Image.Image, path: Path) -> bool:
     """Whether the file has more than 8 bits a channel (Pillow cuts those to 8 when they are RGB)."""
     if image.format == "PNG":
-        return path.open("rb").read(25)[24] == 16
+        with path.open("rb") as file:
+            return file.read(25)[24] == 16
     if image.format == "TIFF":
         return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
     return image.mode in ("I", "F") or image.mode.startswith("I;16")

@@ -146,14 +146,17 @@ def option_fov(fov: float | str | None) -> float | None:
 
 
 def _working(original: Array, size: int) -> Array:
-    """[H, W, 3] with the longer side at most `size`: area average of linear light, never an enlargement."""
+    """[H, W, 3] with the longer side at most `size`: area average of linear light, never an enlargement.
+
+    Pixels stay square: of a long photo the shorter side has MIN_SIDE pixels, and the longer one more than `size`.
+    """
     import cv2
 
     height, width = original.shape[:2]
-    scale = size / max(height, width)
+    scale = max(size / max(height, width), MIN_SIDE / min(height, width))
     if scale >= 1:
         return original
-    target = (max(MIN_SIDE, round(width * scale)), max(MIN_SIDE, round(height * scale)))
+    target = (round(width * scale), round(height * scale))
     return np.asarray(cv2.resize(original, target, interpolation=cv2.INTER_AREA))
 
 
