@@ -286,3 +286,21 @@ def test_how_much_of_a_shadow_goes_is_told_by_word_or_number():
     for value in ("much", None, True, [1]):
         with pytest.raises(InputError, match="give auto, or a share"):
             told_shadow(value)
+
+
+def test_light_that_comes_back_outshines_nothing():
+    """Where an object's guessed back hid a strong light, its neighbour must not glow when it goes."""
+    from materialist.edit.revealed import _too_bright
+
+    scene = flat_scene()
+    grey = np.full((36, 48, 3), 0.2, np.float32)
+    grey[:, :12] = 0.8  # a quarter of it is bright
+    scene = replace(scene, photo=replace(scene.photo, linear=grey))
+    filled = np.zeros((36, 48), bool)
+    filled[10:20, 20:30] = True
+    gained = np.full((36, 48, 3), 0.9, np.float32)
+    kept = gained - _too_bright(scene, gained, filled)
+    np.testing.assert_allclose(kept[:, :12], 0, atol=1e-6)  # as bright as anything already
+    np.testing.assert_allclose(kept[30, 40], 0.6, rtol=1e-5)  # shade may go
+    np.testing.assert_array_equal(kept[filled], gained[filled])
+    assert not _too_bright(scene, -gained, filled).any()

@@ -210,3 +210,17 @@ def tetrahedron() -> Body:
     grey = np.full((1, 1), 0.5, np.float32)
     red = np.float32([[[0.7, 0.05, 0.05]]])
     return Body(corners, faces, normals, np.zeros((4, 2), np.float32), Surface(red, grey, 0 * grey))
+
+
+def test_light_on_what_the_fit_has_far_too_dark_is_not_believed():
+    from types import SimpleNamespace
+
+    from materialist.edit.composite import _same_light
+
+    photo = SimpleNamespace(linear=np.full((1, 3, 3), 0.9, np.float32))
+    base = np.array([0.9, 0.1, 0.1], np.float32)[None, :, None].repeat(3, 2)
+    changed = np.array([[False, False, True]])
+    more = SimpleNamespace(base=base, edited=base + 1, changed=changed)
+    np.testing.assert_allclose(_same_light(photo, more)[0][0, :, 0], [1, (0.12 * 2 / 0.92) ** 2, 1], rtol=1e-4)
+    less = SimpleNamespace(base=base, edited=base * 0.5, changed=changed)
+    np.testing.assert_allclose(_same_light(photo, less)[0], -0.5 * base, rtol=1e-6)

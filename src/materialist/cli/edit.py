@@ -78,5 +78,6 @@ def edit(
     )  # fmt: skip
     write_result(
         "edit", loaded, edited, output, save=save, spp=spp, seed=seed, denoise=denoise, full_render=full_render,
-        device=device.value, as_json=as_json, force=force, lines=[f"{int(region.sum())} pixels edited."],
+        device=device.value, as_json=as_json, force=force,
+        lines=[f"{int(region.sum())} pixels edited, {float(region.mean()):.0%} of the photo."],
     )  # fmt: skip

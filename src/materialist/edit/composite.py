@@ -28,6 +28,8 @@ RERENDERED = 36
 """Camera rays a pixel of the re-rendering of an edited scene that is kept."""
 MOST_DETAIL = 2.0
 """Largest factor on the photo's detail beyond working size, under another light."""
+BELIEVED, SHADE_FADE = 2.0, 2.0
+"""Photo over fit from which added light is not believed, and by which power of what is beyond it fades."""
 LIGHT_FADE = 12.0
 """How fast the fit's error goes when the light changes."""
 
@@ -184,9 +186,15 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
 
     What the photo has and the fit has not is mostly texture that the albedo lacks: it dims as the surface does,
     factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
+
+    Beside what was edited, light that is added to what the fit has far too dark is not believed: there the fit has
+    shade that the photo has not, and takes it away from a material that made up for it.
     """
     factor = np.minimum((layers.edited + FLOOR) / (layers.base + FLOOR), MOST)
-    return layers.edited - layers.base, factor - 1, layers.base
+    change = layers.edited - layers.base
+    dark = np.log((photo.linear.mean(-1) + FLOOR) / (layers.base.mean(-1) + FLOOR)) - np.log(BELIEVED)
+    faded = np.where(layers.changed, 1, np.exp(-SHADE_FADE * np.maximum(dark, 0)))[..., None]
+    return np.where(change > 0, faded * change, change).astype(np.float32), factor - 1, layers.base
 
 
 def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edit.objects import certainty
 from materialist.types import Array, Scene
 
 _INNER, _OUTER = 0.02, 0.22
@@ -14,6 +15,8 @@ _INNER, _OUTER = 0.02, 0.22
 
 _UNLIKELY, _BESIDE = 0.04, 0.015
 """Likelihood below which, and this far (a share of the longer side) from where it is more, nothing is of the object."""
+_SURE, _UNLIKELY_THEN = 0.7, 0.3
+"""Certainty of the likelihoods from which a larger one is asked for."""
 _PASSES = 3
 """How often the band follows the border: a first pass stops at a shadow, whose far side the next one can reach."""
 _SETTLED = 0.98
@@ -47,7 +50,8 @@ def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely
     if not inner.any():
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=1) > 0
     if likely is not None:
-        possible = cv2.dilate((likely > _UNLIKELY).astype(np.uint8), _disc(_BESIDE, rough)) > 0
+        least = _UNLIKELY_THEN if certainty(likely) >= _SURE else _UNLIKELY
+        possible = cv2.dilate((likely > least).astype(np.uint8), _disc(_BESIDE, rough)) > 0
         outer &= possible | rough
     label = np.where(inner, cv2.GC_FGD, np.where(rough, cv2.GC_PR_FGD, np.where(outer, cv2.GC_PR_BGD, cv2.GC_BGD)))
     for x, y in points:

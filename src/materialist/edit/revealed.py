@@ -17,6 +17,8 @@ from materialist.types import Array, Photo, Scene
 
 LEAST = 0.02
 """Added to radiance before its change is taken as a factor."""
+BRIGHT = 90
+"""Percentile of the photo's surfaces up to which light that comes back makes others brighter."""
 MOST = 0.4
 """Logarithm of the largest change of light that is carried on."""
 
@@ -37,20 +39,25 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     if scene.bodies:
         filled &= placed(scene) < 1
-    bare = _bare(studio, edited, layers, spp, seed, clean)
+    bare = shined = _bare(studio, edited, layers, spp, seed, clean)
     given = _given(scene, edited, filled)
     if (filled & ~given).any():
         factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
         change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
         # Filled places may be far brighter than what is rendered there.
         bare = np.where(given[..., None], bare, np.maximum(bare - change, 0))
+    shown = np.maximum(layers.edited - _too_bright(scene, shined - layers.base, filled), 0)
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
         base = np.where(covered[..., None], photo.linear, base)
         photo = _without_detail(photo, covered)
     return photo, replace(
-        layers, base=base.astype(np.float32), reached=layers.reached | filled, changed=layers.changed | filled
+        layers,
+        base=base.astype(np.float32),
+        edited=shown.astype(np.float32),
+        reached=layers.reached | filled,
+        changed=layers.changed | filled,
     )
 
 
@@ -63,6 +70,20 @@ def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: boo
     picture = studio.beside(edited, bare)(-(-spp // 2), 2 * seed)
     guides = (edited.materials.albedo, edited.materials.albedo, edited.normal)
     return denoised(picture, picture, guides)[0] if clean else picture
+
+
+def _too_bright(scene: Scene, gained: Array, filled: Array) -> Array:
+    """[H, W, 3] what of the light that came back beside `filled` would outshine the photo.
+
+    What an object hid of the light is a guess, as its back is; no surface gets brighter by it than the brightest tenth
+    of the photo.
+    """
+    seen = scene.photo.linear.mean(-1)
+    surface = seen[scene.depth > 0]
+    room = np.maximum(float(np.percentile(surface, BRIGHT)) - seen, 0) if len(surface) else 0 * seen
+    gain = gained.mean(-1)
+    kept = np.where((gain > room) & ~filled, room / np.maximum(gain, 1e-6), 1)
+    return (1 - kept)[..., None] * np.maximum(gained, 0)
 
 
 def _given(scene: Scene, edited: Scene, filled: Array) -> Array:
