@@ -77,7 +77,7 @@ def inside_out(vertices: Array, faces: Array) -> Array:
     place = places(vertices)[faces]
     edges = place[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     size = int(place.max()) + 1
-    links = coo_array((np.ones(len(edges), np.int8), edges.T), (size, size))
+    links = coo_array((np.ones(len(edges), np.int32), edges.T), (size, size))
     piece = connected_components(links, directed=False)[1][place[:, 0]]  # [F]
     edges = np.sort(edges[edges[:, 0] != edges[:, 1]], 1)
     where, count = np.unique(edges, axis=0, return_counts=True)

@@ -50,7 +50,7 @@ def sky_maps(scene: Scene) -> tuple[Array, Array] | None:
 
 
 def only_lit_by(scene: Scene, envmap: Array) -> Scene:
-    """The scene under another map alone: surfaces reflect nothing, lamps are out."""
+    """The scene under another map: surfaces reflect nothing. Lamps shine on, and cancel in the difference of two."""
     size = scene.depth.shape
     black = Materials(np.zeros((*size, 3), np.float32), np.ones(size, np.float32), np.ones(size, np.float32))
     return replace(scene, materials=black, envmap=envmap)
