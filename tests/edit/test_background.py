@@ -94,21 +94,6 @@ def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
     np.testing.assert_array_equal(told.photo.linear, plain.photo.linear)
 
 
-def test_the_outline_of_what_was_filled_is_smooth_at_native_size():
-    from materialist.edit.background import _enlarged
-
-    rows, columns = np.mgrid[:40, :40] + 0.5
-    share = _enlarged(np.hypot(rows - 20, columns - 20) < 11, (320, 320))
-    y, x = np.mgrid[:320, :320] + 0.5
-    radius = np.hypot(y - 160, x - 160) / 8
-    rim = (share > 0.3) & (share < 0.7)
-    assert rim.sum() > 60 and radius[rim].std() < 0.25  # of whole pixels: 0.4
-    assert (share[radius < 9.5] == 1).all() and not share[radius > 11.8].any()
-    lines = np.zeros((40, 40), bool)
-    lines[10], lines[20:22] = True, True
-    assert _enlarged(lines, (320, 320))[84].all() and _enlarged(lines, (320, 320))[168].all(), "thin ones are kept"
-
-
 def test_a_true_background_is_what_is_seen():
     scene = rendered_scene()
     y, x = np.mgrid[:36, :48]

@@ -64,6 +64,13 @@ def test_clear_glass_in_uniform_light_is_invisible():
     assert np.abs(seen - 1).max() < 0.1
 
 
+@pytest.mark.parametrize("ior, roughness", [(1.5, 0.2), (1.5, 0.5), (1.5, 1.0), (1.0, 0.7), (2.0, 0.7)])
+def test_rough_glass_in_uniform_light_is_invisible(ior, roughness):
+    """Without the gain 0.81 at 0.5, and 0.32 at 1."""
+    seen = picture(sphere(surface(roughness=roughness, transmission=1.0, ior=ior)), uniform(), spp=128)
+    assert seen[disc()].mean() == pytest.approx(1, abs=0.015)
+
+
 def test_tint_colours_what_passes_through_once():
     glass = surface(transmission=1.0, ior=1.0, tint=(0.25, 0.5, 1.0))
     inside = picture(sphere(glass), uniform())[disc()]

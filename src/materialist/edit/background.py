@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edit.behind import Behind, behind
+from materialist.edit.amodal import going_on
+from materialist.edit.behind import Behind, behind, is_thing
 from materialist.edit.exemplar import Plan, exemplar_plan
+from materialist.edit.filled import laid, outline, with_hole
 from materialist.edit.hole import GROW, Hole, make_hole
 from materialist.edit.material import noted, warned
 from materialist.edit.region import placed
@@ -21,8 +23,6 @@ from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
 from materialist.types import Array, Camera, Materials, Photo, Scene
 
-SMOOTH = 1.0
-"""Standard deviation, working pixels, by which the outline of a hole is smoothed at native size."""
 Inpaint = Callable[[Array, Array], Array]
 """inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
 
@@ -55,7 +55,8 @@ def without(
     hole = make_hole(scene, mask, grow=grow, shadow=shadow)
     label = scene.geometry.plane_label.astype(np.int64)
     front = np.where(hole.object, scene.depth, 0)
-    found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera)
+    things = _things(scene, label, hole) if inpaint is None and background is None else []
+    found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera, things)
     features = looks(scene.materials.albedo, scene.photo.linear)
     photographed = replace(scene, bodies=(fitted or scene).bodies)  # what an edit puts there is not in the photo
     usable = placed(photographed) == 0 if photographed.bodies else None
@@ -63,7 +64,7 @@ def without(
     shown = _denoised(scene)
     picture, notes = _given(scene, background, inpaint, hole)
     if picture is None:
-        materials, photo, rerender = _continued(scene, plan, hole, shown)
+        materials, photo, rerender = _continued(scene, plan, hole, shown, found.label)
     else:
         materials, photo, rerender = _painted(scene, plan, hole, shown, picture, found.label)
     how = "background" if background is not None else ("inpainter" if inpaint else "patches")
@@ -78,6 +79,24 @@ def without(
     if picture is not None:
         removed = _matched(removed, hole, picture, fitted or scene)
     return noted(warned(removed, *notes), "remove", what)
+
+
+def _things(scene: Scene, label: Array, hole: Hole) -> list[tuple[Array, Array]]:
+    """Things that the object hid in part: what is seen, and what is hidden of each, [H, W] bool."""
+    from materialist.edit.select import select
+
+    faces = [k for k in np.unique(label[label >= 0]) if is_thing((label == k) & ~hole.gone, hole.gone)]
+    loose = ((label < 0) | np.isin(label, faces)) & (scene.depth > 0)
+    inverse = 1 / np.where(scene.depth > 0, scene.depth, np.inf)
+    front = np.where(hole.object, inverse, 0)
+
+    def around(place: tuple[int, int]) -> Array:
+        try:
+            return select(scene, click=place) > 0.5
+        except InputError:  # nothing is found there
+            return np.zeros_like(loose)
+
+    return going_on(loose, hole.gone, inverse, front, around)
 
 
 def _middle(hole: Hole) -> list[int]:
@@ -136,10 +155,12 @@ def _materials(scene: Scene, plan: Plan | None, hole: Array) -> Materials:
     return Materials(albedo, *(np.ascontiguousarray(np.clip(part, 0, 1)) for part in (rest[..., 0], rest[..., 1])))
 
 
-def _continued(scene: Scene, plan: Plan | None, hole: Hole, shown: Array) -> tuple[Materials, Photo, Array]:
+def _continued(
+    scene: Scene, plan: Plan | None, hole: Hole, shown: Array, label: Array
+) -> tuple[Materials, Photo, Array]:
     """Materials, photo and re-rendering filled with patches."""
     linear, rerender = (filled(plan, picture, hole.painted) for picture in (scene.photo.linear, shown))
-    photo = _with_hole(scene.photo, linear, hole.painted, plan)
+    photo = with_hole(scene.photo, linear, hole.painted, plan, label)
     return _materials(scene, plan, hole.painted), photo, rerender.astype(np.float32)
 
 
@@ -165,8 +186,8 @@ def _painted(
     rough = np.where(hole.painted, np.maximum(materials.roughness, 0.6), materials.roughness)
     metal = np.where(hole.painted, 0, materials.metallic).astype(np.float32)
     linear = np.where(inside, small, scene.photo.linear).astype(np.float32)
-    share = _enlarged(hole.painted, scene.photo.original.shape[:2])
-    original = _laid(resized(picture, share.shape), share, scene.photo.original)
+    share = outline(hole.painted, scene.photo.original.shape[:2])
+    original = laid(resized(picture, share.shape), share, scene.photo.original)
     photo = replace(scene.photo, linear=linear, original=original)
     return Materials(albedo.astype(np.float32), rough.astype(np.float32), metal), photo, linear
 
@@ -179,10 +200,9 @@ def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
     photo, native = scene.photo, scene.photo.original.shape[:2]
     large = share if native == share.shape else _enlarged_share(scene, hole.painted & (share > 0), native)
     linear, rerender = (
-        _laid(old, share, new)
-        for old, new in ((photo.linear, removed.photo.linear), (scene.rerender, removed.rerender))
+        laid(old, share, new) for old, new in ((photo.linear, removed.photo.linear), (scene.rerender, removed.rerender))
     )
-    original = _laid(photo.original, large, removed.photo.original)
+    original = laid(photo.original, large, removed.photo.original)
     return replace(removed, photo=replace(removed.photo, linear=linear, original=original), rerender=rerender)
 
 
@@ -221,43 +241,6 @@ def _matched(removed: Scene, hole: Hole, picture: Array, fitted: Scene, *, spp: 
         known = replace(known, materials=replace(known.materials, albedo=albedo))
         studio = Studio(known)
     return replace(removed, materials=known.materials)
-
-
-def _with_hole(photo: Photo, linear: Array, hole: Array, plan: Plan | None) -> Photo:
-    """The photo with the hole filled at working size [H, W, 3], and at native size with the detail of its sources."""
-    native = photo.original.shape[:2]
-    if native == hole.shape:
-        original = np.where(hole[..., None], linear, photo.original).astype(np.float32)
-        return replace(photo, linear=linear.astype(np.float32), original=original)
-    share = _enlarged(hole, native)
-    large = resized(linear.astype(np.float32), native)
-    if plan is not None:
-        detail = photo.original - resized(photo.linear, native)
-        rows, columns = np.nonzero(share)
-        y, x = _native_sources(plan, hole, rows, columns, native)
-        large[rows, columns] += detail[y, x]
-    original = _laid(np.maximum(large, 0), share, photo.original)
-    return replace(photo, linear=linear.astype(np.float32), original=original)
-
-
-def _laid(picture: Array, share: Array, photo: Array) -> Array:
-    """[H0, W0, 3] a picture over the photo by its share [H0, W0]; bit for bit the photo where that is 0."""
-    over = share[..., None]
-    return np.where(over > 0, over * picture + (1 - over) * photo, photo).astype(np.float32)
-
-
-def _native_sources(plan: Plan, hole: Array, rows: Array, columns: Array, native: tuple[int, int]):
-    """Native row and column that native pixels (rows, columns) take their detail from."""
-    height, width = hole.shape
-    shift = np.zeros((height, width, 2))
-    shift[plan.rows, plan.columns, 0] = plan.source // width - plan.rows
-    shift[plan.rows, plan.columns, 1] = plan.source % width - plan.columns
-    scale = np.array([native[0] / height, native[1] / width])
-    here = shift[
-        np.minimum((rows / scale[0]).astype(int), height - 1), np.minimum((columns / scale[1]).astype(int), width - 1)
-    ]
-    moved = np.round(here * scale).astype(int)
-    return np.clip(rows + moved[:, 0], 0, native[0] - 1), np.clip(columns + moved[:, 1], 0, native[1] - 1)
 
 
 def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> tuple[Array | None, list[str]]:
@@ -305,20 +288,6 @@ def _denoised(scene: Scene) -> Array:
 
     guides = (scene.materials.albedo, scene.materials.albedo, scene.normal)
     return denoised(scene.rerender, scene.rerender, guides)[0]
-
-
-def _enlarged(mask: Array, native: tuple[int, int]) -> Array:
-    """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
-    import cv2
-
-    hard = cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
-    if native == mask.shape:
-        return hard.astype(np.float32)
-    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), SMOOTH)
-    share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
-    thin = mask & (cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((4, 4), np.uint8)) == 0)
-    thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
-    return np.where(thin > 0, 1, hard * share).astype(np.float32)
 
 
 def resized(picture: Array, shape: tuple[int, ...]) -> Array:

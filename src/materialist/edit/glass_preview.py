@@ -143,7 +143,7 @@ class GlassPreview:
             self._targets[kind] = self._built(surface)
         target, params = self._targets[kind]
         if surface.transmission >= 1:
-            start = f"{self._name}.bsdf."
+            start = f"{self._name}.bsdf." + ("interface." if kind == "rough" else "")
             params[start + "eta"] = max(float(surface.ior), 1.0001)
             params[start + "specular_transmittance.value"] = target.mi.Color3f(*(c**0.5 for c in surface.tint))
             if kind == "rough":

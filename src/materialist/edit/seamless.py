@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.edit.behind import THING
 from materialist.edit.exemplar import Plan
 from materialist.types import Array
 
@@ -75,7 +76,7 @@ def _pairs(plan: Plan, values: Array, filled: Array, where: Array, along: int) -
         expected = np.where(sound[:, None], flat[beside], own[here])
         off = np.where(hole[here] & ~hole[there], np.abs(expected - flat[there]).max(-1), off)
     step = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own[second] - own[first])
-    alike = off <= ALIKE
+    alike = (off <= ALIKE) | (label[first] <= THING)  # of one thing, whatever it looks like
     return first[alike], second[alike], step[alike]
 
 

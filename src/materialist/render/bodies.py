@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from materialist.render.buffers import tensor
+from materialist.render.frosted import PLUGIN as FROSTED
 from materialist.types import Array, Surface
 
 OUTSIDE = "materialist_outside"
@@ -56,7 +57,8 @@ def _dielectric(surface: Surface) -> dict:
     }  # fmt: skip
     if roughness < SMOOTH:
         return {"type": "dielectric", **glass}
-    return {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2, **glass}
+    rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2, **glass}
+    return {"type": FROSTED, "interface": rough}
 
 
 def _opaque(mi, surface: Surface) -> dict:

@@ -251,7 +251,8 @@ def _limit_threads() -> None:
 @lru_cache(maxsize=2)
 def _register_plugins(variant: str) -> None:
     """Once for each variant: Mitsuba keeps plugins by variant."""
-    from materialist.render import bodies, bsdf
+    from materialist.render import bodies, bsdf, frosted
 
     bsdf.register()
     bodies.register()
+    frosted.register()
