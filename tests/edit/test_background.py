@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
+from scipy import ndimage
 
 from materialist.edit.background import joined, without
 from materialist.edit.composite import composite
@@ -289,3 +290,47 @@ def test_light_that_comes_back_outshines_nothing():
     np.testing.assert_allclose(kept[30, 40], 0.6, rtol=1e-5)  # shade may go
     np.testing.assert_array_equal(kept[filled], gained[filled])
     assert not _too_bright(scene, -gained, filled).any()
+
+
+def test_changes_beside_a_filled_place_are_those_of_the_light():
+    """Not what surfaces leave that do not meet there, nor what the fit misses, nor too much shade on a thing."""
+    from materialist.edit.revealed import MOST, RIM, _believed
+
+    scene = rendered_scene()
+    photo, filled = scene.photo.linear, block_mask(36, 48)
+    rim = ~filled & (ndimage.distance_transform_edt(~filled) <= RIM)
+    brighter = 1.2 * photo
+    spoiled = np.where(rim[..., None], 9 * photo, brighter)
+    for plane, least in ((-1, np.exp(-MOST)), (0, 0.1)):
+        label = np.full(filled.shape, plane)
+        one = replace(scene, geometry=replace(scene.geometry, plane_label=label))
+        found = _believed(one, photo, spoiled, filled)
+        np.testing.assert_array_equal(found[filled], spoiled[filled])
+        np.testing.assert_allclose(found[rim] + 0.02, 1.2 * (photo[rim] + 0.02), rtol=0.05)
+        np.testing.assert_allclose(found[~filled & ~rim], brighter[~filled & ~rim], rtol=1e-4)
+        darker = _believed(one, photo, 0.1 * photo, filled)[~filled]
+        assert (darker + 0.02 >= least * (photo[~filled] + 0.02) * 0.999).all() and (darker < photo[~filled]).all()
+    missed = np.zeros(filled.shape, bool)
+    missed[4:12, 4:12] = True
+    fit = np.where(missed[..., None], 2 * photo, photo)
+    found = _believed(scene, fit, 1.2 * fit, filled)
+    np.testing.assert_allclose(found[6:10, 6:10], fit[6:10, 6:10], rtol=0.01)
+    np.testing.assert_allclose(found[30:, 30:], (1.2 * fit)[30:, 30:], rtol=0.02)
+
+
+@pytest.mark.parametrize("native", [1, 3])
+def test_under_a_body_nothing_of_the_photo_is_left(native):
+    from materialist.edit.composite import into_photo
+    from materialist.edit.layers import Layers
+    from materialist.edit.revealed import _as_body
+
+    scene = rendered_scene(native)
+    body = block_mask(36, 48)
+    shown = np.broadcast_to(np.float32([0.1, 0.3, 0.2]), scene.photo.linear.shape)
+    photo = _as_body(scene.photo, body, shown)
+    base = np.where(body[..., None], shown, scene.photo.linear)
+    out = into_photo(photo, Layers(base, base, body, body, base))
+    inside = np.kron(ndimage.binary_erosion(body), np.ones((native, native))) > 0
+    outside = np.kron(~ndimage.binary_dilation(body, iterations=2), np.ones((native, native))) > 0
+    np.testing.assert_allclose(out[inside], np.broadcast_to([0.1, 0.3, 0.2], out[inside].shape), rtol=1e-5)
+    np.testing.assert_array_equal(out[outside], scene.photo.original[outside])

@@ -21,6 +21,12 @@ BRIGHT = 90
 """Percentile of the photo's surfaces up to which light that comes back makes others brighter."""
 MOST = 0.4
 """Logarithm of the largest change of light that is carried on."""
+USUAL, UNUSUAL = 0.05, 0.08
+"""Logarithms by which a fit usually misses the photo, and beyond that, by which its changes lose 1 / e."""
+NEARBY = 9
+"""Pixels over which that is taken."""
+RIM = 4.0
+"""Pixels beside a filled place in which surfaces do not meet."""
 
 
 def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, clean: bool = True):
@@ -39,19 +45,23 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     if scene.bodies:
         filled &= placed(scene) < 1
-    bare = shined = _bare(studio, edited, layers, spp, seed, clean)
+    bare = _bare(studio, edited, layers, spp, seed, clean)
+    # Two pictures beside the filled places: without what was put there, and with it (its shadow, its caustics).
+    bright = _too_bright(scene, bare - layers.base, filled)
+    lit, shown = (
+        _believed(scene, layers.base, np.maximum(picture - bright, 0), filled) for picture in (bare, layers.edited)
+    )
     given = _given(scene, edited, filled)
     if (filled & ~given).any():
-        factor = np.log((np.maximum(bare, 0) + LEAST) / (np.maximum(layers.base, 0) + LEAST))
+        factor = np.log((lit + LEAST) / (np.maximum(layers.base, 0) + LEAST))
         change = edited.photo.linear * np.expm1(_continued(factor, filled, edited.geometry.plane_label))
         # Filled places may be far brighter than what is rendered there.
         bare = np.where(given[..., None], bare, np.maximum(bare - change, 0))
-    shown = np.maximum(layers.edited - _too_bright(scene, shined - layers.base, filled), 0)
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None and covered.any():
-        base = np.where(covered[..., None], photo.linear, base)
-        photo = _without_detail(photo, covered)
+        base = np.where(covered[..., None], shown, base)
+        photo = _as_body(photo, covered, shown)
     return photo, replace(
         layers,
         base=base.astype(np.float32),
@@ -84,6 +94,41 @@ def _too_bright(scene: Scene, gained: Array, filled: Array) -> Array:
     gain = gained.mean(-1)
     kept = np.where((gain > room) & ~filled, room / np.maximum(gain, 1e-6), 1)
     return (1 - kept)[..., None] * np.maximum(gained, 0)
+
+
+def _believed(scene: Scene, base: Array, shown: Array, filled: Array) -> Array:
+    """[H, W, 3] `shown`; beside filled places only as far as its change can be one of the light.
+
+    At the rim the surface that was seen and the one that goes on seldom meet: there the change is that of the nearest
+    pixel beyond, on the same plane or thing. No thing, as what lies on no plane, loses more than 1 - exp(-MOST) of its
+    light; a polished plane may lose a reflection. And where the fit misses the photo, its changes are missed, too.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    plane = scene.geometry.plane_label
+    change = np.log((np.maximum(shown, 0) + LEAST) / (np.maximum(base, 0) + LEAST))
+    rim = ~filled & (distance_transform_edt(~filled) <= RIM)
+    for number in np.unique(plane[rim]):
+        own = plane == number
+        beyond = own & ~rim & ~filled
+        if beyond.any():
+            row, column = distance_transform_edt(~beyond, return_distances=False, return_indices=True)
+            change = np.where((rim & own)[..., None], change[row, column], change)
+    change = np.where((plane < 0)[..., None], np.maximum(change, -MOST), change)
+    change *= np.exp(-((np.maximum(_missed(scene, base, filled) - USUAL, 0) / UNUSUAL) ** 2))[..., None]
+    believed = np.maximum((np.maximum(base, 0) + LEAST) * np.exp(change) - LEAST, 0)
+    return np.where(filled[..., None], shown, believed)
+
+
+def _missed(scene: Scene, base: Array, filled: Array) -> Array:
+    """[H, W] by how much the fit misses the photo nearby, mean logarithms; what was taken away does not count."""
+    import cv2
+
+    photo = scene.photo.linear
+    off = np.abs(np.log((photo + LEAST) / (np.maximum(base, 0) + LEAST))).mean(-1)
+    off = np.where(filled, 0, off).astype(np.float32)
+    window = (NEARBY, NEARBY)
+    return cv2.blur(cv2.dilate(cv2.blur(off, window), np.ones(window, np.uint8)), window)
 
 
 def _given(scene: Scene, edited: Scene, filled: Array) -> Array:
@@ -119,14 +164,18 @@ def _continued(change: Array, filled: Array, plane: Array) -> Array:
     return out
 
 
-def _without_detail(photo: Photo, covered: Array) -> Photo:
-    """The photo with nothing beyond working size where a body covers it."""
+def _as_body(photo: Photo, covered: Array, shown: Array) -> Photo:
+    """The photo with the picture of a body [H, W, 3] where it covers it: nothing of the photo is left to be changed."""
     import cv2
+    from scipy.ndimage import distance_transform_edt
 
+    linear = np.where(covered[..., None], shown, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
-    if native == covered.shape:
-        return photo
     size = native[::-1]
-    share = cv2.resize(covered.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)[..., None]
-    plain = cv2.resize(photo.linear, size, interpolation=cv2.INTER_LINEAR)
-    return replace(photo, original=(share * plain + (1 - share) * photo.original).astype(np.float32))
+    share = covered.astype(np.float32)
+    row, column = distance_transform_edt(~covered, return_distances=False, return_indices=True)
+    own = shown[row, column].astype(np.float32)
+    if native != covered.shape:
+        share, own = (np.asarray(cv2.resize(v, size, interpolation=cv2.INTER_LINEAR), np.float32) for v in (share, own))
+    original = share[..., None] * own + (1 - share[..., None]) * photo.original
+    return replace(photo, linear=linear, original=original.astype(np.float32))
