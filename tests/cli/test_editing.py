@@ -98,6 +98,24 @@ def test_apply_replays_the_list(run, folder):
     assert "1 edit applied, 1 skipped." in shown
 
 
+def test_relight_dims_the_lights_that_are_meant(run, folder):
+    scene = folder / "a.scene"
+    (folder / "dim.yaml").write_text("- relight: {dim: 0.2, mask: block.png}\n")
+    (folder / "not.yaml").write_text("- relight: {rotate: 20, mask: block.png}\n")
+    for command in (
+        ["relight", scene, "--dim", 0.2, "--mask", folder / "block.png"],
+        ["apply", scene, folder / "dim.yaml"],
+    ):
+        assert run(*command, "--spp", 8, "--no-denoise", "-o", folder / f"{command[0]}.exr")[0] == 0
+    one, other = (read_exr(folder / name) for name in ("relight.exr", "apply.exr"))
+    inner = np.argwhere(MASK).mean(0).astype(int)
+    before = load_scene(scene).photo.original[tuple(inner)]
+    np.testing.assert_allclose(one[tuple(inner)], 0.2 * before, rtol=0.02)
+    np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
+    code, _, err = run("apply", scene, folder / "not.yaml", "-o", folder / "n.png")
+    assert code == 2 and "give dim" in err and not (folder / "n.png").exists()
+
+
 def test_relight_by_map_lamp_and_frames(run, folder):
     scene = folder / "a.scene"
     assert (
@@ -204,6 +222,8 @@ RELIGHT = ["relight", "SCENE", "-o", "OUT.png"]
         ([*RELIGHT, "--rotate", "9", "--gain", "2"], "--gain says nothing without --envmap"),
         ([*RELIGHT, "--rotate", "9", "--sun-power", "2"], "--sun-power says nothing without --sun"),
         ([*RELIGHT, "--rotate", "9", "--fps", "7"], "--fps says nothing without --frames"),
+        ([*RELIGHT, "--rotate", "9", "--mask", "block.png"], "--mask says nothing without --dim"),
+        ([*RELIGHT, "--dim", "0.5", "--mask", "empty.png"], "empty"),
         ([*EDIT, "--hue", "9", "--texture-scale", "2"], "--texture-scale says nothing without --texture"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--full-render", "--spp", "0", "-o", "OUT"], "--spp"),
         (["relight", "SCENE", "--rotate", "9", "--frames", "4", "--fps", "0", "-o", "OUT"], "--fps"),

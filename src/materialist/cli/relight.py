@@ -10,6 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from materialist.cli.options import (
+    Box,
+    Clicks,
     Denoise,
     Device,
     DeviceOption,
@@ -17,6 +19,8 @@ from materialist.cli.options import (
     FramesPerSecond,
     FullRender,
     Json,
+    MaskFile,
+    Method,
     Save,
     SceneArgument,
     Seed,
@@ -24,7 +28,7 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_before, check_paths, check_video, numbers, write_result
+from materialist.cli.picture import check_before, check_paths, check_video, chosen_region, numbers, write_result
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
 
@@ -54,6 +58,9 @@ def relight(
     dim: Annotated[
         float | None, typer.Option(help="Factor on windows and lamps that the photo shows; they stay put.")
     ] = None,
+    click: Clicks = None,
+    box: Box = None,
+    mask: MaskFile = None,
     frames: Annotated[
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
@@ -78,8 +85,10 @@ def relight(
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
     alone = "--gain" if gain != "auto" and envmap is None else "--sun-power" if sun_power != 1.0 and not sun else ""
     alone = alone or ("--fps" if fps != FPS and frames is None else "")
+    if dim is None:
+        alone = alone or "--click" * bool(click) or "--box" * bool(box) or "--mask" * (mask is not None)
     if alone:
-        needed = {"--gain": "--envmap", "--sun-power": "--sun", "--fps": "--frames"}[alone]
+        needed = {"--gain": "--envmap", "--sun-power": "--sun", "--fps": "--frames"}.get(alone, "--dim")
         raise InputError(f"{alone} says nothing without {needed}; give that, too, or leave {alone} out.")
     suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     wanted = [numbers(text, 5, "--lamp") for text in lamp or ()]
@@ -98,6 +107,8 @@ def relight(
     if envmap is not None:
         options |= {"envmap": read_envmap(envmap), "gain": gain if gain == "auto" else numbers(gain, 1, "--gain")[0]}
     loaded = load_scene(scene)
+    if click or box or mask is not None:
+        options["lights"] = chosen_region(loaded, click, box, mask, Method.network, device.value)
     lamps = tuple(make_lamp(loaded, *values) for values in wanted)
     shared: dict[str, Any] = {
         "spp": spp, "seed": seed, "denoise": denoise, "device": device.value, "full_render": full_render,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from materialist.edit.glows import KEY, explained
+from materialist.edit.glows import KEY, explained, in_photo
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio, rendered
 from materialist.edit.material import PICTURED, is_pictured
@@ -69,13 +69,14 @@ def composite(
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     _check_rendered(edited, full_render)
+    lights = edited.provenance.get(KEY) if KEY not in scene.provenance else None
     scene = explained(scene, edited)
     studio = Studio(scene, device=device)
     if full_render:
         picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
     layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, sparing=True, progress=progress)
-    return into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
+    return _finished(studio, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
 
 
 def pictures(
@@ -94,12 +95,23 @@ def pictures(
         _check_rendered(edited, full_render)
         if edited.provenance.get(KEY) != lights:  # frames of one film share their lights, and so their base picture
             studio, lights = Studio(explained(scene, edited), device=device), edited.provenance.get(KEY)
+        own = lights if KEY not in scene.provenance else None
         if full_render:
             yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         else:
             layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
-            yield into_photo(*revealed(studio, edited, layers, spp=spp, seed=seed, clean=denoise))
+            yield _finished(studio, edited, layers, own, spp=spp, seed=seed, clean=denoise)
     tick("frames", total, total)
+
+
+def _finished(studio: Studio, edited: Scene, layers: Layers, lights: dict | None, **options) -> Array:
+    """[H0, W0, 3] the composite of layers; `lights`: what was found of the photo's lights where these were dimmed."""
+    photo, layers = revealed(studio, edited, layers, **options)
+    picture = into_photo(photo, layers)
+    if not lights:
+        return picture
+    before = None if layers.portrait is None else layers.portrait.share
+    return in_photo(picture, photo, studio.photo_lights(), lights, before)
 
 
 def _check_rendered(edited: Scene, full_render: bool) -> None:

@@ -28,21 +28,21 @@ MAX_FRAMES = 3600
 
 def moving_light(
     scene: Scene, count: int, *, turn: float = 0.0, suns: tuple[tuple[float, float], ...] = (),
-    lamps: tuple[Lamp, ...] = (), dim: float | None = None, **options,
+    lamps: tuple[Lamp, ...] = (), dim: float | None = None, lights: Array | None = None, **options,
 ) -> Iterator[Scene]:  # fmt: skip
     """`count` relit scenes: the light turns by `turn` degrees in all, the sun and one lamp follow their stations.
 
     Several suns or lamps are stations of one that moves in straight lines at even time between them; a single one
-    stands still. With nothing that moves the light makes a full turn. Lights that the photo shows stay where they
-    are, all frames with the same `dim` (None: they are part of what turns). `options` go to `relight`.
-    Raises InputError for a count outside 2 to 3600.
+    stands still. With nothing that moves the light makes a full turn. Lights that the photo shows (`lights`, or those
+    that are found) stay where they are, all frames with the same `dim` (None: they are part of what turns). `options`
+    go to `relight`. Raises InputError for a count outside 2 to 3600.
     """
     if not 2 <= count <= MAX_FRAMES:
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     if not turn and len(suns) < 2 and len(lamps) < 2:
         turn = 360.0
     if dim is not None:
-        scene = relight(scene, dim=dim)  # once: finding the lights takes a rendering
+        scene = relight(scene, dim=dim, lights=lights)  # once: finding the lights takes a rendering
     closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
     for k in range(count):
         t = k / (count if closed else count - 1)

@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from materialist.edit.material import warned
 from materialist.edit.mesh_material import constant
+from materialist.edit.upsample import matte
 from materialist.errors import InputError
 from materialist.render.scene import part
-from materialist.types import Array, Body, Scene
+from materialist.types import Array, Body, Photo, Scene
 
 CLIPPED = 0.97
 """Least channel of a linear photo from which a pixel is taken for a light, whose radiance is not known but larger."""
+AROUND, REACH = 0.6, 0.015
+"""What adjoins a light and has this part of that value belongs to it (its rim, a shade), as far as this share of the
+picture's longer side."""
+CLOSED = 0.006
+"""Gaps in a light that are narrower than twice this share of the longer side, as leaves before a window, are closed."""
+UPWARD = 0.7
+"""A surface that faces up more than this (mean Y of its normals) reflects a light, or lies in the sun, and is none."""
 LEAST = 0.001
 """Smallest share of the picture that a light covers; less is a highlight."""
 LIFT = 2e-3
 """A light lies before its surface by this share of the depth."""
 RADIANCES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 """Radiances that are tried, in units of the photo's white."""
+HALF, SOME = 0.5, 0.1
+"""Share of a light that is clipped beyond which its colour is unknown, and up to which its radiance is known."""
 WORSE = 1.02
 """Errors of the photo that are alike: up to so many times the least one."""
 DARK = 1e-6
@@ -33,34 +44,62 @@ KEY = "photo_lights"
 
 
 def visible_lights(scene: Scene) -> list[Array]:
-    """Masks [H, W] bool of the lights on surfaces of the photo: connected clipped regions, the largest first."""
-    from scipy import ndimage
-
+    """Masks [H, W] bool of the lights on surfaces of the photo: connected regions of clipped pixels and the bright
+    ones beside them, the largest first; none that face up.
+    """
     photo, surface = scene.photo, scene.depth > 0
     least = CLIPPED
     if photo.hdr and surface.any():
         least = max(CLIPPED, BRIGHTER * float(np.median(photo.linear[surface].mean(-1))))
-    bright = (photo.linear.min(-1) >= least) & surface
-    label, count = ndimage.label(bright)
-    masks = [label == k for k in range(1, count + 1)]
-    return sorted((m for m in masks if m.sum() >= LEAST * bright.size), key=lambda m: -int(m.sum()))
+    value = photo.linear.min(-1)
+    bright = (value >= least) & surface
+    masks = [m for m in _parts(_spread(bright, (value >= AROUND * least) & surface)) if _is_light(m, bright, scene)]
+    return sorted(masks, key=lambda m: -int(m.sum()))
+
+
+def _spread(bright: Array, beside: Array) -> Array:
+    """[H, W] bool: `bright` with what is connected to it of `beside`, and without its narrow gaps."""
+    import cv2
+    from scipy import ndimage
+
+    if not bright.any():
+        return bright
+    longer = max(bright.shape)
+    near = ndimage.distance_transform_edt(~bright) <= max(1, round(REACH * longer))
+    grown = ndimage.binary_propagation(bright, mask=beside & near)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(CLOSED * longer) + 1,) * 2)
+    return cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, kernel) > 0
+
+
+def _parts(mask: Array) -> list[Array]:
+    """[H, W] bool each: the connected parts of a mask."""
+    from scipy import ndimage
+
+    label, count = ndimage.label(mask)
+    return [label == k for k in range(1, count + 1)]
+
+
+def _is_light(mask: Array, bright: Array, scene: Scene) -> bool:
+    return bool((mask & bright).sum() >= LEAST * mask.size and scene.normal[mask][:, 1].mean() <= UPWARD)
 
 
 def dimmed(
-    scene: Scene, dim: float, *, fitted: Scene | None = None, seed: int = 0, device: str = "auto"
+    scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None, seed: int = 0,
+    device: str = "auto",
 ) -> Scene:  # fmt: skip
     """The scene with its visible lights as glowing surfaces of `dim` times their radiance; the photo's is 1.
 
     The fitted environment map explains the whole photo. Here it is scaled down to leave room for the lights, whose
-    radiance is the largest of `RADIANCES` with which the two together explain the photo best, and at least its white.
-    With dim = 1 the scene is about what it was.
+    radiance is the largest of `RADIANCES` with which the two together explain the photo best, and at least its white;
+    of lights that are not clipped it is what the photo shows. With dim = 1 the scene is about what it was.
 
     Args:
+        lights: [H, W] bool mask of the lights that are meant, at working size; None takes `visible_lights`.
         fitted: the scene before its edits, whose rendering is the photo: the lights are found in it.
 
     Raises:
-        InputError: the scene is edited, and `fitted` is not given; dim is not in [0, 10], or no clipped region of the
-            photo is large enough.
+        InputError: the scene is edited, and `fitted` is not given; dim is not in [0, 10], no clipped region of the
+            photo is large enough, or the mask has another size or no surface in it.
     """
     if not (np.isfinite(dim) and 0 <= dim <= 10):
         raise InputError(f"The dimming is {dim:g}; it must lie in [0, 10], 1 for as it is, 0 for off.")
@@ -71,15 +110,38 @@ def dimmed(
             "The lights of a photo are found in the scene before its edits; give that as fitted=, or dim first."
         )
     known = fitted or scene
-    masks = visible_lights(known)
+    masks = visible_lights(known) if lights is None else _given(known, lights)
     if not masks:
-        raise InputError("The photo shows no light: no clipped region on a surface covers a thousandth of it.")
-    ambient, radiance, share = _explained(known, masks, seed, device)
-    found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share}
-    provenance = {**scene.provenance, KEY: found}
+        raise InputError(
+            "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
+            "mark the lights that you mean."
+        )
+    colours = [_colour(known.photo, mask) for mask in masks]
+    ambient, radiance, share = _explained(known, masks, colours, seed, device)
+    shining = [[radiance * c for c in colour] for colour in colours]
+    found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": shining}
+    edited = _shining(scene, [_patch(scene, m, (1, 1, 1), f"{NAME} {k}") for k, m in enumerate(masks)], found)
+    edited = replace(edited, bodies=(*scene.bodies, *_emitting(edited, shining, dim)))
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
-    note = f"Taken for lights, {radiance:g} times as bright as the photo's white: the clipped regions around {places}."
-    return warned(replace(_shining(scene, masks, ambient, dim * radiance), provenance=provenance), note)
+    kind = "clipped regions" if lights is None else "regions"
+    note = f"Taken for lights, {radiance:.3g} times as bright as the photo's white: the {kind} around {places}."
+    return warned(replace(edited, provenance={**scene.provenance, KEY: found}), note)
+
+
+def _given(scene: Scene, lights: Array) -> list[Array]:
+    """The parts of a mask of lights that are large enough to be a surface."""
+    from materialist.edit.region import checked_region
+
+    return [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() > 1]
+
+
+def _colour(photo: Photo, mask: Array) -> tuple[float, float, float]:
+    """Colour of a light, 1 in its brightest channel; white where most of it is clipped."""
+    inside = photo.linear[mask]
+    if not photo.hdr and (inside.min(-1) >= CLIPPED).mean() > HALF:
+        return 1.0, 1.0, 1.0
+    mean = inside.mean(0) / max(float(inside.mean(0).max()), 1e-6)
+    return float(mean[0]), float(mean[1]), float(mean[2])
 
 
 def is_edited(scene: Scene) -> bool:
@@ -96,23 +158,49 @@ def explained(scene: Scene, edited: Scene) -> Scene:
     found = edited.provenance.get(KEY)
     if not found or KEY in scene.provenance:
         return scene
-    return _shining(scene, visible_lights(scene), found["ambient"], found["radiance"])
+    return _shining(scene, _emitting(edited, found["emission"], 1.0), found)
 
 
-def _shining(scene: Scene, masks: list[Array], ambient: float, radiance: float) -> Scene:
-    glow = max(radiance, DARK)
-    lights = tuple(_patch(scene, mask, glow, f"{NAME} {k}") for k, mask in enumerate(masks))
-    return replace(scene, envmap=scene.envmap * np.float32(ambient), bodies=(*scene.bodies, *lights))
+def _shining(scene: Scene, lights: Sequence[Body], found: dict) -> Scene:
+    envmap = scene.envmap * np.float32(found["ambient"])
+    return replace(scene, envmap=envmap, bodies=(*scene.bodies, *lights))
 
 
-def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tuple[float, float, float]:
+def _emitting(scene: Scene, emission: Sequence[Sequence[float]], factor: float) -> list[Body]:
+    """The photo's lights among a scene's bodies, with that emission [K][3] times a factor."""
+    lights = [body for body in scene.bodies if body.name.startswith(NAME)]
+    found = []
+    for body, own in zip(lights, emission):
+        red, green, blue = (max(float(factor * c), DARK) for c in own)
+        found.append(replace(body, surface=replace(body.surface, emission=(red, green, blue))))
+    return found
+
+
+def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Array | None = None) -> Array:
+    """[H0, W0, 3] a composite in which the photo's lights are the photo itself, dimmed: with the trees in the window.
+
+    What is clipped is as bright as the light was found to be.
+
+    Args:
+        seen: [H, W] bool: where lights are seen. found: the entry KEY. before: [H0, W0] share of what stands before.
+    """
+    share = matte(seen, photo.original)
+    share = (share if before is None else share * (1 - before))[..., None]
+    clipped = np.clip((photo.original.min(-1, keepdims=True) - AROUND) / (CLIPPED - AROUND), 0, 1) ** 2
+    own = photo.original * (1 if photo.hdr else 1 + max(found["radiance"] - 1, 0) * clipped)
+    return np.where(share > 0, share * found["dim"] * own + (1 - share) * picture, picture).astype(np.float32)
+
+
+def _explained(
+    scene: Scene, masks: list[Array], colours: Sequence[tuple[float, float, float]], seed: int, device: str
+) -> tuple[float, float, float]:
     """(factor on the environment map, radiance of the lights) that together give the photo, and the lights' share.
 
     The share is what the lights bring to the surfaces of the photo, relative to what the whole map brings.
     """
     from materialist.render.scene import RenderScene
 
-    shining = tuple(_patch(scene, mask, 1.0, NAME) for mask in masks)
+    shining = tuple(_patch(scene, mask, colour, NAME) for mask, colour in zip(masks, colours))
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *shining), device=device)
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), 1e-6, np.float32))
@@ -129,23 +217,24 @@ def _explained(scene: Scene, masks: list[Array], seed: int, device: str) -> tupl
         factor = float(np.clip((weight**2 * rest * base).sum() / max((weight**2 * base**2).sum(), 1e-12), 0, 2))
         return factor, float((np.abs(rest - factor * base) * weight).mean())
 
-    # An HDR photo tells how bright its lights are.
-    tried = (float(photo[np.any(masks, 0)].mean()),) if scene.photo.hdr else RADIANCES
+    # An HDR photo tells how bright its lights are, and any photo those that are not clipped.
+    inside = photo[np.any(masks, 0)]
+    known = scene.photo.hdr or (inside.max(-1) >= CLIPPED).mean() < SOME
+    tried = (max(float(inside.mean(0).max()), DARK),) if known else RADIANCES
     found = {radiance: fitted(radiance) for radiance in tried}
     best = min(error for _, error in found.values())
     chosen = max(radiance for radiance, (_, error) in found.items() if error <= WORSE * best)
     return found[chosen][0], chosen, float(chosen * lit.mean() / max(base.mean(), 1e-6))
 
 
-def _patch(scene: Scene, mask: Array, radiance: float, name: str) -> Body:
-    """The surface of the masked pixels, lifted a little towards the camera, black but for its light."""
+def _patch(scene: Scene, mask: Array, emission: Sequence[float], name: str) -> Body:
+    """The surface of the masked pixels, lifted a little towards the camera, black but for its light [3]."""
     surface = part(scene.geometry.mesh, -1)
     chosen = mask.reshape(-1)[surface.face_pixel]
     faces = surface.faces[chosen]
     used, numbers = np.unique(faces, return_inverse=True)
     vertices = (surface.vertices[used] * np.float32(1 - LIFT)).astype(np.float32)
-    emission = (float(radiance),) * 3
     return Body(
         vertices, numbers.reshape(faces.shape).astype(np.int32), surface.normals[used], surface.uv[used],
-        constant(0.0, 1.0, 0.0, emission=emission), name,
+        constant(0.0, 1.0, 0.0, emission=(float(emission[0]), float(emission[1]), float(emission[2]))), name,
     )  # fmt: skip

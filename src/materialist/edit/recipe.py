@@ -22,7 +22,7 @@ REGION = ("mask", "click", "box", "with")
 MATERIAL = (
     "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
 )  # fmt: skip
-LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps")
+LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps", *REGION)
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
 DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
 REMOVE = ("background", "inpaint", "shadow", "grow", "seed")
@@ -183,6 +183,11 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
         if name in given and needed not in given:
             raise InputError(f"relight: {name} says nothing without {needed}; give that, too, or leave {name} out.")
     options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
+    region = [name for name in REGION if name in given]
+    if region and "dim" not in given:
+        raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
+    if region:
+        options["lights"] = _region(scene, step)
     if "envmap" in given:
         options["envmap"] = read_envmap(_file(step, "envmap"))
         gain = given.get("gain", "auto")

@@ -27,6 +27,7 @@ def relight(
     scene: Scene,
     *,
     dim: float | None = None,
+    lights: Array | None = None,
     envmap: Array | None = None,
     gain: float | str = 1.0,
     rotate: float = 0.0,
@@ -41,6 +42,7 @@ def relight(
     Args:
         dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. They become surfaces that glow and
             stay where they are, whatever happens to the light from around.
+        lights: [H, W] bool: the lights that `dim` means, at working size; None takes those that are found.
         envmap: [h, 2h, 3] linear radiance >= 0 in place of the fitted light, in the project's convention.
         gain: factor on `envmap`; "auto" gives it the fitted map's mean light, for captures of unknown exposure.
         rotate: turn of the light about the vertical, degrees; > 0 moves what is in front of the camera to its right.
@@ -59,7 +61,9 @@ def relight(
     if dim is not None:
         from materialist.edit.glows import dimmed
 
-        scene = dimmed(scene, dim, fitted=fitted)
+        scene = dimmed(scene, dim, lights=lights, fitted=fitted)
+    elif lights is not None:
+        raise InputError("The mask of lights says nothing without a dimming; give dim, too.")
     light = scene.envmap
     if envmap is not None:
         light = checked_envmap(envmap) * _gain(gain, envmap, scene.envmap)
