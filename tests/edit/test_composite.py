@@ -8,7 +8,7 @@ from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.camera import project
 from materialist.edit.composite import FLOOR, composite, developed, into_photo, pictures
-from materialist.edit.layers import Layers, difference, significance
+from materialist.edit.layers import Layers, difference, significance, texture_held
 from materialist.edit.lights import Studio
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, relight
@@ -220,7 +220,31 @@ def test_light_on_what_the_fit_has_far_too_dark_is_not_believed():
     photo = SimpleNamespace(linear=np.full((1, 3, 3), 0.9, np.float32))
     base = np.array([0.9, 0.1, 0.1], np.float32)[None, :, None].repeat(3, 2)
     changed = np.array([[False, False, True]])
-    more = SimpleNamespace(base=base, edited=base + 1, changed=changed)
+    more = SimpleNamespace(held=None, base=base, edited=base + 1, changed=changed)
     np.testing.assert_allclose(_same_light(photo, more)[0][0, :, 0], [1, (0.12 * 2 / 0.92) ** 2, 1], rtol=1e-4)
-    less = SimpleNamespace(base=base, edited=base * 0.5, changed=changed)
+    less = SimpleNamespace(held=None, base=base, edited=base * 0.5, changed=changed)
     np.testing.assert_allclose(_same_light(photo, less)[0], -0.5 * base, rtol=1e-6)
+
+
+def test_the_rim_of_a_pattern_goes_with_the_pattern():
+    """Dots on a white thing that becomes blue leave no rings; other detail, and what is not edited, stays."""
+    rows, columns = np.mgrid[:40, :60]
+    dot = np.hypot(rows - 20, columns - 20) < 5
+    own = (np.abs(rows - 20) < 15) & (np.abs(columns - 22) < 18)
+    albedo = np.where(dot, 0.05, np.where(own, 0.8, 0.3))[..., None] * np.ones(3)
+    uniform = np.where(own[..., None], [0.1, 0.2, 0.6], albedo)
+    darker = np.where(own[..., None], 0.5 * albedo, albedo)
+    rim = np.abs(np.hypot(rows - 20, columns - 20) - 5) < 1.5
+    held = texture_held(albedo, uniform)
+    assert held[rim].max() < 0.01
+    away = own & (np.hypot(rows - 20, columns - 20) > 9)
+    assert (held[~own] == 1).all() and (held[away] == 1).all()
+    assert texture_held(albedo, darker)[rim].min() > 0.9
+    assert (texture_held(albedo, albedo) == 1).all()
+    base = albedo.astype(np.float32)
+    photo = np.where(rim[..., None], base + 0.1, base).astype(np.float32)  # the fit misses the rim
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = replace(layers_of(base, uniform.astype(np.float32), own), held=held)
+    out = into_photo(scene, layers)
+    np.testing.assert_allclose(out[rim], uniform[rim], atol=1e-5)
+    assert np.abs(into_photo(scene, replace(layers, held=None)) - uniform)[rim].min() > 0.005

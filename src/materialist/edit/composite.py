@@ -197,12 +197,15 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """(change, factor - 1, reference), [H, W, 3] each: out = edited + factor (photo - base).
 
     What the photo has and the fit has not is mostly texture that the albedo lacks: it dims as the surface does,
-    factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
+    factor = edited / base, and does not grow (a ratio above 1 is taken as 1). Where an edit takes a pattern away
+    (`layers.held`), what the photo has at its rim goes, too.
 
     Beside what was edited, light that is added to what the fit has far too dark is not believed: there the fit has
     shade that the photo has not, and takes it away from a material that made up for it.
     """
     factor = np.minimum((layers.edited + FLOOR) / (layers.base + FLOOR), MOST)
+    if layers.held is not None:
+        factor = factor * layers.held[..., None]
     change = layers.edited - layers.base
     dark = np.log((photo.linear.mean(-1) + FLOOR) / (layers.base.mean(-1) + FLOOR)) - np.log(BELIEVED)
     faded = np.where(layers.changed, 1, np.exp(-SHADE_FADE * np.maximum(dark, 0)))[..., None]

@@ -13,6 +13,11 @@ from materialist.edit.sparing import FEWEST, Begun, spared
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
+FAR = 1e3
+DARKEST = 0.02
+"""Added to albedo before its logarithm is taken."""
+PATTERNED, AT_RIM = (0.3, 0.8), 2
+"""Contrast of albedo (logarithms) within so many pixels: none of a pattern, and certainly of one."""
 Render = Callable[[int, int], Array]
 """render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
 
@@ -37,6 +42,8 @@ class Layers:
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
     covered: Array | None = None
     """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
+    held: Array | None = None
+    """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
 
 
 def render_layers(
@@ -67,7 +74,31 @@ def render_layers(
         base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress,
         focused=focused(edited),
     )  # fmt: skip
-    return replace(layers, relit=relit, portrait=alone, covered=covered)
+    held = texture_held(scene.materials.albedo, edited.materials.albedo)
+    return replace(layers, relit=relit, portrait=alone, covered=covered, held=held)
+
+
+def texture_held(albedo: Array, edited: Array) -> Array:
+    """[H, W] float32 in [0, 1]: the part of the contrast of an albedo [H, W, 3] that is left where an edit changes it.
+
+    What the photo has there beyond the fit is the rim of a pattern, which goes with it. 1 where there was none.
+    """
+    own = (albedo != edited).any(-1)
+    if not own.any():
+        return np.ones(own.shape, np.float32)
+    before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, edited))
+    patterned = np.clip((before - PATTERNED[0]) / (PATTERNED[1] - PATTERNED[0]), 0, 1)
+    left = np.clip(after / np.maximum(before, 1e-6), 0, 1)
+    return np.where(own, 1 - patterned * (1 - left), 1).astype(np.float32)
+
+
+def _contrast(values: Array, own: Array) -> Array:
+    """[H, W] largest difference of values [H, W] nearby, among the pixels `own` [H, W] bool."""
+    import cv2
+
+    window = np.ones((2 * AT_RIM + 1,) * 2, np.uint8)
+    high, low = (np.where(own, values, far).astype(np.float32) for far in (-FAR, FAR))
+    return np.maximum(np.asarray(cv2.dilate(high, window)) - np.asarray(cv2.erode(low, window)), 0)
 
 
 def focused(scene: Scene) -> bool:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from materialist.edit.layers import Layers, changed_pixels, is_relit
+from materialist.edit.layers import Layers, changed_pixels, is_relit, texture_held
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -73,7 +73,9 @@ class Preview:
         base = self._base_picture
         relit = is_relit(self.scene, edited)
         differs = (picture != base).any(-1)
-        return Layers(base, picture, differs, changed_pixels(self.scene, edited) & differs, picture, relit)
+        held = texture_held(self.scene.materials.albedo, edited.materials.albedo)
+        changed = changed_pixels(self.scene, edited) & differs
+        return Layers(base, picture, differs, changed, picture, relit, held=held)
 
     def picture(self, edited: Scene, *, quick: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""
