@@ -7,7 +7,7 @@ import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.camera import project
-from materialist.edit.composite import FLOOR, composite, developed, into_photo, pictures
+from materialist.edit.composite import FLOOR, _calmed, composite, developed, into_photo, pictures
 from materialist.edit.layers import Layers, difference, significance, texture_held
 from materialist.edit.lights import Studio
 from materialist.edit.material import edit
@@ -248,3 +248,27 @@ def test_the_rim_of_a_pattern_goes_with_the_pattern():
     out = into_photo(scene, layers)
     np.testing.assert_allclose(out[rim], uniform[rim], atol=1e-5)
     assert np.abs(into_photo(scene, replace(layers, held=None)) - uniform)[rim].min() > 0.005
+
+
+def test_where_the_fit_is_rougher_than_the_photo_another_light_does_what_it_does_around():
+    """Steps of a depth that should be smooth do not come out under another light."""
+    rows, columns = np.mgrid[:60, :80]
+    photo = np.repeat((0.4 + 0.1 * np.sin(columns / 15))[..., None], 3, -1).astype(np.float32)
+    patch = np.hypot(rows - 30, columns - 40) < 9
+    stripes = np.where(columns % 4 < 2, 1.8, 0.3)
+    base = np.where(patch[..., None], photo * stripes[..., None], photo).astype(np.float32)
+    new = (0.5 * base).astype(np.float32)
+    new[patch] *= (np.where(rows % 4 < 2, 3.0, 0.1)[patch])[:, None]
+    everywhere = np.ones(patch.shape, bool)
+    layers = layers_of(base, new, everywhere, relit=True)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    out = into_photo(scene, layers)
+    core = np.hypot(rows - 30, columns - 40) < 7
+    np.testing.assert_allclose(out[core], 0.5 * photo[core], rtol=0.1)
+    sound = layers_of(photo, 0.5 * photo, everywhere, relit=True)
+    for given, kept in zip(_calmed(scene, sound), (sound.base, sound.edited)):
+        assert given is kept
+    textured = photo * np.where(columns % 4 < 2, 1.5, 0.6)[..., None].astype(np.float32)
+    scene = replace(scene, linear=textured, original=textured)
+    layers = layers_of(textured, 0.5 * textured, everywhere, relit=True)
+    assert _calmed(scene, layers)[1] is layers.edited, "what the photo has itself is no fault of the fit"

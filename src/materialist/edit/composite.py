@@ -30,6 +30,9 @@ MOST_DETAIL = 2.0
 """Largest factor on the photo's detail beyond working size, under another light."""
 BELIEVED, SHADE_FADE = 2.0, 2.0
 """Photo over fit from which added light is not believed, and by which power of what is beyond it fades."""
+WILD, EVEN, NEARBY = (2.0, 4.0), 0.02, 9
+"""Roughness of the fit over that of the photo, at least EVEN (logarithms per pixel, over NEARBY of them), at which it
+begins to be not believed under another light, and is not at all."""
 LIGHT_FADE = 12.0
 """How fast the fit's error goes when the light changes."""
 
@@ -222,14 +225,40 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """
     import cv2
 
-    ratio = np.log((layers.edited + FLOOR) / (layers.base + FLOOR))
+    base, edited = _calmed(photo, layers)
+    ratio = np.log((edited + FLOOR) / (base + FLOOR))
     overall = np.median(ratio.reshape(-1, 3), axis=0)
     window = max(3, max(ratio.shape[:2]) // 8)
     away = cv2.blur(np.abs(ratio - overall), (window, window), borderType=cv2.BORDER_REFLECT)
     kept = np.exp(overall - LIGHT_FADE * away)
-    held = photo.linear if photo.hdr else _unclipped(photo.linear, layers.base)
-    change = layers.edited + kept * (held - layers.base) - photo.linear
+    held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
+    change = edited + kept * (held - base) - photo.linear
     return change, np.minimum(np.exp(ratio), MOST_DETAIL) - 1, photo.linear
+
+
+def _calmed(photo: Photo, layers: Layers) -> tuple[Array, Array]:
+    """[H, W, 3] twice: both renderings where the fit is no rougher than the photo. Where it is, normals and shine are
+    wrong, and another light makes it worse: there the photo stands for the fit, changed as its surroundings are.
+    """
+    from materialist.geometry.membrane import membrane
+
+    seen, fit = (_roughness(np.log(np.maximum(v, 0) + FLOOR).mean(-1)) for v in (photo.linear, layers.base))
+    wild = np.clip((fit - WILD[0] * np.maximum(seen, EVEN)) / ((WILD[1] - WILD[0]) * np.maximum(seen, EVEN)), 0, 1)
+    if not (wild > 0).any() or (wild > 0.5).all():
+        return layers.base, layers.edited
+    ratio = np.log((np.maximum(layers.edited, 0) + FLOOR) / (np.maximum(layers.base, 0) + FLOOR))
+    ratio = membrane(ratio, wild < 0.5)
+    wild = wild[..., None].astype(np.float32)
+    changed = np.maximum((photo.linear + FLOOR) * np.exp(ratio) - FLOOR, 0)
+    return wild * photo.linear + (1 - wild) * layers.base, wild * changed + (1 - wild) * layers.edited
+
+
+def _roughness(values: Array) -> Array:
+    """[H, W] mean difference of neighbours nearby."""
+    import cv2
+
+    steps = sum(np.abs(np.diff(values, axis=k, append=np.take(values, [-1], k))) for k in (0, 1))
+    return np.asarray(cv2.blur(np.ascontiguousarray(steps, np.float32), (NEARBY, NEARBY)))
 
 
 def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto") -> Scene:
