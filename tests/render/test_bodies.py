@@ -151,3 +151,25 @@ def test_a_body_alone_has_its_own_radiance_at_its_rim():
     met = (alone > 0).any(-1)
     error = np.abs(mixed - expected)  # the share is one of 16 rays
     assert error[met].max() < 10 / 16 and error[rim & met].mean() < 0.15
+
+
+def test_a_body_behind_a_thing_is_seen_as_if_that_were_not_there():
+    """In its own light: the outline of what hides it may be elsewhere in the photo than in the depth."""
+    from render_scenes import wall
+
+    from materialist.render.portrait import radiance
+
+    columns = np.indices((CAMERA.height, CAMERA.width))[1]
+    geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere
+    target = RenderScene(geometry, CAMERA, bodies=(sphere(surface(0.5, 1.0)),))
+    light = np.full((8, 16, 3), 1.0, np.float32)
+    target.set_envmap(light)
+    size, box = (CAMERA.height, CAMERA.width), (0, CAMERA.height, 0, CAMERA.width)
+    given = {"spp": 64, "seed": 1, "max_depth": 3, "names": ["body0"]}
+    hidden, shown = radiance(target, size, box, **given), radiance(target, size, box, **given, gap=0.5)
+    left, right = disc() & (columns < CAMERA.width // 2 - 1), disc() & (columns > CAMERA.width // 2)
+    assert (hidden[left] == 0).all() and hidden[right].min() > 0.1
+    np.testing.assert_allclose(shown[right], hidden[right], rtol=1e-4)
+    np.testing.assert_allclose(shown[left].mean(), shown[right].mean(), rtol=0.25)
+    near = radiance(target, size, box, **given, gap=3.5)  # the wall stands 2 to 3 before it: it is what it touches
+    assert (near[left] == 0).all()

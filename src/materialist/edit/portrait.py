@@ -74,7 +74,10 @@ def portrait(
     # As many paths as a picture of working size has, on the part that the bodies take.
     pixels = (part[1] - part[0]) * (part[3] - part[2])
     paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
-    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": max_depth, "names": names}
+    # A lamp that touches a surface is cut by it, not hidden by a thing before it.
+    contact = 2.0 if all(name.startswith("lamp") for name in names) else CONTACT
+    gap = contact * _extent(alone)
+    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": max_depth, "names": names, "gap": gap}
     clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
     maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
     picture = traced(lambda: trace.radiance(target, size, part, **options), target, edited, maps)
@@ -86,9 +89,7 @@ def portrait(
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
     rows, columns = slice(*box[:2]), slice(*box[2:])
-    # A lamp that touches a surface is cut by it, not hidden by a thing before it.
-    contact = 2.0 if all(name.startswith("lamp") for name in names) else CONTACT
-    share[rows, columns] = _behind_things(sight, alone, scene, box, contact)
+    share[rows, columns] = _behind_things(sight, alone, scene, box, gap)
     whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
     bright = any(max(bodies[name].surface.emission) > 1 or name.startswith("lamp") for name in names)
     return Portrait(_around(small.share) if bright else small.share, share, whole)
@@ -142,9 +143,9 @@ def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
 
 
 def _behind_things(
-    sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int], contact: float = CONTACT
+    sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int], gap: float
 ) -> Array:  # fmt: skip
-    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands before them.
+    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands `gap` before them.
 
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
     """
@@ -156,9 +157,7 @@ def _behind_things(
     rows, columns = slice(*box[:2]), slice(*box[2:])
     enlarge = lambda v: cv2.resize(v, native[::-1], interpolation=cv2.INTER_NEAREST)[rows, columns]  # noqa: E731
     nearer = alone.depth - enlarge(scene.depth)
-    size = float(alone.depth.max() - alone.depth[alone.depth > 0].min()) + 1e-9
-    size = max(size, float(alone.depth.max()) * np.sqrt((alone.share > 0).mean()) * 0.05)
-    hidden = (alone.share > sight.share + 0.05) & (nearer > contact * size)
+    hidden = (alone.share > sight.share + 0.05) & (nearer > gap)
     if not hidden.any():
         return sight.share
     scale = max(native[0] / scene.depth.shape[0], 1.0)
@@ -166,10 +165,18 @@ def _behind_things(
     near = cv2.dilate(hidden.astype(np.uint8), kernel) > 0
     whole = np.zeros(native, np.float32)
     whole[rows, columns] = spread(alone.depth)
-    depth = cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST)
-    thing = (scene.depth > 0) & (scene.depth < depth - contact * size)
+    depth = spread(cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST))
+    thing = (scene.depth > 0) & (scene.depth < depth - gap)
     cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
     return np.where(near, cut, sight.share).astype(np.float32)
+
+
+def _extent(alone: Any) -> float:
+    """How deep bodies seen alone are, scene units; a flat one that faces the camera has some depth, too."""
+    if not (alone.depth > 0).any():
+        return 1e-9
+    size = float(alone.depth.max() - alone.depth[alone.depth > 0].min()) + 1e-9
+    return max(size, float(alone.depth.max()) * float(np.sqrt((alone.share > 0).mean())) * 0.05)
 
 
 def spread(values: Array) -> Array:
