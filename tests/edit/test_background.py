@@ -334,3 +334,20 @@ def test_under_a_body_nothing_of_the_photo_is_left(native):
     outside = np.kron(~ndimage.binary_dilation(body, iterations=2), np.ones((native, native))) > 0
     np.testing.assert_allclose(out[inside], np.broadcast_to([0.1, 0.3, 0.2], out[inside].shape), rtol=1e-5)
     np.testing.assert_array_equal(out[outside], scene.photo.original[outside])
+
+
+def test_what_was_removed_leaves_no_ghost_of_its_pattern():
+    """The composite of a patterned block that goes is the filled photo."""
+    scene = rendered_scene()
+    mask = block_mask(36, 48)
+    pattern = np.where((np.indices(mask.shape).sum(0) % 6 < 3)[..., None], 0.05, 0.9).astype(np.float32)
+    albedo = np.where(mask[..., None], pattern, scene.materials.albedo).astype(np.float32)
+    linear = np.where(mask[..., None], 0.6 * pattern, scene.photo.linear).astype(np.float32)
+    scene = replace(
+        scene, materials=replace(scene.materials, albedo=albedo),
+        photo=replace(scene.photo, linear=linear, original=linear),
+    )  # fmt: skip
+    gone = without(scene, mask, shadow=0)
+    out = composite(scene, gone, spp=32)
+    inner = ndimage.binary_erosion(mask, iterations=2)
+    np.testing.assert_allclose(out[inner], gone.photo.original[inner], atol=0.03)

@@ -272,3 +272,23 @@ def test_where_the_fit_is_rougher_than_the_photo_another_light_does_what_it_does
     scene = replace(scene, linear=textured, original=textured)
     layers = layers_of(textured, 0.5 * textured, everywhere, relit=True)
     assert _calmed(scene, layers)[1] is layers.edited, "what the photo has itself is no fault of the fit"
+
+
+def test_a_rough_fit_does_not_undo_what_is_edited_there():
+    rows, columns = np.mgrid[:60, :80]
+    photo = np.full((60, 80, 3), 0.4, np.float32)
+    patch = np.hypot(rows - 30, columns - 40) < 9
+    base = np.where(patch[..., None], photo * np.where(columns % 4 < 2, 1.8, 0.3)[..., None], photo).astype(np.float32)
+    blue = np.where(patch[..., None], 0.5 * base * np.float32([0.1, 0.1, 1]), 0.5 * base).astype(np.float32)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = replace(layers_of(base, blue, np.ones(patch.shape, bool), relit=True), replaced=patch)
+    core = np.hypot(rows - 30, columns - 40) < 7
+    out = into_photo(scene, layers)[core].mean(0)
+    assert out[2] > 3 * out[0]
+
+
+def test_a_pattern_that_is_darker_is_one_all_the_same():
+    columns = np.arange(60)[None, :, None].repeat(40, 0).repeat(3, 2)
+    albedo = np.where(columns % 6 < 3, 0.05, 0.8)
+    for factor in (0.5, 0.1, 0.02):
+        assert texture_held(albedo, factor * albedo).min() > 0.9

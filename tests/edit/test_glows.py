@@ -239,3 +239,88 @@ def test_dimmed_lights_keep_what_is_seen_in_them():
     before = np.zeros((30, 40), np.float32)
     before[7, 20:28] = 1  # something that was inserted stands before it
     np.testing.assert_array_equal(glows.in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
+
+
+def spot(rows=slice(22, 26), columns=slice(14, 20)):
+    """[H, W] bool: a part of the floor, far from the window."""
+    mask = np.zeros((30, 40), bool)
+    mask[rows, columns] = True
+    return mask
+
+
+@pytest.mark.parametrize("kind", ["ambient", "lamp", "dim", "recolour"])
+def test_a_removal_elsewhere_changes_nothing_else_of_an_edit(kind):
+    from materialist.edit.background import without
+    from materialist.edit.material import edit
+    from materialist.edit.relight import lamp
+
+    _, fit = rooms()
+    floor = (fit.normal[..., 1] > 0.5) & ~spot(slice(18, 30), slice(8, 26))
+
+    def then(scene):
+        if kind == "recolour":
+            return edit(scene, floor, value=-0.9)
+        lamps = [lamp(fit, 10, 20, 2.0, 3000, 1.0)] if kind == "lamp" else ()
+        dim, ambient = 0.1 if kind == "dim" else None, 0.2 if kind == "ambient" else 1.0
+        return relight(scene, dim=dim, ambient=ambient, lamps=lamps, fitted=fit)
+
+    alone = composite(fit, then(fit), spp=32)
+    both = composite(fit, then(without(fit, spot(), shadow=0)), spp=32)
+    away = ~spot(slice(16, 30), slice(6, 28))
+    np.testing.assert_allclose(both[away].mean(), alone[away].mean(), rtol=0.04)
+    assert np.median(np.abs(both / np.maximum(alone, 0.01) - 1)[away]) < 0.06
+
+
+def test_lights_glass_and_removals_meet():
+    """Dimmed once, whatever stands in the photo; not over glass; not where the light was taken away."""
+    from materialist.edit.background import without
+    from materialist.edit.glass import glass
+
+    _, fit = rooms()
+    window, core = spot(slice(2, 14), slice(6, 34)), (slice(5, 10), slice(12, 28))
+    removed = without(fit, spot(), shadow=0)
+    plain = composite(fit, relight(fit, dim=0.1), spp=16)[core]
+    np.testing.assert_allclose(composite(fit, relight(removed, dim=0.1, fitted=fit), spp=16)[core], plain, rtol=0.02)
+    bare = without(fit, window, shadow=0)
+    with pytest.raises(InputError, match="taken away"):
+        relight(bare, dim=0.0, fitted=fit)
+    with pytest.raises(InputError, match="dim afterwards"):
+        without(relight(fit, dim=0.3), window, fitted=fit)
+    pane = spot(slice(5, 20), slice(10, 20))
+    before = glass(fit, pane, roughness=0.5, tint=(0.2, 0.9, 0.2), thickness="symmetry")
+    out = composite(fit, relight(before, dim=0.5, fitted=fit), spp=16)[7:9, 13:17]
+    assert out[..., 1].mean() > 2 * out[..., 0].mean(), "the glass stays green"
+
+
+def test_dimming_by_one_is_none_and_dimming_brightens_nothing():
+    _, fit = rooms()
+    original = fit.photo.original.copy()
+    original[4:11:2, 10:30:2] = 0.75  # twigs
+    photo = replace(fit.photo, original=original)
+    picture = np.full_like(original, 0.3)
+    same = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 1.0})
+    np.testing.assert_array_equal(same, picture)
+    half = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 0.5})
+    np.testing.assert_allclose(half[6, 14], 0.375, rtol=1e-5)
+    unclipped = LIGHT & (original.min(-1) < glows.CLIPPED)
+    assert (half <= np.maximum(original, picture) + 1e-6)[unclipped].all()
+
+
+def test_lights_of_known_radiance_keep_their_own():
+    _, fit = rooms()
+    shown = np.minimum(fit.photo.linear, 0.1)
+    left, right = LIGHT & (np.arange(40) < 18), LIGHT & (np.arange(40) > 22)
+    shown[left], shown[right] = 50.0, 5.0
+    scene = replace(fit, photo=replace(fit.photo, hdr=True, linear=shown, original=shown))
+    found = sorted(body.surface.emission[0] for body in dimmed(scene, 1.0, lights=left | right).bodies)
+    np.testing.assert_allclose(found, [5, 50], rtol=1e-3)
+    with pytest.raises(InputError, match="whole light"):
+        dimmed(fit, 0.5, lights=spot(slice(5, 6), slice(9, 11)))
+    with pytest.raises(InputError, match="give dim"):
+        list(moving_light(fit, 3, lights=left))
+    old = dimmed(fit, 0.5)
+    old = replace(old, provenance={**old.provenance, glows.KEY: {**old.provenance[glows.KEY]}})
+    del old.provenance[glows.KEY]["emission"]  # as an earlier version saved it
+    assert glows.explained(fit, old).bodies[0].surface.emission[0] == pytest.approx(
+        2 * old.bodies[0].surface.emission[0]
+    )

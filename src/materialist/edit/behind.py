@@ -90,7 +90,7 @@ def behind(
         return None if found is None else found[box]
 
     part = _behind(depth[box], normal[box], known[box], hole[box], front[box], rays[box], ends, hidden, parted)
-    for number, (own, _) in enumerate(things):
+    for number, (own, _) in reversed(list(enumerate(things))):
         known[own] = THING - number if (part.label == THING - number).any() else known[own]
     out = Behind(depth.astype(np.float32), normal.astype(np.float32), known)
     for whole, piece in ((out.depth, part.depth), (out.normal, part.normal), (out.label, part.label)):
@@ -137,7 +137,7 @@ def _behind(
         if k == SKY:
             new_depth[here] = 0
             continue
-        own = ~hole & (known == k)
+        own = ~hole & (known == k) & (inverse > 0)
         spanned = _on_plane(inverse, own, rays) if k >= 0 else membrane(inverse, own)
         spanned = np.where(spanned > 0, spanned, general)[here]
         limit = np.where(front[here] > 0, (1 - CLEAR) / np.maximum(front[here], 1e-12), np.inf)

@@ -114,7 +114,7 @@ def _finished(studio: Studio, edited: Scene, layers: Layers, lights: dict | None
     if not lights:
         return picture
     before = None if layers.portrait is None else layers.portrait.share
-    return in_photo(picture, photo, studio.photo_lights(), lights, before)
+    return in_photo(picture, photo, studio.photo_lights(edited), lights, before)
 
 
 def _check_rendered(edited: Scene, full_render: bool) -> None:
@@ -244,6 +244,8 @@ def _calmed(photo: Photo, layers: Layers) -> tuple[Array, Array]:
 
     seen, fit = (_roughness(np.log(np.maximum(v, 0) + FLOOR).mean(-1)) for v in (photo.linear, layers.base))
     wild = np.clip((fit - WILD[0] * np.maximum(seen, EVEN)) / ((WILD[1] - WILD[0]) * np.maximum(seen, EVEN)), 0, 1)
+    if layers.replaced is not None:
+        wild = np.where(layers.replaced, 0, wild)  # what is another surface now looks as it is rendered
     if not (wild > 0).any() or (wild > 0.5).all():
         return layers.base, layers.edited
     ratio = np.log((np.maximum(layers.edited, 0) + FLOOR) / (np.maximum(layers.base, 0) + FLOOR))

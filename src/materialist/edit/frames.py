@@ -41,7 +41,7 @@ def moving_light(
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     if not turn and len(suns) < 2 and len(lamps) < 2:
         turn = 360.0
-    if dim is not None:
+    if dim is not None or lights is not None:
         scene = relight(scene, dim=dim, lights=lights)  # once: finding the lights takes a rendering
     closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
     for k in range(count):

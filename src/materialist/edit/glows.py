@@ -25,6 +25,10 @@ UPWARD = 0.7
 """A surface that faces up more than this (mean Y of its normals) reflects a light, or lies in the sun, and is none."""
 LEAST = 0.001
 """Smallest share of the picture that a light covers; less is a highlight."""
+SMALLEST = 9
+"""Pixels below which a mask is no light."""
+NEARLY = 0.9
+"""Least channel from which a pixel may be brighter than it looks."""
 LIFT = 2e-3
 """A light lies before its surface by this share of the depth."""
 RADIANCES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
@@ -116,8 +120,11 @@ def dimmed(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
             "mark the lights that you mean."
         )
-    colours = [_colour(known.photo, mask) for mask in masks]
-    ambient, radiance, share = _explained(known, masks, colours, seed, device)
+    masks = [part for mask in masks for part in _parts(mask & ~_gone(scene, known)) if part.sum() >= SMALLEST]
+    if not masks:
+        raise InputError("The lights of this photo were taken away by an earlier step; leave the dimming out.")
+    colours, given = _looks(known.photo, masks)
+    ambient, radiance, share = _explained(known, masks, colours, seed, device, given)
     shining = [[radiance * c for c in colour] for colour in colours]
     found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": shining}
     edited = _shining(scene, [_patch(scene, m, (1, 1, 1), f"{NAME} {k}") for k, m in enumerate(masks)], found)
@@ -132,16 +139,36 @@ def _given(scene: Scene, lights: Array) -> list[Array]:
     """The parts of a mask of lights that are large enough to be a surface."""
     from materialist.edit.region import checked_region
 
-    return [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() > 1]
+    masks = [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() >= SMALLEST]
+    if not masks:
+        raise InputError(f"The mask of lights has no connected part of {SMALLEST} pixels; mark the whole light.")
+    return masks
 
 
-def _colour(photo: Photo, mask: Array) -> tuple[float, float, float]:
-    """Colour of a light, 1 in its brightest channel; white where most of it is clipped."""
-    inside = photo.linear[mask]
-    if not photo.hdr and (inside.min(-1) >= CLIPPED).mean() > HALF:
-        return 1.0, 1.0, 1.0
-    mean = inside.mean(0) / max(float(inside.mean(0).max()), 1e-6)
-    return float(mean[0]), float(mean[1]), float(mean[2])
+def _gone(scene: Scene, known: Scene) -> Array:
+    """[H, W] bool: what edits took away of a photo since it was fitted."""
+    return (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
+
+
+def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, float]], float | None]:
+    """The lights' colours, and the radiance that goes with them where the photo tells it.
+
+    An HDR photo tells how bright its lights are, and any photo those that are not clipped. Else colours are 1 in the
+    brightest channel, and white where most of a light is clipped.
+    """
+    inside = [photo.linear[mask] for mask in masks]
+    clipped = np.concatenate([(part.max(-1) >= CLIPPED) for part in inside]).mean()
+    if photo.hdr or clipped < SOME:
+        peak = max(max(float(part.mean(0).max()) for part in inside), DARK)
+        return [_triple(part.mean(0) / peak) for part in inside], peak
+    white = [(part.min(-1) >= CLIPPED).mean() > HALF for part in inside]
+    means = [np.ones(3) if is_white else part.mean(0) for part, is_white in zip(inside, white)]
+    return [_triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    red, green, blue = (float(v) for v in values)
+    return red, green, blue
 
 
 def is_edited(scene: Scene) -> bool:
@@ -158,7 +185,8 @@ def explained(scene: Scene, edited: Scene) -> Scene:
     found = edited.provenance.get(KEY)
     if not found or KEY in scene.provenance:
         return scene
-    return _shining(scene, _emitting(edited, found["emission"], 1.0), found)
+    white = [[found["radiance"]] * 3] * len(edited.bodies)  # of scenes of earlier versions
+    return _shining(scene, _emitting(edited, found.get("emission", white), 1.0), found)
 
 
 def _shining(scene: Scene, lights: Sequence[Body], found: dict) -> Scene:
@@ -184,15 +212,27 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Arr
     Args:
         seen: [H, W] bool: where lights are seen. found: the entry KEY. before: [H0, W0] share of what stands before.
     """
+    dim = float(found["dim"])
+    if dim == 1 or not seen.any():
+        return picture
     share = matte(seen, photo.original)
     share = (share if before is None else share * (1 - before))[..., None]
-    clipped = np.clip((photo.original.min(-1, keepdims=True) - AROUND) / (CLIPPED - AROUND), 0, 1) ** 2
-    own = photo.original * (1 if photo.hdr else 1 + max(found["radiance"] - 1, 0) * clipped)
-    return np.where(share > 0, share * found["dim"] * own + (1 - share) * picture, picture).astype(np.float32)
+    white = photo.original.min(-1, keepdims=True)
+    own = dim * photo.original
+    if not photo.hdr:
+        lifted = own * (1 + max(found["radiance"] - 1, 0) * np.clip((white - NEARLY) / (CLIPPED - NEARLY), 0, 1))
+        # What is not clipped is as bright as it is, and dimming brightens nothing.
+        own = np.where((white < CLIPPED) & (dim < 1), np.minimum(lifted, photo.original), lifted)
+    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
 
 
 def _explained(
-    scene: Scene, masks: list[Array], colours: Sequence[tuple[float, float, float]], seed: int, device: str
+    scene: Scene,
+    masks: list[Array],
+    colours: Sequence[tuple[float, float, float]],
+    seed: int,
+    device: str,
+    given: float | None = None,
 ) -> tuple[float, float, float]:
     """(factor on the environment map, radiance of the lights) that together give the photo, and the lights' share.
 
@@ -217,10 +257,7 @@ def _explained(
         factor = float(np.clip((weight**2 * rest * base).sum() / max((weight**2 * base**2).sum(), 1e-12), 0, 2))
         return factor, float((np.abs(rest - factor * base) * weight).mean())
 
-    # An HDR photo tells how bright its lights are, and any photo those that are not clipped.
-    inside = photo[np.any(masks, 0)]
-    known = scene.photo.hdr or (inside.max(-1) >= CLIPPED).mean() < SOME
-    tried = (max(float(inside.mean(0).max()), DARK),) if known else RADIANCES
+    tried = RADIANCES if given is None else (given,)
     found = {radiance: fitted(radiance) for radiance in tried}
     best = min(error for _, error in found.values())
     chosen = max(radiance for radiance, (_, error) in found.items() if error <= WORSE * best)

@@ -42,6 +42,8 @@ class Layers:
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
     covered: Array | None = None
     """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
+    replaced: Array | None = None
+    """[H, W] bool: pixels that show another surface, or other materials, whatever the light; None for not known."""
     held: Array | None = None
     """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
 
@@ -57,7 +59,8 @@ def render_layers(
     """
     scene = studio.scene
     base, other = studio.twins(edited)
-    changed, relit = changed_pixels(scene, edited), is_relit(scene, edited)  # another light changes every pixel
+    replaced, relit = replaced_pixels(scene, edited), is_relit(scene, edited)
+    changed = replaced | relit  # another light changes every pixel
     begun = studio.begun(edited) if sparing and spp >= FEWEST and not relit else None
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
@@ -66,7 +69,7 @@ def render_layers(
         covered = anything = studio.covered(edited)
         if alone is not None:
             covered = anything & (alone.inside == 0)
-        changed |= covered
+        changed, replaced = changed | covered, replaced | anything
         if clean and anything.any():
             albedo, normal = studio.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
@@ -75,7 +78,7 @@ def render_layers(
         focused=focused(edited),
     )  # fmt: skip
     held = texture_held(scene.materials.albedo, edited.materials.albedo)
-    return replace(layers, relit=relit, portrait=alone, covered=covered, held=held)
+    return replace(layers, relit=relit, portrait=alone, covered=covered, replaced=replaced, held=held)
 
 
 def texture_held(albedo: Array, edited: Array) -> Array:
@@ -86,7 +89,8 @@ def texture_held(albedo: Array, edited: Array) -> Array:
     own = (albedo != edited).any(-1)
     if not own.any():
         return np.ones(own.shape, np.float32)
-    before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, edited))
+    level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
+    before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, level * edited))
     patterned = np.clip((before - PATTERNED[0]) / (PATTERNED[1] - PATTERNED[0]), 0, 1)
     left = np.clip(after / np.maximum(before, 1e-6), 0, 1)
     return np.where(own, 1 - patterned * (1 - left), 1).astype(np.float32)
@@ -119,8 +123,11 @@ def is_relit(scene: Scene, edited: Scene) -> bool:
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
-    if is_relit(scene, edited):
-        return np.ones(scene.depth.shape, bool)
+    return replaced_pixels(scene, edited) | is_relit(scene, edited)
+
+
+def replaced_pixels(scene: Scene, edited: Scene) -> Array:
+    """[H, W] bool: where the maps or the depth of the two scenes differ, whatever their light."""
     a, b = scene.materials, edited.materials
     changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
     # Where a surface was taken away, what stands behind it is seen, but for what a body hides before and after.

@@ -133,12 +133,12 @@ class Studio:
         names = [f"body{k}" for k in range(len(scene.bodies))]
         return self._seen(scene, names) if names else np.zeros(scene.depth.shape, np.float32)
 
-    def photo_lights(self) -> Array:
-        """[H, W] bool: where lights of the photo that became surfaces (`glows.dimmed`) are seen."""
+    def photo_lights(self, edited: Scene) -> Array:
+        """[H, W] bool: where lights of the photo that became surfaces (`glows.dimmed`) are seen, past all else."""
         from materialist.edit.glows import NAME
 
-        names = [f"body{k}" for k, body in enumerate(self.scene.bodies) if body.name.startswith(NAME)]
-        return self._seen(self.scene, names) > 0.5
+        names = [f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(NAME)]
+        return self._seen(edited, names) > 0.5 if names else np.zeros(edited.depth.shape, bool)
 
     def bodies_in(self, scene: Scene, size: tuple[int, int], box: tuple[int, int, int, int]) -> Array:
         """The same in a box (top, bottom, left, right) of a picture of another size (H, W)."""

@@ -15,6 +15,7 @@ PLACED = (
     "a thing that was put into the scene, or made glass, and edits reach only what the photo shows: put it there "
     "again as you want it"
 )
+DIMMED = "a light of the photo that an earlier step dimmed: edit it first, and dim afterwards"
 
 
 def checked_region(scene: Scene, mask: Array) -> Array:
@@ -37,7 +38,11 @@ def checked_region(scene: Scene, mask: Array) -> Array:
     if not weight.any():
         raise InputError("The mask covers only sky, where the scene has no surface to edit; mark a surface.")
     if scene.bodies and float((placed(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
-        raise InputError(f"What is marked is {PLACED}, or mark something else.")
+        from materialist.edit.lights import Studio
+
+        lights = Studio(scene).photo_lights(scene)
+        what = DIMMED if float((lights * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
+        raise InputError(f"What is marked is {what}, or mark something else.")
     return weight
 
 

@@ -6,14 +6,14 @@ stands in for the photo, and a rendering without the object for the base.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from materialist.edit.layers import Layers, denoised
 from materialist.edit.region import placed
 from materialist.geometry.membrane import membrane
-from materialist.types import Array, Photo, Scene
+from materialist.types import Array, Materials, Photo, Scene
 
 LEAST = 0.02
 """Added to radiance before its change is taken as a factor."""
@@ -42,15 +42,16 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     scene = studio.scene
     if edited.photo is scene.photo:
         return scene.photo, layers
-    filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
+    filled = hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     if scene.bodies:
-        filled &= placed(scene) < 1
-    bare = _bare(studio, edited, layers, spp, seed, clean)
-    # Two pictures beside the filled places: without what was put there, and with it (its shadow, its caustics).
-    bright = _too_bright(scene, bare - layers.base, filled)
-    lit, shown = (
-        _believed(scene, layers.base, np.maximum(picture - bright, 0), filled) for picture in (bare, layers.edited)
-    )
+        filled = hole & (placed(scene) < 1)
+    bare = _bare(studio, edited, layers, hole, spp, seed, clean)
+    # What the removal alone does to the light, as far as it is believed; everything else of the edit comes on top.
+    lit = _believed(scene, layers.base, np.maximum(bare - _too_bright(scene, bare - layers.base, filled), 0), filled)
+    if layers.relit:
+        shown = layers.edited * (lit + LEAST) / (np.maximum(bare, 0) + LEAST)
+    else:
+        shown = np.maximum(layers.edited + (lit - bare), 0)
     given = _given(scene, edited, filled)
     if (filled & ~given).any():
         factor = np.log((lit + LEAST) / (np.maximum(layers.base, 0) + LEAST))
@@ -59,6 +60,8 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
         bare = np.where(given[..., None], bare, np.maximum(bare - change, 0))
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
+    if covered is not None:
+        covered = covered & ~studio.photo_lights(edited)  # these stay the photo's
     if covered is not None and covered.any():
         base = np.where(covered[..., None], shown, base)
         photo = _as_body(photo, covered, shown)
@@ -68,17 +71,24 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
         edited=shown.astype(np.float32),
         reached=layers.reached | filled,
         changed=layers.changed | filled,
+        held=None if layers.held is None else np.where(filled, 1, layers.held).astype(np.float32),
+        replaced=None if layers.replaced is None else layers.replaced | filled,
     )
 
 
-def _bare(studio, edited: Scene, layers: Layers, spp: int, seed: int, clean: bool) -> Array:
-    """[H, W, 3] the edited scene with the bodies and the light of the fitted one."""
+def _bare(studio, edited: Scene, layers: Layers, hole: Array, spp: int, seed: int, clean: bool) -> Array:
+    """[H, W, 3] the fitted scene without what was taken away, and with nothing else of the edit."""
     scene = studio.scene
-    if edited.bodies == scene.bodies and not layers.relit:
+    old, new = scene.materials, edited.materials
+    albedo = np.where(hole[..., None], new.albedo, old.albedo)
+    rest = (np.where(hole, *pair) for pair in ((new.roughness, old.roughness), (new.metallic, old.metallic)))
+    materials = Materials(albedo, *rest)
+    same = all(np.array_equal(*pair) for pair in zip(astuple(materials), astuple(new)))
+    if same and edited.bodies == scene.bodies and not layers.relit:
         return layers.edited
-    bare = replace(edited, bodies=scene.bodies, envmap=scene.envmap, lamps=scene.lamps)
+    bare = replace(edited, materials=materials, bodies=scene.bodies, envmap=scene.envmap, lamps=scene.lamps)
     picture = studio.beside(edited, bare)(-(-spp // 2), 2 * seed)
-    guides = (edited.materials.albedo, edited.materials.albedo, edited.normal)
+    guides = (albedo, albedo, edited.normal)
     return denoised(picture, picture, guides)[0] if clean else picture
 
 
