@@ -51,7 +51,9 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if layers.relit:
         shown = layers.edited * (lit + LEAST) / (np.maximum(bare, 0) + LEAST)
     else:
-        shown = np.maximum(layers.edited + (lit - bare), 0)
+        # As is the shade of what was put there, but on surfaces that are new themselves.
+        trust = np.where(layers.changed | filled, 1, _trust(scene, layers.base, filled))[..., None]
+        shown = np.maximum(lit + trust * (layers.edited - bare), 0)
     given = _given(scene, edited, filled)
     if (filled & ~given).any():
         factor = np.log((lit + LEAST) / (np.maximum(layers.base, 0) + LEAST))
@@ -125,20 +127,21 @@ def _believed(scene: Scene, base: Array, shown: Array, filled: Array) -> Array:
             row, column = distance_transform_edt(~beyond, return_distances=False, return_indices=True)
             change = np.where((rim & own)[..., None], change[row, column], change)
     change = np.where((plane < 0)[..., None], np.maximum(change, -MOST), change)
-    change *= np.exp(-((np.maximum(_missed(scene, base, filled) - USUAL, 0) / UNUSUAL) ** 2))[..., None]
+    change *= _trust(scene, base, filled)[..., None]
     believed = np.maximum((np.maximum(base, 0) + LEAST) * np.exp(change) - LEAST, 0)
     return np.where(filled[..., None], shown, believed)
 
 
-def _missed(scene: Scene, base: Array, filled: Array) -> Array:
-    """[H, W] by how much the fit misses the photo nearby, mean logarithms; what was taken away does not count."""
+def _trust(scene: Scene, base: Array, filled: Array) -> Array:
+    """[H, W] in [0, 1]: how far the fit explains the photo nearby; what was taken away does not count."""
     import cv2
 
     photo = scene.photo.linear
     off = np.abs(np.log((photo + LEAST) / (np.maximum(base, 0) + LEAST))).mean(-1)
     off = np.where(filled, 0, off).astype(np.float32)
     window = (NEARBY, NEARBY)
-    return cv2.blur(cv2.dilate(cv2.blur(off, window), np.ones(window, np.uint8)), window)
+    missed = cv2.blur(cv2.dilate(cv2.blur(off, window), np.ones(window, np.uint8)), window)
+    return np.exp(-((np.maximum(missed - USUAL, 0) / UNUSUAL) ** 2))
 
 
 def _given(scene: Scene, edited: Scene, filled: Array) -> Array:
