@@ -156,19 +156,16 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
     An HDR photo tells how bright its lights are, and any photo those that are not clipped. Else colours are 1 in the
     brightest channel, and white where most of a light is clipped.
     """
+    from materialist.edit.relight import triple
+
     inside = [photo.linear[mask] for mask in masks]
     clipped = np.concatenate([(part.max(-1) >= CLIPPED) for part in inside]).mean()
     if photo.hdr or clipped < SOME:
         peak = max(max(float(part.mean(0).max()) for part in inside), DARK)
-        return [_triple(part.mean(0) / peak) for part in inside], peak
+        return [triple(part.mean(0) / peak) for part in inside], peak
     white = [(part.min(-1) >= CLIPPED).mean() > HALF for part in inside]
     means = [np.ones(3) if is_white else part.mean(0) for part, is_white in zip(inside, white)]
-    return [_triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    red, green, blue = (float(v) for v in values)
-    return red, green, blue
+    return [triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
 
 
 def is_edited(scene: Scene) -> bool:

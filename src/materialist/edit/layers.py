@@ -87,13 +87,17 @@ def texture_held(albedo: Array, edited: Array) -> Array:
     What the photo has there beyond the fit is the rim of a pattern, which goes with it. 1 where there was none.
     """
     own = (albedo != edited).any(-1)
+    held = np.ones(own.shape, np.float32)
     if not own.any():
-        return np.ones(own.shape, np.float32)
+        return held
+    box = tuple(slice(v.min(), v.max() + 1) for v in (np.flatnonzero(own.any(1)), np.flatnonzero(own.any(0))))
+    albedo, edited, own = albedo[box], edited[box], own[box]
     level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
     before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, level * edited))
     patterned = np.clip((before - PATTERNED[0]) / (PATTERNED[1] - PATTERNED[0]), 0, 1)
     left = np.clip(after / np.maximum(before, 1e-6), 0, 1)
-    return np.where(own, 1 - patterned * (1 - left), 1).astype(np.float32)
+    held[box] = np.where(own, 1 - patterned * (1 - left), 1)
+    return held
 
 
 def _contrast(values: Array, own: Array) -> Array:
