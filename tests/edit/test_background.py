@@ -294,7 +294,7 @@ def test_light_that_comes_back_outshines_nothing():
 
 def test_changes_beside_a_filled_place_are_those_of_the_light():
     """Not what surfaces leave that do not meet there, nor what the fit misses, nor too much shade on a thing."""
-    from materialist.edit.revealed import MOST, RIM, _believed
+    from materialist.edit.revealed import MOST, RIM, _believed, _trust
 
     scene = rendered_scene()
     photo, filled = scene.photo.linear, block_mask(36, 48)
@@ -303,17 +303,18 @@ def test_changes_beside_a_filled_place_are_those_of_the_light():
     spoiled = np.where(rim[..., None], 9 * photo, brighter)
     for plane, least in ((-1, np.exp(-MOST)), (0, 0.1)):
         label = np.full(filled.shape, plane)
-        one = replace(scene, geometry=replace(scene.geometry, plane_label=label))
-        found = _believed(one, photo, spoiled, filled)
+        trust = _trust(scene, photo, filled)
+        np.testing.assert_array_equal(trust, 1)
+        found = _believed(photo, spoiled, filled, label, trust)
         np.testing.assert_array_equal(found[filled], spoiled[filled])
         np.testing.assert_allclose(found[rim] + 0.02, 1.2 * (photo[rim] + 0.02), rtol=0.05)
         np.testing.assert_allclose(found[~filled & ~rim], brighter[~filled & ~rim], rtol=1e-4)
-        darker = _believed(one, photo, 0.1 * photo, filled)[~filled]
+        darker = _believed(photo, 0.1 * photo, filled, label, trust)[~filled]
         assert (darker + 0.02 >= least * (photo[~filled] + 0.02) * 0.999).all() and (darker < photo[~filled]).all()
     missed = np.zeros(filled.shape, bool)
     missed[4:12, 4:12] = True
     fit = np.where(missed[..., None], 2 * photo, photo)
-    found = _believed(scene, fit, 1.2 * fit, filled)
+    found = _believed(fit, 1.2 * fit, filled, scene.geometry.plane_label, _trust(scene, fit, filled))
     np.testing.assert_allclose(found[6:10, 6:10], fit[6:10, 6:10], rtol=0.01)
     np.testing.assert_allclose(found[30:, 30:], (1.2 * fit)[30:, 30:], rtol=0.02)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from materialist.edit.glows import KEY, explained, in_photo
+from materialist.edit.glows import explained, in_photo, newly_dimmed
 from materialist.edit.layers import Layers, denoised, render_layers
 from materialist.edit.lights import Studio, rendered
 from materialist.edit.material import PICTURED, is_pictured
@@ -72,7 +72,7 @@ def composite(
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     _check_rendered(edited, full_render)
-    lights = edited.provenance.get(KEY) if KEY not in scene.provenance else None
+    lights = newly_dimmed(scene, edited)
     scene = explained(scene, edited)
     studio = Studio(scene, device=device)
     if full_render:
@@ -96,14 +96,14 @@ def pictures(
     for k, edited in enumerate(edits):
         tick("frames", k, total)
         _check_rendered(edited, full_render)
-        if edited.provenance.get(KEY) != lights:  # frames of one film share their lights, and so their base picture
-            studio, lights = Studio(explained(scene, edited), device=device), edited.provenance.get(KEY)
-        own = lights if KEY not in scene.provenance else None
+        found = newly_dimmed(scene, edited)
+        if found != lights:  # frames of one film share their lights, and so their base picture
+            studio, lights = Studio(explained(scene, edited), device=device), found
         if full_render:
             yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
         else:
             layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
-            yield _finished(studio, edited, layers, own, spp=spp, seed=seed, clean=denoise)
+            yield _finished(studio, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
     tick("frames", total, total)
 
 

@@ -127,8 +127,8 @@ def dimmed(
     ambient, radiance, share = _explained(known, masks, colours, seed, device, given)
     shining = [[radiance * c for c in colour] for colour in colours]
     found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": shining}
-    edited = _shining(scene, [_patch(scene, m, (1, 1, 1), f"{NAME} {k}") for k, m in enumerate(masks)], found)
-    edited = replace(edited, bodies=(*scene.bodies, *_emitting(edited, shining, dim)))
+    glow = [[max(dim * c, DARK) for c in own] for own in shining]
+    edited = _shining(scene, [_patch(scene, masks[k], own, f"{NAME} {k}") for k, own in enumerate(glow)], found)
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     kind = "clipped regions" if lights is None else "regions"
     note = f"Taken for lights, {radiance:.3g} times as bright as the photo's white: the {kind} around {places}."
@@ -174,16 +174,21 @@ def is_edited(scene: Scene) -> bool:
     return len(scene.provenance.get("edits", ())) > max(saved, default=0)
 
 
+def newly_dimmed(scene: Scene, edited: Scene) -> dict | None:
+    """The entry KEY of an edit that dimmed the lights of this scene's photo, None where it did not."""
+    return None if KEY in scene.provenance else edited.provenance.get(KEY) or None
+
+
 def explained(scene: Scene, edited: Scene) -> Scene:
     """What an edit is compared with: the scene itself, or where the edit has dimmed its lights, the scene with them.
 
     The two give the same photo; the scene's own map has the light of the photo's lights from elsewhere.
     """
-    found = edited.provenance.get(KEY)
-    if not found or KEY in scene.provenance:
+    found = newly_dimmed(scene, edited)
+    if found is None:
         return scene
     white = [[found["radiance"]] * 3] * len(edited.bodies)  # of scenes of earlier versions
-    return _shining(scene, _emitting(edited, found.get("emission", white), 1.0), found)
+    return _shining(scene, _emitting(edited, found.get("emission", white)), found)
 
 
 def _shining(scene: Scene, lights: Sequence[Body], found: dict) -> Scene:
@@ -191,12 +196,12 @@ def _shining(scene: Scene, lights: Sequence[Body], found: dict) -> Scene:
     return replace(scene, envmap=envmap, bodies=(*scene.bodies, *lights))
 
 
-def _emitting(scene: Scene, emission: Sequence[Sequence[float]], factor: float) -> list[Body]:
-    """The photo's lights among a scene's bodies, with that emission [K][3] times a factor."""
+def _emitting(scene: Scene, emission: Sequence[Sequence[float]]) -> list[Body]:
+    """The photo's lights among a scene's bodies, with that emission [K][3]."""
     lights = [body for body in scene.bodies if body.name.startswith(NAME)]
     found = []
     for body, own in zip(lights, emission):
-        red, green, blue = (max(float(factor * c), DARK) for c in own)
+        red, green, blue = (max(float(c), DARK) for c in own)
         found.append(replace(body, surface=replace(body.surface, emission=(red, green, blue))))
     return found
 

@@ -14,6 +14,7 @@ from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 FAR = 1e3
+"""Beyond any logarithm: pixels that are not asked."""
 DARKEST = 0.02
 """Added to albedo before its logarithm is taken."""
 PATTERNED, AT_RIM = (0.3, 0.8), 2

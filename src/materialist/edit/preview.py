@@ -97,10 +97,10 @@ class Preview:
         comes from around, as the fit has it."""
         from dataclasses import replace
 
-        from materialist.edit.glows import KEY
+        from materialist.edit.glows import newly_dimmed
 
-        found = edited.provenance.get(KEY)
-        if not found or KEY in self.scene.provenance:
+        found = newly_dimmed(self.scene, edited)
+        if found is None:
             return edited
         ambient, dim = float(found["ambient"]), float(found.get("dim", 1.0))
         lights = float(found.get("share", max(1 - ambient, 0)))

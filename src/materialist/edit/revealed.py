@@ -47,13 +47,15 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
         filled = hole & (placed(scene) < 1)
     bare = _bare(studio, edited, layers, hole, spp, seed, clean)
     # What the removal alone does to the light, as far as it is believed; everything else of the edit comes on top.
-    lit = _believed(scene, layers.base, np.maximum(bare - _too_bright(scene, bare - layers.base, filled), 0), filled)
+    trust = _trust(scene, layers.base, filled)
+    lit = np.maximum(bare - _too_bright(scene, bare - layers.base, filled), 0)
+    lit = _believed(layers.base, lit, filled, scene.geometry.plane_label, trust)
     if layers.relit:
         shown = layers.edited * (lit + LEAST) / (np.maximum(bare, 0) + LEAST)
     else:
-        # As is the shade of what was put there, but on surfaces that are new themselves.
-        trust = np.where(layers.changed | filled, 1, _trust(scene, layers.base, filled))[..., None]
-        shown = np.maximum(lit + trust * (layers.edited - bare), 0)
+        # The shade of what was put there is believed as far, but for surfaces that are new themselves.
+        share = np.where(layers.changed | filled, 1, trust)[..., None]
+        shown = np.maximum(lit + share * (layers.edited - bare), 0)
     given = _given(scene, edited, filled)
     if (filled & ~given).any():
         factor = np.log((lit + LEAST) / (np.maximum(layers.base, 0) + LEAST))
@@ -108,16 +110,15 @@ def _too_bright(scene: Scene, gained: Array, filled: Array) -> Array:
     return (1 - kept)[..., None] * np.maximum(gained, 0)
 
 
-def _believed(scene: Scene, base: Array, shown: Array, filled: Array) -> Array:
+def _believed(base: Array, shown: Array, filled: Array, plane: Array, trust: Array) -> Array:
     """[H, W, 3] `shown`; beside filled places only as far as its change can be one of the light.
 
     At the rim the surface that was seen and the one that goes on seldom meet: there the change is that of the nearest
     pixel beyond, on the same plane or thing. No thing, as what lies on no plane, loses more than 1 - exp(-MOST) of its
-    light; a polished plane may lose a reflection. And where the fit misses the photo, its changes are missed, too.
+    light; a polished plane may lose a reflection. And where the fit misses the photo (`trust`), its changes do, too.
     """
     from scipy.ndimage import distance_transform_edt
 
-    plane = scene.geometry.plane_label
     change = np.log((np.maximum(shown, 0) + LEAST) / (np.maximum(base, 0) + LEAST))
     rim = ~filled & (distance_transform_edt(~filled) <= RIM)
     for number in np.unique(plane[rim]):
@@ -127,7 +128,7 @@ def _believed(scene: Scene, base: Array, shown: Array, filled: Array) -> Array:
             row, column = distance_transform_edt(~beyond, return_distances=False, return_indices=True)
             change = np.where((rim & own)[..., None], change[row, column], change)
     change = np.where((plane < 0)[..., None], np.maximum(change, -MOST), change)
-    change *= _trust(scene, base, filled)[..., None]
+    change *= trust[..., None]
     believed = np.maximum((np.maximum(base, 0) + LEAST) * np.exp(change) - LEAST, 0)
     return np.where(filled[..., None], shown, believed)
 
