@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from materialist.edit import upsample
 from materialist.edit.exemplar import Plan
 from materialist.edit.filled import outline, with_hole
 from materialist.types import Camera, Photo
@@ -75,3 +76,16 @@ def test_detail_comes_from_the_sources_and_the_rest_is_the_photo():
     found = with_hole(photo, photo.linear, hole, plan, np.zeros((32, 48), int))
     np.testing.assert_array_equal(found.original[:40], spoiled[:40].astype(np.float32))
     np.testing.assert_allclose(found.original[46:74, 46:74], fine[46:74, 46:74], atol=0.02)
+
+
+def test_strips_have_no_seams(monkeypatch):
+    rng = np.random.default_rng(0)
+    photo = photo_of(rng.random((24 * 5, 32 * 5, 3)), 5)
+    rows, columns = np.mgrid[:24, :32]
+    hole, label = np.hypot(rows - 12, columns - 15) < 8, (rows > 11).astype(int) + 2 * (columns > 16)
+    r, c = np.nonzero(hole)
+    plan = Plan(r, c, r * 32 + (c + 9) % 32, np.ones(len(r), np.float32), hole)
+    whole = with_hole(photo, photo.linear[:, ::-1], hole, plan, label).original
+    monkeypatch.setattr(upsample.strips, "__defaults__", (7, 0))
+    np.testing.assert_array_equal(with_hole(photo, photo.linear[:, ::-1], hole, plan, label).original, whole)
+    assert (whole != photo.original).mean() > 0.2

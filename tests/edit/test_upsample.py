@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edit.upsample import GuidedUpsample, matte, strips
+from materialist.edit import upsample
+from materialist.edit.upsample import GuidedUpsample, matte, strips, window
 
 
 def photo_of(mask, inside, outside):
@@ -90,3 +91,50 @@ def test_without_a_colour_edge_the_mask_decides():
 
 def test_strips_cover_every_row_once():
     assert np.concatenate([np.arange(1000)[rows] for rows in strips(1000)]).tolist() == list(range(1000))
+
+
+def disc(height, width, radius=15):
+    rows, columns = np.mgrid[:height, :width]
+    return np.hypot(rows - height / 2, columns - 1.5 * radius) < radius
+
+
+def test_a_matte_made_in_parts_is_the_matte_made_at_once():
+    small = disc(90, 120)
+    large = np.kron(small, np.ones((5, 5)))[..., None] * [0.5, 0.2, 0.1] + 0.1
+    large = (large * np.random.default_rng(0).uniform(0.8, 1, large.shape)).astype(np.float32)
+    soft = np.clip(upsample.matte(small, np.full_like(large, 0.5)), 0, 1)  # of one colour: the enlarged mask
+    whole = upsample._shares(soft, large, 5.0)
+    assert ((whole > 0.05) & (whole < 0.95)).sum() > 100
+    np.testing.assert_allclose(matte(small, large), whole, atol=0.05)
+    assert np.abs(matte(small, large) - whole).mean() < 1e-4
+
+
+def test_coarse_means_are_the_fine_ones(monkeypatch):
+    rng = np.random.default_rng(1)
+    picture = np.kron(rng.random((12, 16, 3)), np.ones((20, 20, 1))).astype(np.float32)
+    members = np.kron(rng.random((6, 8)) > 0.4, np.ones((40, 40))) > 0
+    coarse = upsample._mean_of(picture, members, 25.0)
+    monkeypatch.setattr(upsample, "COARSE", 0)
+    fine = upsample._mean_of(picture, members, 25.0)
+    near = fine[2] & coarse[2]
+    assert (fine[2] == coarse[2]).mean() > 0.99 and near.mean() > 0.5
+    assert np.abs(fine[0] - coarse[0])[near].max() < 0.02
+    assert np.abs(fine[1] - coarse[1])[near].max() < 0.01
+
+
+@pytest.mark.parametrize("factor", [1, 3])
+def test_a_window_is_a_part_of_the_whole(factor):
+    rng = np.random.default_rng(2)
+    large, layer = rng.random((20 * factor, 30 * factor, 3), np.float32), rng.random((20, 30, 2), np.float32)
+    small = large.reshape(20, factor, 30, factor, 3).mean((1, 3))
+    guided, members = GuidedUpsample(small, large), rng.random((20, 30)) > 0.5
+    rows, columns = slice(4, 9), slice(7, 20)
+    whole = guided(layer, members, slice(0, 20 * factor))
+    np.testing.assert_array_equal(guided(layer, members, rows, columns), whole[rows, columns])
+
+
+def test_windows_hold_the_pixels_and_their_margin():
+    mask = np.zeros((10, 10), bool)
+    mask[3:5, 8] = True
+    assert window(mask, (40, 35)) == (slice(12, 20), slice(28, 32))
+    assert window(mask, (40, 35), 2) == (slice(4, 28), slice(21, 35))

@@ -12,7 +12,7 @@ from materialist.edit.lights import Studio, rendered
 from materialist.edit.material import PICTURED, is_pictured
 from materialist.edit.portrait import Portrait
 from materialist.edit.revealed import revealed
-from materialist.edit.upsample import GuidedUpsample, matte, strips
+from materialist.edit.upsample import GuidedUpsample, matte, strips, window
 from materialist.errors import InputError
 from materialist.types import Array, Photo, Scene
 
@@ -152,7 +152,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
         return _in_front(out, layers.portrait, photo.hdr)
     stack = np.concatenate((_other_light if layers.relit else _same_light)(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
-    upsample = GuidedUpsample(photo.linear, photo.original)
+    upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
     alpha = matte(layers.changed, photo.original)
     changed, clear = layers.changed, np.ones_like(layers.changed)
     if layers.portrait is not None:
@@ -161,14 +161,18 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
         # The rim of a body: what light changes beside it goes on under it, where there is nothing to look up.
         away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
         stack, changed, clear = stack[row, column], changed[row, column], away <= RIM
-    for rows in strips(out.shape[0]):
-        share = alpha[rows][..., None]
-        large = share * upsample(stack, changed & clear, rows)
-        large += (1 - share) * upsample(stack, ~changed & clear, rows)
+    reached = (stack[..., :3] != 0).any(-1)
+    if not reached.any():
+        return _in_front(out, layers.portrait, photo.hdr)
+    box, columns = window(reached, native, 3)  # nothing of it is seen further away: see `GuidedUpsample`
+    for rows in strips(box.stop, start=box.start):
+        share, here = alpha[rows, columns][..., None], out[rows, columns]
+        large = share * upsample(stack, changed & clear, rows, columns)
+        large += (1 - share) * upsample(stack, ~changed & clear, rows, columns)
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
-        held = out[rows] if photo.hdr or layers.relit else _unclipped(out[rows], reference)
+        held = here if photo.hdr or layers.relit else _unclipped(here, reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)
-        out[rows] = np.where((change != 0).any(-1, keepdims=True), moved, out[rows])
+        out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
     return _in_front(out, layers.portrait, photo.hdr)
 
 

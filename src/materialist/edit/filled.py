@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from materialist.edit.exemplar import Plan
+from materialist.edit.upsample import strips, window
 from materialist.types import Array, Photo
 
 SMOOTH = 1.0
@@ -28,12 +29,37 @@ def with_hole(photo: Photo, linear: Array, hole: Array, plan: Plan | None, label
     share = outline(hole, native)
     original = photo.original.copy()
     if share.any():
-        box = tuple(slice(v.min(), v.max() + 1) for v in np.nonzero(share))
-        picture = np.zeros((*share[box].shape, 3), np.float32)
-        for own, weight in _surfaces(label, hole, native, box):
-            picture += weight[..., None] * _of_one(photo, linear, hole, plan, own, box)
-        original[box] = laid(np.maximum(picture, 0), share[box], photo.original[box])
+        shift = _shift(plan, hole.shape)
+        surfaces = [_Surface.of(own, linear, hole) for own in _surfaces(label, hole)]
+        box, columns = window(hole, native)
+        for rows in strips(box.stop, start=box.start):
+            part = (rows, columns)
+            picture = _of_all(photo, surfaces, hole, shift, part)
+            original[part] = laid(np.maximum(picture, 0), share[part], photo.original[part])
     return replace(photo, linear=linear.astype(np.float32), original=original)
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """One surface in a hole or at its rim, continued over the picture by its nearest pixels."""
+
+    smooth: Array
+    """[H, W] float32: where it is, with soft outlines."""
+    row: Array
+    column: Array
+    """[H, W] int: the nearest pixel of it."""
+    picture: Array
+    """[H, W, 3] the filled picture of that pixel."""
+
+    @staticmethod
+    def of(own: Array, linear: Array, hole: Array) -> _Surface:
+        """From where it is, [H, W] bool."""
+        import cv2
+        from scipy.ndimage import distance_transform_edt
+
+        smooth = np.asarray(cv2.GaussianBlur(own.astype(np.float32), (0, 0), SMOOTH))
+        row, column = distance_transform_edt(~own, return_distances=False, return_indices=True)
+        return _Surface(smooth, row, column, linear[row, column])
 
 
 def laid(picture: Array, share: Array, photo: Array) -> Array:
@@ -56,8 +82,8 @@ def outline(mask: Array, native: tuple[int, int]) -> Array:
     return np.where(thin > 0, 1, hard * share).astype(np.float32)
 
 
-def _surfaces(label: Array, hole: Array, native: tuple[int, int], box) -> Iterator[tuple[Array, Array]]:
-    """Each surface in a hole or at its rim: [H, W] bool, and its share [h, w] of the native pixels of a window.
+def _surfaces(label: Array, hole: Array) -> Iterator[Array]:
+    """[H, W] bool of each surface in a hole or at its rim.
 
     Surfaces beside the hole go on into it by a pixel: so they end in the hole, where their outline is drawn anew.
     """
@@ -68,38 +94,45 @@ def _surfaces(label: Array, hole: Array, native: tuple[int, int], box) -> Iterat
     beside = label[tuple(distance_transform_edt(hole, return_distances=False, return_indices=True))]
     label = np.where(hole & ~inner, beside, label)
     wide = cv2.dilate(hole.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
-    kinds = np.unique(label[wide])
-    shares = []
-    for kind in kinds:
-        smooth = cv2.GaussianBlur((label == kind).astype(np.float32), (0, 0), SMOOTH)
-        shares.append(_sampled(smooth, _grid(native, hole.shape, box)))
-    stack = np.stack(shares)
-    if len(kinds) > 1:
-        first, second = np.sort(stack, axis=0)[-1], np.sort(stack, axis=0)[-2]
-        lead = np.where(stack == first, stack - second, stack - first)
-        stack = np.clip(0.5 + SHARP * lead, 0, 1)
-    stack /= np.maximum(stack.sum(0), 1e-6)
-    for kind, share in zip(kinds, stack):
-        if share.any():
-            yield label == kind, share
+    return (label == kind for kind in np.unique(label[wide]))
 
 
-def _of_one(photo: Photo, linear: Array, hole: Array, plan: Plan | None, own: Array, box) -> Array:
-    """[h, w, 3] a native window of `linear`, as if the surface `own` [H, W] bool filled all of it."""
-    from scipy.ndimage import distance_transform_edt
-
-    native, working = photo.original.shape[:2], hole.shape
-    row, column = distance_transform_edt(~own, return_distances=False, return_indices=True)
-    x, y = _grid(native, working, box)
-    picture = _sampled(linear[row, column], (x, y))
+def _shift(plan: Plan | None, working: tuple[int, ...]) -> Array | None:
+    """[H, W, 2] rows and columns from each filled pixel to its source."""
     if plan is None:
-        return picture
+        return None
     shift = np.zeros((*working, 2))
     shift[plan.rows, plan.columns, 0] = plan.source // working[1] - plan.rows
     shift[plan.rows, plan.columns, 1] = plan.source % working[1] - plan.columns
+    return shift
+
+
+def _of_all(photo: Photo, surfaces: list[_Surface], hole: Array, shift: Array | None, box) -> Array:
+    """[h, w, 3] a native window of the filled picture: each surface by its share of the pixels."""
+    grid = _grid(photo.original.shape[:2], hole.shape, box)
+    stack = np.stack([_sampled(surface.smooth, grid) for surface in surfaces])
+    if len(surfaces) > 1:
+        second, first = np.partition(stack, -2, axis=0)[-2:]
+        lead = np.where(stack == first, stack - second, stack - first)
+        stack = np.clip(0.5 + SHARP * lead, 0, 1)
+    stack /= np.maximum(stack.sum(0), 1e-6)
+    picture = np.zeros((*stack.shape[1:], 3), np.float32)
+    for surface, share in zip(surfaces, stack):
+        if share.any():
+            picture += share[..., None] * _of_one(photo, surface, hole, shift, grid, box)
+    return picture
+
+
+def _of_one(photo: Photo, surface: _Surface, hole: Array, shift: Array | None, grid, box) -> Array:
+    """[h, w, 3] a native window of the filled picture, as if one surface filled all of it; `grid` as of `_grid`."""
+    native, working = photo.original.shape[:2], hole.shape
+    x, y = grid
+    picture = _sampled(surface.picture, grid)
+    if shift is None:
+        return picture
     # The native pixels' own working pixels, and of the surface the ones nearest to these.
     at = tuple(np.clip(np.round(v), 0, n - 1).astype(int) for v, n in zip((y, x), working))
-    at = row[at], column[at]
+    at = surface.row[at], surface.column[at]
     rows, columns = np.mgrid[box]
     moved = [np.round(shift[at][..., k] * native[k] / working[k]).astype(int) for k in (0, 1)]
     rows, columns = np.clip(rows + moved[0], 0, native[0] - 1), np.clip(columns + moved[1], 0, native[1] - 1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.edit.material import warned
 from materialist.edit.mesh_material import constant
-from materialist.edit.upsample import matte
+from materialist.edit.upsample import matte, window
 from materialist.errors import InputError
 from materialist.render.scene import part
 from materialist.types import Array, Body, Photo, Scene
@@ -217,15 +217,19 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Arr
     dim = float(found["dim"])
     if dim == 1 or not seen.any():
         return picture
-    share = matte(seen, photo.original)
-    share = (share if before is None else share * (1 - before))[..., None]
-    white = photo.original.min(-1, keepdims=True)
-    own = dim * photo.original
+    share, picture = matte(seen, photo.original), picture.copy()
+    box = window(seen, picture.shape[:2], 4)
+    share, seen_so, here = share[box][..., None], photo.original[box], picture[box]
+    if before is not None:
+        share = share * (1 - before[box])[..., None]
+    white = seen_so.min(-1, keepdims=True)
+    own = dim * seen_so
     if not photo.hdr:
         lifted = own * (1 + max(found["radiance"] - 1, 0) * np.clip((white - NEARLY) / (CLIPPED - NEARLY), 0, 1))
         # What is not clipped is as bright as it is, and dimming brightens nothing.
-        own = np.where((white < CLIPPED) & (dim < 1), np.minimum(lifted, photo.original), lifted)
-    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
+        own = np.where((white < CLIPPED) & (dim < 1), np.minimum(lifted, seen_so), lifted)
+    picture[box] = np.where(share > 0, share * own + (1 - share) * here, here)
+    return picture
 
 
 def _explained(

@@ -11,6 +11,10 @@ from materialist.types import Array
 
 STRIP = 256
 """Native rows handled at a time: bounds the memory."""
+TILE, BORDER = 32, 4
+"""Working pixels: sides of the parts in which a matte is made, and how far from the mask's border one may reach."""
+NEARBY, COARSE = 2.5, 0.2
+"""Working pixels over which a matte takes means of colours (standard deviation), and the grid of these in its units."""
 _RANGE = 0.06
 """Standard deviation of the colour weight, sRGB-encoded values: about a just visible step in a picture."""
 GRAIN = 0.03
@@ -22,9 +26,19 @@ _RADIUS = 0.8
 """Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
 
 
-def strips(height: int) -> Iterator[slice]:
-    """Slices of at most STRIP rows that cover `height` rows."""
-    return (slice(top, min(top + STRIP, height)) for top in range(0, height, STRIP))
+def strips(height: int, size: int = STRIP, start: int = 0) -> Iterator[slice]:
+    """Slices of at most `size` rows that cover `height` rows, from `start` on."""
+    return (slice(top, min(top + size, height)) for top in range(start, height, size))
+
+
+def window(mask: Array, native: tuple[int, int], margin: int = 0) -> tuple[slice, slice]:
+    """The native rows and columns of the pixels of a mask [H, W] bool that is not empty, and of `margin` around."""
+    sides = []
+    for axis in (0, 1):
+        where, count = np.flatnonzero(mask.any(1 - axis)), mask.shape[axis]
+        first, last = max(where[0] - margin, 0), min(where[-1] + 1 + margin, count)
+        sides.append(slice(first * native[axis] // count, -(-last * native[axis] // count)))
+    return sides[0], sides[1]
 
 
 class GuidedUpsample:
@@ -42,21 +56,21 @@ class GuidedUpsample:
         self.guide, self.large = linear_to_srgb(small), large
         self.same = small.shape == large.shape
 
-    def __call__(self, layer: Array, members: Array, rows: slice) -> Array:
-        """[h, W0, C] float32: `layer` [H, W, C] in the native rows, from the working pixels `members` [H, W] bool.
+    def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
+        """[h, w, C] float32: `layer` [H, W, C] in a native window, from the working pixels `members` [H, W] bool.
 
         0 where none of the 4 x 4 is a member. At equal sizes members keep their own value, and the next ones take the
         mean of those around.
         """
         if self.same and members.all():
-            return layer[rows].astype(np.float32)
+            return layer[rows, columns].astype(np.float32)
         if self.same:
-            near = _blurred(layer, members)[rows]
-            return np.where(members[rows][..., None], layer[rows], near).astype(np.float32)
-        here = linear_to_srgb(self.large[rows])  # [h, W0, 3]
+            near = _blurred(layer, members)[rows, columns]
+            return np.where(members[rows, columns][..., None], layer[rows, columns], near).astype(np.float32)
+        here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
         native, working = self.large.shape[:2], members.shape
         y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0])
-        x0, xs = _taps(np.arange(native[1]), native[1], working[1])
+        x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1])
         total = np.zeros((*here.shape[:2], layer.shape[2]), np.float32)
         if not members[y0.min() : y0.max() + 1].any():
             return total
@@ -88,13 +102,35 @@ def matte(mask: Array, large: Array) -> Array:
     soft = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     if mask.all() or not mask.any():
         return soft
+    wide = np.ones((2 * BORDER + 1,) * 2, np.uint8)
+    border = np.asarray(cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide))
+    alpha = (soft >= 0.5).astype(np.float32)
+    margin = int(np.ceil((3 * NEARBY + 4) * scale))
+    for tile in strips(mask.shape[0], TILE):
+        for part in strips(mask.shape[1], TILE):
+            if not border[tile, part].any():
+                continue
+            own = np.zeros_like(border)
+            own[tile, part] = True
+            rows, columns = window(own, (height, width))
+            around = tuple(slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns))
+            found = _shares(soft[around], large[around], scale)
+            top, left = rows.start - around[0].start, columns.start - around[1].start
+            alpha[rows, columns] = found[top:, left:][: rows.stop - rows.start, : columns.stop - columns.start]
+    return alpha
+
+
+def _shares(soft: Array, large: Array, scale: float) -> Array:
+    """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
+    import cv2
+
     reach = 2 * int(np.ceil(1.5 * scale)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     inner, outer = cv2.erode(soft, kernel), cv2.dilate(soft, kernel)
     sure_in, sure_out = (inner >= 0.999), (outer <= 0.001)
     encoded = linear_to_srgb(large)
-    front, front_spread, known_front = _mean_of(encoded, sure_in, 2.5 * scale)
-    back, back_spread, known_back = _mean_of(encoded, sure_out, 2.5 * scale)
+    front, front_spread, known_front = _mean_of(encoded, sure_in, NEARBY * scale)
+    back, back_spread, known_back = _mean_of(encoded, sure_out, NEARBY * scale)
     line = front - back
     length = (line**2).sum(-1)
     share = np.clip(((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6), 0, 1)
@@ -120,12 +156,21 @@ def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array
     """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
     import cv2
 
+    height, width = members.shape
+    # Means so wide are as good on a coarser grid, of pixels a fifth of sigma wide.
+    small = tuple(max(1, round(v / max(1.0, COARSE * sigma))) for v in (width, height))
+    sigmas = [float(np.sqrt(max(sigma**2 / (v / s) ** 2 - (v > s) / 12, 0.1))) for v, s in zip((width, height), small)]
+    sizes = [2 * int(np.ceil(3 * v)) + 1 for v in sigmas]
+
+    def blurred(values: Array) -> Array:
+        coarse = cv2.resize(values, small, interpolation=cv2.INTER_AREA)
+        coarse = cv2.GaussianBlur(coarse, sizes, sigmas[0], sigmaY=sigmas[1], borderType=cv2.BORDER_REFLECT)
+        return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR))
+
     weight = members.astype(np.float32)
-    size = 2 * int(np.ceil(3 * sigma)) + 1
-    blur = lambda v: cv2.GaussianBlur(v, (size, size), sigma)  # noqa: E731
-    norm = np.maximum(blur(weight), 1e-12)
-    mean = blur(picture * weight[..., None]) / norm[..., None]
-    square = blur((picture**2).sum(-1) * weight) / norm
+    norm = np.maximum(blurred(weight), 1e-12)
+    mean = blurred(picture * weight[..., None]) / norm[..., None]
+    square = blurred((picture**2).sum(-1) * weight) / norm
     return mean, np.maximum(square - (mean**2).sum(-1), 0), norm > 1e-5
 
 
