@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -24,6 +26,8 @@ RIM = 4.0
 """Working pixels under the outline of a new body to which the change beside it goes on: what enlarging looks up."""
 MOST = 1.0
 """Largest factor on what the photo has and the fit has not, under the same light."""
+THREADS = 4
+"""Strips of a large photo that are made at a time, of about 0.2 GB each."""
 RERENDERED = 36
 """Camera rays a pixel of the re-rendering of an edited scene that is kept."""
 MOST_DETAIL = 2.0
@@ -165,14 +169,23 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     if not reached.any():
         return _in_front(out, layers.portrait, photo.hdr)
     box, columns = window(reached, native, 3)  # nothing of it is seen further away: see `GuidedUpsample`
-    for rows in strips(box.stop, start=box.start):
-        share, here = alpha[rows, columns][..., None], out[rows, columns]
-        large = share * upsample(stack, changed & clear, rows, columns)
-        large += (1 - share) * upsample(stack, ~changed & clear, rows, columns)
+
+    def laid(rows: slice) -> None:
+        here, share = out[rows, columns], alpha[rows, columns]
+        large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
+        for part, members in ((share, changed & clear), (1 - share, ~changed & clear)):
+            where = np.flatnonzero((part > 0).any(0))
+            if where.size:
+                own = slice(int(where[0]), int(where[-1]) + 1)
+                there = slice(columns.start + own.start, columns.start + own.stop)
+                large[:, own] += part[:, own, None] * upsample(stack, members, rows, there)
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
         held = here if photo.hdr or layers.relit else _unclipped(here, reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
+
+    with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
+        list(threads.map(laid, strips(box.stop, start=box.start)))
     return _in_front(out, layers.portrait, photo.hdr)
 
 

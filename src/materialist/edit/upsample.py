@@ -9,7 +9,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.types import Array
 
-STRIP = 256
+STRIP = 128
 """Native rows handled at a time: bounds the memory."""
 TILE, BORDER = 32, 4
 """Working pixels: sides of the parts in which a matte is made, and how far from the mask's border one may reach."""
@@ -76,13 +76,16 @@ class GuidedUpsample:
             return total
         norm = np.zeros(here.shape[:2], np.float32)
         for i in range(4):
-            for j in range(4):
-                y, x = y0[i][:, None], x0[j][None, :]
-                away = ((self.guide[y, x] - here) ** 2).sum(-1)
-                # The small constant keeps a mean of the neighbourhood where nothing there looks alike.
-                weight = (np.exp(-0.5 * away / _RANGE**2) + 1e-4) * ys[i][:, None] * xs[j][None, :] * members[y, x]
-                total += weight[..., None] * layer[y, x]
-                norm += weight
+            for row in np.unique(y0[i]):
+                band = slice(*np.searchsorted(y0[i], (row, row + 1)))  # the native rows that look up this working row
+                for j in range(4):
+                    away = here[band] - self.guide[row, x0[j]]
+                    away = np.einsum("ijk,ijk->ij", away, away)
+                    # The small constant keeps a mean of the neighbourhood where nothing there looks alike.
+                    weight = np.exp(-0.5 / _RANGE**2 * away) + 1e-4
+                    weight *= ys[i][band, None] * (xs[j] * members[row, x0[j]])
+                    total[band] += weight[..., None] * layer[row, x0[j]]
+                    norm[band] += weight
         total /= np.maximum(norm, 1e-20)[..., None]
         return total.astype(np.float32)
 
