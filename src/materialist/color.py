@@ -4,6 +4,8 @@ import numpy as np
 
 from materialist.types import Array
 
+ROWS = 256
+"""Rows of a picture encoded at a time: bounds the memory."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """Rec.709 luminance weights of linear RGB."""
 
@@ -18,6 +20,16 @@ def linear_to_srgb(linear: Array) -> Array:
     """Encode linear values (any shape, clipped to [0, 1]) as sRGB in [0, 1]; returns float32."""
     linear = np.clip(np.asarray(linear, np.float32), 0, 1)
     return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def srgb_levels(linear: Array, dtype: type = np.uint8) -> Array:
+    """Linear values [H, ...] (clipped to [0, 1]) as whole levels of a display file, uint8 or uint16; by parts."""
+    linear = np.asarray(linear, np.float32)
+    top, out = float(np.iinfo(dtype).max), np.empty(linear.shape, dtype)
+    for start in range(0, len(linear), ROWS):
+        rows = slice(start, start + ROWS)
+        out[rows] = np.round(linear_to_srgb(linear[rows]).astype(np.float64) * top)
+    return out
 
 
 def luminance(linear: Array) -> Array:

@@ -20,7 +20,7 @@ from materialist.batch.edits import edits_for, edits_key
 from materialist.batch.job import Job, thumbnail_path
 from materialist.batch.packages import file_hash, package_hash, whole_size
 from materialist.batch.remote import is_url, local_copy
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
 from materialist.io.target import ensure_writable
 from materialist.types import Array, Scene
@@ -138,7 +138,7 @@ def _write_strip(path: Path, pictures: list[Array]) -> None:
         scale = min(THUMBNAIL[0] / picture.shape[1], THUMBNAIL[1] / picture.shape[0])
         size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
         resized = cv2.resize(np.clip(picture, 0, 1), size, interpolation=cv2.INTER_AREA)
-        small.append(np.round(linear_to_srgb(np.asarray(resized)) * 255).astype(np.uint8))
+        small.append(srgb_levels(np.asarray(resized)))
     height = max(one.shape[0] for one in small)
     gap = np.full((height, 4, 3), 255, np.uint8)
     columns: list[Array] = []

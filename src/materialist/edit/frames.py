@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.edit.relight import relight, triple
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.beside import partial
@@ -127,7 +127,7 @@ def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
 
 
 def _display(picture: Array) -> Array:
-    return np.round(linear_to_srgb(picture) * 255).astype(np.uint8)
+    return srgb_levels(picture)
 
 
 def _replaceable(path: Path) -> bool:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edit.background import Inpaint
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict.models import INSTEAD
@@ -57,7 +57,7 @@ def diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int)
     unit = 8 * max(1, getattr(pipeline, "vae_scale_factor", 8) // 8)
     scale = min(1.0, LONGEST / max(height, width))
     w, h = (max(unit, round(n * scale / unit) * unit) for n in (width, height))
-    picture = np.round(linear_to_srgb(photo) * 255).astype(np.uint8)
+    picture = srgb_levels(photo)
     image = Image.fromarray(picture).resize((w, h), Image.Resampling.LANCZOS)
     mask = Image.fromarray(hole.astype(np.uint8) * 255).resize((w, h), Image.Resampling.NEAREST)
     out = pipeline(

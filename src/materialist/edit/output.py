@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.errors import OutputError
 from materialist.io.beside import partial
 from materialist.io.image import ensure_image_writable, write_image
@@ -30,7 +30,7 @@ def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bo
     import cv2
 
     ensure_image_writable(path, force=force)
-    pixels = np.round(linear_to_srgb(picture).astype(np.float64) * 65535).astype(np.uint16)
+    pixels = srgb_levels(picture, np.uint16)
     temporary = partial(path)
     try:
         temporary.write_bytes(cv2.imencode(".png", pixels[..., ::-1])[1].tobytes())

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.edit.objects import certainty
 from materialist.types import Array, Scene
 
@@ -79,7 +79,7 @@ def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
 
     if not ((label == cv2.GC_FGD) | (label == cv2.GC_PR_FGD)).any() or (label != cv2.GC_FGD).sum() < 16:
         return label == cv2.GC_FGD
-    picture = np.round(linear_to_srgb(scene.photo.linear)[..., ::-1] * 255).astype(np.uint8)
+    picture = srgb_levels(scene.photo.linear[..., ::-1])
     labels = np.ascontiguousarray(label)
     cv2.setRNGSeed(0)
     try:

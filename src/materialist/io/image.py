@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
 from materialist.io.beside import partial
 from materialist.io.exr import read_exr, write_exr
@@ -19,7 +19,7 @@ COLOURED = 0.2
 
 def write_png(path: str | Path, linear: Array) -> None:
     """Write linear RGB [H, W, 3] (or grey [H, W]), clipped to [0, 1], as an 8-bit sRGB PNG."""
-    write_png_bytes(path, np.round(linear_to_srgb(linear) * 255).astype(np.uint8))
+    write_png_bytes(path, srgb_levels(linear))
 
 
 def write_png_bytes(path: str | Path, pixels: Array) -> None:

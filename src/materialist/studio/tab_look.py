@@ -7,7 +7,7 @@ from typing import Any
 import gradio as gr
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.studio import views
 from materialist.studio.context import Context
 from materialist.studio.follow import follow
@@ -95,4 +95,4 @@ def compared(session: Session) -> tuple[Array, Array]:
 
 
 def _bytes(linear: Array) -> Array:
-    return np.round(linear_to_srgb(linear) * 255).astype(np.uint8)
+    return srgb_levels(linear)

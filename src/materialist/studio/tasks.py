@@ -207,9 +207,9 @@ def _zip(folder: Path, output: Path) -> None:
 
 def display(linear: Array) -> Array:
     """[H, W, 3] linear to uint8 sRGB."""
-    from materialist.color import linear_to_srgb
+    from materialist.color import srgb_levels
 
-    return np.round(linear_to_srgb(linear) * 255).astype(np.uint8)
+    return srgb_levels(linear)
 
 
 def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
+from materialist.color import srgb_levels
 from materialist.types import Array, Scene
 
 _QUALITY = 88
@@ -17,7 +17,7 @@ _QUALITY = 88
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return _url(np.round(linear_to_srgb(linear) * 255).astype(np.uint8), ".jpg", "image/jpeg")
+    return _url(srgb_levels(linear), ".jpg", "image/jpeg")
 
 
 def mask_urls(mask: Array | None) -> dict[str, str]:
@@ -49,15 +49,14 @@ def maps(scene: Scene) -> list[tuple[Array, str]]:
     from materialist.export import pictures
 
     materials = scene.materials
-    bytes_of = lambda linear: np.round(linear_to_srgb(linear) * 255).astype(np.uint8)  # noqa: E731
     return [
-        (bytes_of(materials.albedo), "Albedo: colour without light"),
+        (srgb_levels(materials.albedo), "Albedo: colour without light"),
         (pictures.grey(materials.roughness), "Roughness: black is a mirror, white is chalk"),
         (pictures.grey(materials.metallic), "Metallic: white is metal"),
         (pictures.normals(scene.normal), "Normals: which way surfaces face"),
         (pictures.nearness(scene.depth), "Depth: near is bright"),
         (pictures.light(scene.envmap), "Light, all around; ahead is the middle"),
-        (bytes_of(scene.rerender), "Re-rendering: the scene, path traced"),
+        (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
         (pictures.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
     ]
 
