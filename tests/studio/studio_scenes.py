@@ -10,6 +10,7 @@ import numpy as np
 
 from materialist.geometry.build import build_geometry
 from materialist.io.package import save_scene
+from materialist.studio.context import Context
 from materialist.studio.selection import read_pick
 from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
 
@@ -59,3 +60,15 @@ def png_header(width: int, height: int) -> bytes:
 def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:
     """A click of the page at a working pixel; by default on the block."""
     session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))
+
+
+class _Names(dict):
+    """Every component, its name in its place."""
+
+    def __missing__(self, name: str) -> str:
+        return name
+
+
+def named(hub=None) -> Context:
+    """What the tabs share, without a page: updates come under the names of components."""
+    return Context(hub, _Names())

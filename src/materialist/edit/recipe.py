@@ -138,8 +138,8 @@ def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto
     return edited
 
 
-def _region(scene: Scene, step: Step):
-    """[H, W] bool of the step's mask, click or box."""
+def region_of(scene: Scene, step: Step) -> Array:
+    """[H, W] bool of the step's mask, click or box. Raises InputError."""
     given = step.options
     where: dict[str, Any] = {
         "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
@@ -161,7 +161,7 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
 
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
     given = step.options
-    region = _left(scene, edited, _region(scene, step))
+    region = _left(scene, edited, region_of(scene, step))
     options: dict[str, Any] = {
         k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
     }
@@ -187,7 +187,7 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     if region and "dim" not in given:
         raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
     if region:
-        options["lights"] = _region(scene, step)
+        options["lights"] = region_of(scene, step)
     if "envmap" in given:
         options["envmap"] = read_envmap(_file(step, "envmap"))
         gain = given.get("gain", "auto")
@@ -245,7 +245,7 @@ def _thing(step: Step) -> dict[str, Any]:
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return without(edited, _left(scene, edited, _region(scene, step)), **_removal(step), fitted=scene)
+    return without(edited, _left(scene, edited, region_of(scene, step)), **_removal(step), fitted=scene)
 
 
 def _removal(step: Step) -> dict[str, Any]:
@@ -289,7 +289,7 @@ def glass_arguments(scene: Scene, step: Step):
         options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
         if not known and not options["thickness"].is_file():
             raise InputError(f"There is no file {options['thickness']}; thickness is one, or {', '.join(METHODS)}.")
-    return _region(scene, step), options | _removal(step)
+    return region_of(scene, step), options | _removal(step)
 
 
 _MAKERS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,10 +37,13 @@ class Context:
         return {**self.picture(session), **self.controls(session)}
 
     def controls(self, session: Session) -> dict[Any, Any]:
-        """Sliders as the step in hand, or the selected object, has them."""
+        """Sliders as the step in hand, or the selected object, has them; as they are where a step says nonsense."""
         if session.live is None:
             return {}
-        values = {**material_values(session), **light_values(session), **glass_values(session)}
+        values: dict[str, Any] = {}
+        for read in (material_values, light_values, glass_values):
+            with suppress(TypeError, ValueError):
+                values |= read(session)
         return {self[name]: value for name, value in values.items()}
 
     @property

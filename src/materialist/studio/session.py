@@ -5,12 +5,11 @@ from __future__ import annotations
 import hashlib
 import secrets
 import threading
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edit.recipe import Step, write_recipe
-from materialist.errors import InputError, MaterialistError
+from materialist.edit.recipe import REGION, Step, region_of, write_recipe
+from materialist.errors import InputError
 from materialist.studio import things, views
 from materialist.studio.desk import keep, new_name, read_steps, write_mask
 from materialist.studio.glass import Tracer
@@ -18,7 +17,7 @@ from materialist.studio.jobs import Job, Jobs
 from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.showing import Final, stage
-from materialist.studio.stack import Stack
+from materialist.studio.stack import Stack, told
 from materialist.studio.work import Project
 from materialist.types import Scene
 
@@ -125,13 +124,14 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            self.remember("select")
+            step, stack = self._current("edit") or self._current("glass"), self.stack
+            if after.mask is None or mode not in (ADD, REMOVE) or step is None or stack.current is None:
+                self.remember("select")
+                self.stack = stack.chosen(None)
+            else:  # the edit in hand grows or shrinks with its region, whatever that was given as
+                region = {**dict.fromkeys(REGION), "mask": write_mask(self.desk, after.mask)}
+                self.change("select", stack.put(stack.current, told(step, **region)))
             self._select(after)
-            step = self._current("edit") or self._current("glass")
-            if after.mask is None or mode not in (ADD, REMOVE) or step is None or self.stack.current is None:
-                self.stack = self.stack.chosen(None)
-            else:  # the edit in hand grows or shrinks with its region
-                self._put(step, mask=write_mask(self.desk, after.mask))
 
     def deselect(self) -> None:
         with self.lock:
@@ -166,13 +166,12 @@ class Session:
             if step is None and mask is None:
                 _ = self.scene
                 raise InputError("Click the object that you want to change first.")
-            self.remember(kind)
-            before = self.stack
+            stack = self.stack
             if step is None:
                 step = Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk)  # type: ignore[arg-type]
-                self.stack = before.add(step)
-            merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
-            self.check_or(before, replace(step, options=merged))
+                stack = stack.add(step)
+            assert stack.current is not None
+            self.change(kind, stack.put(stack.current, told(step, **options)))
 
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light step; it is made when the first is set."""
@@ -199,7 +198,6 @@ class Session:
         with self.lock:
             if not 0 <= index < len(self.stack.steps):
                 raise InputError("That edit is no longer there.")
-            self.remember(what)
             stack = self.stack
             changed = {
                 "toggle": lambda: stack.toggled(index), "up": lambda: stack.moved(index, -1),
@@ -208,9 +206,12 @@ class Session:
             }  # fmt: skip
             if what not in changed:
                 raise InputError("That button is not known; reload the page.")
-            self.stack = changed[what]()
-            if what == "choose":
-                self._select(self._region_of(self.stack.current))
+            after = changed[what]()
+            region = self._region_of(after) if what == "choose" else None
+            self.remember(what)
+            self.stack = after
+            if region is not None:
+                self._select(region)
             self.save()
 
     def undo(self) -> bool:
@@ -266,16 +267,12 @@ class Session:
 
     # Within
 
-    def check_or(self, before: Stack, step: Step) -> None:
-        """Put a step in hand; where it cannot be applied the stack is as before, and the error goes on."""
-        assert self.stack.current is not None and self.live is not None
-        self.stack = self.stack.put(self.stack.current, step)
-        try:
-            self.live.edited(self.stack.active)
-        except MaterialistError:
-            self.stack = before
-            self._past = self._past[:-1]
-            raise
+    def change(self, what: str, after: Stack) -> None:
+        """Another list of edits, and a way back. Where it cannot be applied nothing changes, and the error goes on."""
+        assert self.live is not None
+        self.live.edited(after.active)
+        self.remember(what)
+        self.stack = after
         self.save()
 
     def _current(self, kind: str) -> Step | None:
@@ -284,8 +281,7 @@ class Session:
 
     def _put(self, step: Step, **options: Any) -> None:
         assert self.stack.current is not None
-        merged = {k: v for k, v in {**step.options, **options}.items() if v is not None}
-        self.stack = self.stack.put(self.stack.current, replace(step, options=merged))
+        self.stack = self.stack.put(self.stack.current, told(step, **options))
         self.save()
 
     def remember(self, what: str) -> None:
@@ -298,14 +294,12 @@ class Session:
         self.selection = selection
         self.mask_urls = views.mask_urls(selection.mask)
 
-    def _region_of(self, index: int | None) -> Selection:
-        """The selection that a step was made with."""
-        step = self.stack.steps[index] if index is not None else None
-        if step is None or "mask" not in step.options:
+    def _region_of(self, stack: Stack) -> Selection:
+        """The selection that the step in hand was made with."""
+        step = stack.steps[stack.current] if stack.current is not None else None
+        if step is None or not {*REGION} & {*step.options}:
             return Selection()
-        from materialist.edit.select import select
-
-        return Selection((select(self.scene, mask=step.folder / step.options["mask"]),))
+        return Selection((region_of(self.scene, step),))
 
     def save(self) -> None:
         """Write edits.yaml, and let go of the glass that is no longer in it.

@@ -8,6 +8,7 @@ from time import time
 from typing import TYPE_CHECKING, Any
 
 from materialist.edit.recipe import Step
+from materialist.errors import MaterialistError
 from materialist.studio import glass, views
 from materialist.studio.live import LIVE
 from materialist.studio.stack import Stack
@@ -36,7 +37,8 @@ class Final:
 def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
     """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
 
-    Without `edits` it is the photo, at once; with them it waits for the preview where there are any. Glass in hand is
+    Without `edits` it is the photo, at once; with them it waits for the preview where there are any, and is the photo
+    with the reason on it where they cannot be applied: what is wrong can be taken out of the list. Glass in hand is
     asked for; `asked` counts these wishes, and `waiting` says whether the last is not fulfilled yet. The page ignores a
     picture with an older `serial` than the one it shows.
     """
@@ -45,15 +47,21 @@ def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
         live, stack, final = session.live, session.stack, session.final
         masks, tracer = session.mask_urls, session.glass
     if live is None:
-        none = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False}
+        none = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
         return {**none, "serial": serial, **masks}
     camera, steps = live.scene.camera, stack.active if edits else ()
-    shown = {"width": camera.width, "height": camera.height, "lamps": _lamps(stack), "serial": serial, **masks}
+    size = {"width": camera.width, "height": camera.height}
+    shown = {**size, "lamps": _lamps(stack), "serial": serial, "bad": False, **masks}
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel"
         return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
     state = _asked(tracer, stack) if edits and tracer is not None else None
-    linear, waiting = live.picture(steps, tracer), state is not None and state.waiting
+    waiting = state is not None and state.waiting
+    try:
+        linear = live.picture(steps, tracer)
+    except MaterialistError as error:
+        photo, badge = views.jpeg_url(live.scene.photo.linear), f"The photo without its edits: {error}"
+        return {**shown, "picture": photo, "badge": badge, "waiting": False, "bad": True}
     shown |= {"asked": state.asked if state else 0, "waiting": waiting}
     return {**shown, "picture": views.jpeg_url(linear), "badge": _badge(steps, tracer, waiting)}
 
@@ -77,10 +85,13 @@ def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
 
 
 def _lamps(stack: Stack) -> list[list[float]]:
-    """(x, y) of the lamps, for their marks."""
+    """(x, y) of the lamps, for their marks; none where they are not readable, which the picture tells."""
     place = stack.last("relight")
     lamps = stack.steps[place].options.get("lamps", []) if place is not None else []
-    return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
+    try:
+        return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
+    except (TypeError, ValueError):
+        return []
 
 
 def _badge(steps: tuple[Step, ...], tracer: glass.Tracer | None = None, waiting: bool = False) -> str:

@@ -62,6 +62,11 @@ class Stack:
         return tuple(step for step in self.steps if not step.skipped)
 
 
+def told(step: Step, **options: Any) -> Step:
+    """The step with some options set, or cleared (None)."""
+    return replace(step, options={k: v for k, v in {**step.options, **options}.items() if v is not None})
+
+
 def summary(step: Step) -> str:
     """A step in a few words."""
     parts = [f"{name.replace('_', ' ')} {_short(value)}" for name, value in step.options.items() if name not in _SILENT]

@@ -14,7 +14,7 @@ import gradio as gr
 from materialist.errors import InputError
 from materialist.io.examples import EXAMPLES, example_path
 from materialist.studio import uploads
-from materialist.studio.context import Context
+from materialist.studio.context import Context, steps
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
@@ -30,6 +30,7 @@ PREDICTORS = (
 )
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
 _SOURCES = {"exif": "from its EXIF data", "default": "assumed; it has no EXIF data that says"}
+_READY = "Ready: click an object, then move a slider."
 
 
 def layout(context: Context) -> None:
@@ -243,7 +244,7 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
         return
     known = _projects(context, session)
     yield {
-        **context.controls(session), parts["stage"]: session.stage(edits=False),
+        **context.controls(session), parts["stage"]: session.stage(edits=False), parts["steps"]: steps(session),
         parts["last"]: context.hub.kept(project),
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
@@ -251,8 +252,10 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
     }  # fmt: skip
     live.wait()
     if session.live is live:
-        ready = box("Ready: click an object, then move a slider.")
-        yield {**context.everything(session), parts["fit"]: box("Open."), parts["progress"]: ready}
+        shown = context.everything(session)
+        bad = shown[parts["stage"]]["bad"]
+        words = "Take out of the list, or switch off, what cannot be applied." if bad else _READY
+        yield {**shown, parts["fit"]: box("Open."), parts["progress"]: box(words, bad=bad)}
 
 
 def _projects(context: Context, session: Session) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from materialist.edit.recipe import DROP, Step
 from materialist.errors import InputError
+from materialist.studio.stack import told
 
 if TYPE_CHECKING:
     from materialist.studio.session import Session
@@ -34,14 +35,15 @@ def place(session: Session, x: float, y: float) -> None:
         _ = session.scene
         at = [f"{x:.0f}", f"{y:.0f}"]
         step = in_hand(session)
-        session.remember("place" if step is None else f"at of {session.stack.current}")
-        before = session.stack
+        stack = session.stack
         if step is None:
             if "mesh" not in session.thing:
                 raise InputError("Choose an object from the list, or upload one, first.")
-            step = Step("insert", {**session.thing, "at": at}, session.desk)
-            session.stack = before.add(step)
-        session.check_or(before, replace(step, options={**step.options, "at": at}))
+            step = Step("insert", session.thing, session.desk)
+            stack = stack.add(step)
+        assert stack.current is not None
+        session.change("place" if stack is not session.stack else f"at of {stack.current}",
+                       stack.put(stack.current, told(step, at=at)))  # fmt: skip
 
 
 def option(session: Session, name: str, value: str | None) -> None:
@@ -52,9 +54,9 @@ def option(session: Session, name: str, value: str | None) -> None:
         step = in_hand(session)
         session.thing = {k: v for k, v in {**session.thing, name: value}.items() if v is not None}
         if step is not None and (step.kind == "insert" or name in DROP):
-            session.remember(f"{name} of {session.stack.current}")
-            merged = {k: v for k, v in {**step.options, name: value}.items() if v is not None}
-            session.check_or(session.stack, replace(step, options=merged))
+            assert session.stack.current is not None
+            after = session.stack.put(session.stack.current, told(step, **{name: value}))
+            session.change(f"{name} of {after.current}", after)
 
 
 def let_fall(session: Session, height: float) -> list[str]:

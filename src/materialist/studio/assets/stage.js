@@ -18,7 +18,7 @@ function show() {
   if (v.picture !== undefined && v.picture !== photo.getAttribute("src")) {
     if (v.picture) photo.src = v.picture; else { photo.removeAttribute("src"); width = 0; view.classList.add("empty"); }
   }
-  if (v.badge !== undefined) { badge.textContent = v.badge; view.dataset.kind = v.badge.startsWith("Path traced") ? "final" : "live"; }
+  if (v.badge !== undefined) { badge.textContent = v.badge; view.dataset.kind = v.bad ? "bad" : v.badge.startsWith("Path traced") ? "final" : "live"; }
   if (v.fill !== undefined && v.fill !== maskUrl) {
     maskUrl = v.fill;
     outline.hidden = !v.outline;
