@@ -90,6 +90,29 @@ def test_a_selection_that_grows_takes_its_edit_along(session):
     assert len(session.stack.steps) == 2
 
 
+@pytest.mark.parametrize("what", ["toggle", "up", "down"])
+def test_another_edit_is_ticked_or_moved_and_keeps_its_region(session, what):
+    click(session)
+    session.material("hue", "90")
+    session.deselect()
+    click(session, 50, 40)
+    session.material("hue", "20")
+    masks = {step.options["hue"]: step.options["mask"] for step in session.stack.steps}
+    session.act(what, 0 if what != "up" else 1)
+    click(session, 25, 38, "add")  # still the second is in hand
+    after = {step.options["hue"]: step.options["mask"] for step in session.stack.steps}
+    assert after["90"] == masks["90"] and session.stack.steps[session.stack.current].options["hue"] == "20"
+
+
+def test_an_edit_that_is_switched_off_is_out_of_hand(session):
+    click(session)
+    session.material("hue", "90")
+    session.act("toggle", 0)
+    assert session.in_hand is None
+    session.material("hue", "20")  # of the selection, which is still there
+    assert [step.options["hue"] for step in session.stack.steps] == ["90", "20"]
+
+
 def test_choosing_a_step_brings_its_region_and_values_back(session):
     click(session)
     session.material("hue", "90")

@@ -21,6 +21,14 @@ def test_add_move_toggle_remove():
     assert stack.last("edit") == 2 and stack.last("insert") is None
 
 
+def test_ticking_and_moving_leave_the_one_in_hand():
+    stack = Stack((A, B, C), 2)
+    assert stack.toggled(0).current == 2 and stack.toggled(0).toggled(0).current == 2
+    assert stack.toggled(2).current is None and stack.toggled(2).toggled(2).current is None
+    assert stack.moved(0, 1).current == 2 and stack.moved(1, 1).current == 1 and stack.moved(2, -1).current == 1
+    assert Stack((A, B, C)).moved(0, 1).current is None and Stack((A, B, C)).toggled(1).current is None
+
+
 def test_the_stack_is_edits_yaml(tmp_path):
     stack = (
         Stack().add(A).add(B).toggled(0).add(Step("edit", {"mask": "m.png", "roughness": "+0.3", "albedo": "#c02010"}))

@@ -32,19 +32,20 @@ class Stack:
         return Stack((*self.steps[:index], step, *self.steps[index + 1 :]), index)
 
     def toggled(self, index: int) -> Stack:
-        """With a step switched off, or on again."""
+        """With a step switched off, which takes it out of hand, or on again; any other in hand stays there."""
         step = self.steps[index]
-        options = {k: v for k, v in step.options.items() if k != "skip"}
-        return self.put(index, replace(step, options=options if step.skipped else {**options, "skip": "true"}))
+        after = self.put(index, told(step, skip=None if step.skipped else "true"))
+        return after.chosen(None if after.steps[index].skipped and self.current == index else self.current)
 
     def moved(self, index: int, by: int) -> Stack:
-        """With a step further up (by = -1) or down (+1)."""
+        """With a step further up (by = -1) or down (+1); the one in hand stays in hand, wherever it is then."""
         other = index + by
         if not 0 <= other < len(self.steps):
             return self
         steps = list(self.steps)
         steps[index], steps[other] = steps[other], steps[index]
-        return Stack(tuple(steps), other)
+        current = other if self.current == index else index if self.current == other else self.current
+        return Stack(tuple(steps), current)
 
     def without(self, index: int) -> Stack:
         return Stack((*self.steps[:index], *self.steps[index + 1 :]), None)
