@@ -24,6 +24,12 @@ from materialist.types import Scene
 EDITS = "edits.yaml"
 _UNDO = 60
 """How many steps back there are."""
+DRAGGED = (
+    "hue", "saturation", "value", "albedo", "roughness", "metallic", "texture_scale", "ior", "transmission", "tint",
+)  # fmt: skip
+"""Options of materials and glass that sliders and colour pickers move: a whole drag is one change."""
+LIGHT_DRAGGED = ("rotate", "ambient", "sun", "sun_power")
+"""The same of light; `sun` is where it stands."""
 
 
 class Session:
@@ -142,7 +148,11 @@ class Session:
     # The stack of edits
 
     def material(self, name: str, value: str | None, kind: str = "edit") -> None:
-        """Set or clear (None) an option of the edit (or glass) in hand; a new one begins where there is none."""
+        """Set or clear (None) an option of the edit (or glass) in hand; see `materials`."""
+        self.materials({name: value}, kind)
+
+    def materials(self, options: dict[str, str | None], kind: str = "edit") -> None:
+        """Set or clear (None) options of the edit (or glass) in hand at once; a new one begins where there is none."""
         with self.lock:
             scene = self.scene
             mask = self.selection.mask
@@ -155,9 +165,13 @@ class Session:
                 self.remember("begin")
                 self.stack = self.stack.add(Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk))
                 step = self.stack.steps[-1]
+            elif told(step, **options) == step:
+                return
             else:
-                self.remember(f"{name} of {self.stack.current}")
-            self._put(step, **{name: value})
+                others = [value for name, value in options.items() if name not in DRAGGED]
+                moving = len(others) < len(options) and not any(others)
+                self.remember(f"{', '.join(options)} of {self.stack.current}", moving=moving)
+            self._put(step, **options)
 
     def region_step(self, kind: str, **options: str | None) -> None:
         """Lay a step such as `glass` or `remove` over the selection, or change the one in hand; checked at once."""
@@ -177,10 +191,17 @@ class Session:
         """Set or clear (None) options of the light step; it is made when the first is set."""
         with self.lock:
             _ = self.scene
-            self.remember(f"light {sorted(options)}")
             place = self.stack.last("relight")
-            self.stack = self.stack.add(Step("relight", {}, self.desk)) if place is None else self.stack.chosen(place)
-            self._put(self.stack.steps[self.stack.current or 0], **options)
+            known = self.stack.steps[place].options if place is not None else {}
+            changed = [name for name in options if options[name] != known.get(name)]
+            if not changed:
+                return
+            switched = "sun" in changed and None in (known.get("sun"), options["sun"])
+            after = self.stack.add(Step("relight", {}, self.desk)) if place is None else self.stack.chosen(place)
+            what = f"{', '.join(changed)} of light {after.current}"
+            self.remember(what, moving=set(changed) <= {*LIGHT_DRAGGED} and not switched)
+            self.stack = after
+            self._put(after.steps[after.current or 0], **options)
             if not self.stack.steps[self.stack.current or 0].options:
                 self.stack = self.stack.without(self.stack.current or 0)
                 self.save()
@@ -267,11 +288,11 @@ class Session:
 
     # Within
 
-    def change(self, what: str, after: Stack) -> None:
+    def change(self, what: str, after: Stack, *, moving: bool = False) -> None:
         """Another list of edits, and a way back. Where it cannot be applied nothing changes, and the error goes on."""
         assert self.live is not None
         self.live.edited(after.active)
-        self.remember(what)
+        self.remember(what, moving=moving)
         self.stack = after
         self.save()
 
@@ -284,10 +305,9 @@ class Session:
         self.stack = self.stack.put(self.stack.current, told(step, **options))
         self.save()
 
-    def remember(self, what: str) -> None:
-        """Keep the state for undo; a slider that moves on adds no further entry."""
-        steady = what.startswith("light ") or " of " in what
-        if not (steady and self._past and self._past[-1][0] == what):
+    def remember(self, what: str, *, moving: bool = False) -> None:
+        """Keep the state for undo; a slider (or colour) that is moving on adds no further entry."""
+        if not (moving and self._past and self._past[-1][0] == what):
             self._past = [*self._past[-_UNDO:], (what, self.stack, self.selection)]
 
     def _select(self, selection: Selection) -> None:

@@ -61,22 +61,19 @@ def wire(context: Context) -> None:
     @guarded
     def coloured(value: str, request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
-        session.material("texture", None)
-        session.material("albedo", hex_colour(value))
+        session.materials({"texture": None, "albedo": hex_colour(value)})
         return context.picture(session)
 
     @guarded
     def own(request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
-        for name in ("albedo", "texture", "hue", "saturation", "value"):
-            session.material(name, None)
+        session.materials(dict.fromkeys(("albedo", "texture", "hue", "saturation", "value")))
         return context.everything(session)
 
     @guarded
     def as_fitted(request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
-        for name in ("roughness", "metallic"):
-            session.material(name, None)
+        session.materials(dict.fromkeys(("roughness", "metallic")))
         return context.everything(session)
 
     @guarded
@@ -88,8 +85,7 @@ def wire(context: Context) -> None:
 
         suffix = uploads.checked_picture(Path(file), Path(file).name)
         read_texture(file)
-        session.material("albedo", None)
-        session.material("texture", session.keep(Path(file), "texture", suffix))
+        session.materials({"albedo": None, "texture": session.keep(Path(file), "texture", suffix)})
         return context.everything(session)
 
     parts["colour"].input(coloured, parts["colour"], context.picture_parts, **live)

@@ -42,8 +42,7 @@ def place(session: Session, x: float, y: float) -> None:
             step = Step("insert", session.thing, session.desk)
             stack = stack.add(step)
         assert stack.current is not None
-        session.change("place" if stack is not session.stack else f"at of {stack.current}",
-                       stack.put(stack.current, told(step, at=at)))  # fmt: skip
+        session.change("place", stack.put(stack.current, told(step, at=at)))
 
 
 def option(session: Session, name: str, value: str | None) -> None:
@@ -56,7 +55,8 @@ def option(session: Session, name: str, value: str | None) -> None:
         if step is not None and (step.kind == "insert" or name in DROP):
             assert session.stack.current is not None
             after = session.stack.put(session.stack.current, told(step, **{name: value}))
-            session.change(f"{name} of {after.current}", after)
+            colours = all(str(one).startswith("#") for one in (step.options.get(name), value))
+            session.change(f"{name} of {after.current}", after, moving=name in ("scale", "turn") or colours)
 
 
 def let_fall(session: Session, height: float) -> list[str]:

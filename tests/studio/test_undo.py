@@ -1,0 +1,82 @@
+"""The way back: one for each change, and one for a whole drag of a slider."""
+
+import pytest
+from studio_scenes import click
+
+from materialist.studio.tab_light import place_lamp
+from materialist.studio.tab_object import library_file
+
+
+def back(session) -> int:
+    """How many changes can be taken back."""
+    return len(session._past)
+
+
+def test_each_change_of_light_is_taken_back_alone(session):
+    before = back(session)
+    for x in (10, 25, 40):
+        place_lamp(session, x, 40)
+    assert back(session) == before + 3
+    session.undo()
+    assert len(session.stack.steps[0].options["lamps"]) == 2
+    for envmap in ("light-window.exr", "light-noon.exr", "light-noon.exr"):
+        session.light(envmap=envmap, gain="auto")
+    assert back(session) == before + 4  # the same again changes nothing
+    session.undo()
+    assert session.stack.steps[0].options["envmap"] == "light-window.exr"
+
+
+def test_a_sun_is_switched_and_moved(session):
+    before = back(session)
+    session.light(sun=["45", "40"], sun_power="1")
+    for azimuth in range(0, 90, 10):
+        session.light(sun=[str(azimuth), "40"], sun_power="1")
+    for power in ("1.2", "1.4"):
+        session.light(sun=["80", "40"], sun_power=power)
+    session.light(sun=None, sun_power=None)
+    assert back(session) == before + 4 and session.stack.steps == ()
+    for sun, power in ((["80", "40"], "1.4"), (["80", "40"], "1"), (["45", "40"], "1")):
+        session.undo()
+        assert (session.stack.steps[0].options["sun"], session.stack.steps[0].options["sun_power"]) == (sun, power)
+
+
+@pytest.mark.parametrize("name", ["rotate", "ambient"])
+def test_a_slider_of_light_is_one_change(session, name):
+    before = back(session)
+    for value in ("0.1", "0.5", None, "0.7"):
+        session.light(**{name: value})
+    assert back(session) == before + 1
+    session.light(lamps=[["10", "40", "1", "2700", "1"]])
+    session.light(**{name: "0.9"})
+    assert back(session) == before + 3
+
+
+def test_a_colour_is_dragged_and_a_texture_is_not(session):
+    click(session)
+    session.material("hue", "10")
+    before = back(session)
+    for colour in ("#101010", "#202020", "#303030"):
+        session.materials({"texture": None, "albedo": colour})
+    assert back(session) == before + 1
+    for texture in ("a.png", "b.png"):
+        session.materials({"albedo": None, "texture": texture})
+    assert back(session) == before + 3 and "albedo" not in session.stack.steps[0].options
+    session.materials(dict.fromkeys(("albedo", "texture", "hue")))
+    assert back(session) == before + 4
+    session.undo()
+    assert session.stack.steps[0].options["texture"] == "b.png"
+
+
+def test_an_object_put_elsewhere_is_a_change_each_time(session):
+    session.thing_option("mesh", library_file(session, "Cube"))
+    before = back(session)
+    for x in (50, 15, 30):
+        session.place(x, 40)
+    assert back(session) == before + 3
+    for scale in ("0.5", "0.6"):
+        session.thing_option("scale", scale)
+    for made_of in ("glass", "mirror", "#101010", "#202020", "#303030"):
+        session.thing_option("material", made_of)
+    assert back(session) == before + 7
+    session.undo()
+    assert session.stack.steps[0].options["material"] == "mirror"
