@@ -215,9 +215,10 @@ def _following(context: Context, session: Session, project: Project, job: Job) -
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
+    still_open = hub.kept(session.project) if session.project else ""
     yield {
         parts["cancel"]: gr.update(visible=False), parts["start"]: gr.update(interactive=True),
-        **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: ""} if failed else {}),
+        **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: still_open} if failed else {}),
     }  # fmt: skip
 
 
