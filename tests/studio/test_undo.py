@@ -67,6 +67,16 @@ def test_a_colour_is_dragged_and_a_texture_is_not(session):
     assert session.stack.steps[0].options["texture"] == "b.png"
 
 
+def test_what_is_pressed_again_adds_no_way_back(session):
+    click(session)
+    before = back(session)
+    for _ in range(3):
+        session.region_step("remove", shadow=None)
+    assert back(session) == before + 1
+    session.region_step("remove", shadow="0")
+    assert back(session) == before + 2 and len(session.stack.steps) == 1
+
+
 def test_an_object_put_elsewhere_is_a_change_each_time(session):
     session.thing_option("mesh", library_file(session, "Cube"))
     before = back(session)

@@ -184,6 +184,8 @@ class Session:
             if step is None:
                 step = Step(kind, {"mask": write_mask(self.desk, mask)}, self.desk)  # type: ignore[arg-type]
                 stack = stack.add(step)
+            elif told(step, **options) == step:
+                return
             assert stack.current is not None
             self.change(kind, stack.put(stack.current, told(step, **options)))
 
