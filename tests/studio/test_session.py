@@ -113,6 +113,25 @@ def test_an_edit_that_is_switched_off_is_out_of_hand(session):
     assert [step.options["hue"] for step in session.stack.steps] == ["90", "20"]
 
 
+def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
+    place_lamp(session, 40, 40)
+    session.act("toggle", 0)
+    assert session.stage()["lamps"] == [] and not light_values(session)["sun_on"]
+    session.light(rotate="30")
+    place_lamp(session, 10, 40)
+    assert [step.skipped for step in session.stack.steps] == [True, False]
+    assert len(session.stack.steps[0].options["lamps"]) == len(session.stack.steps[1].options["lamps"]) == 1
+    session.act("toggle", 1)
+    session.act("toggle", 0)
+    session.light(ambient="0.5")  # of the one that is on
+    assert session.stack.steps[0].options["ambient"] == "0.5" and len(session.stack.steps) == 2
+    session.act("choose", 1)
+    assert session.stack.current == 1 and light_values(session)["rotate"] == 30
+    assert "the edit in hand is switched off" in session.stage()["badge"]
+    session.act("toggle", 1)
+    assert session.stack.current == 1 and "off" not in session.stage()["badge"]
+
+
 def test_choosing_a_step_brings_its_region_and_values_back(session):
     click(session)
     session.material("hue", "90")

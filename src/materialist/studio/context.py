@@ -91,7 +91,7 @@ def material_values(session: Session) -> dict[str, Any]:
 
 def light_values(session: Session) -> dict[str, Any]:
     """Values of the light's controls."""
-    place = session.stack.last("relight")
+    place = session.stack.light
     options = session.stack.steps[place].options if place is not None else {}
     values: dict[str, Any] = {name: float(options.get(name, default)) for name, default in _DEFAULTS.items()}
     sun = options.get("sun")

@@ -190,10 +190,10 @@ class Session:
             self.change(kind, stack.put(stack.current, told(step, **options)))
 
     def light(self, **options: Any) -> None:
-        """Set or clear (None) options of the light step; it is made when the first is set."""
+        """Set or clear (None) options of the light (`Stack.light`); it is made when the first is set."""
         with self.lock:
             _ = self.scene
-            place = self.stack.last("relight")
+            place = self.stack.light
             known = self.stack.steps[place].options if place is not None else {}
             changed = [name for name in options if options[name] != known.get(name)]
             if not changed:
@@ -204,7 +204,7 @@ class Session:
             self.remember(what, moving=set(changed) <= {*LIGHT_DRAGGED} and not switched)
             self.stack = after
             self._put(after.steps[after.current or 0], **options)
-            if not self.stack.steps[self.stack.current or 0].options:
+            if not {*self.stack.steps[self.stack.current or 0].options} - {"skip"}:
                 self.stack = self.stack.without(self.stack.current or 0)
                 self.save()
 

@@ -52,8 +52,9 @@ def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
     camera, steps = live.scene.camera, stack.active if edits else ()
     size = {"width": camera.width, "height": camera.height}
     shown = {**size, "lamps": _lamps(stack), "serial": serial, "bad": False, **masks}
+    off = "; the edit in hand is switched off" if _in_hand_off(stack) else ""
     if final is not None and final.of(steps):
-        badge = f"Path traced, {final.spp} paths a pixel"
+        badge = f"Path traced, {final.spp} paths a pixel{off}"
         return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
     state = _asked(tracer, stack) if edits and tracer is not None else None
     waiting = state is not None and state.waiting
@@ -63,7 +64,7 @@ def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
         photo, badge = views.jpeg_url(live.scene.photo.linear), f"The photo without its edits: {error}"
         return {**shown, "picture": photo, "badge": badge, "waiting": False, "bad": True}
     shown |= {"asked": state.asked if state else 0, "waiting": waiting}
-    return {**shown, "picture": views.jpeg_url(linear), "badge": _badge(steps, tracer, waiting)}
+    return {**shown, "picture": views.jpeg_url(linear), "badge": _badge(steps, tracer, waiting) + off}
 
 
 def picture(session: Session) -> Array:
@@ -80,13 +81,18 @@ def _asked(tracer: glass.Tracer, stack: Stack) -> glass.State:
     return tracer.state
 
 
+def _in_hand_off(stack: Stack) -> bool:
+    """Whether sliders move what is not in the picture."""
+    return stack.current is not None and stack.steps[stack.current].skipped
+
+
 def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
     return tuple(one for one in steps if one is not step)
 
 
 def _lamps(stack: Stack) -> list[list[float]]:
     """(x, y) of the lamps, for their marks; none where they are not readable, which the picture tells."""
-    place = stack.last("relight")
+    place = stack.light
     lamps = stack.steps[place].options.get("lamps", []) if place is not None else []
     try:
         return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]

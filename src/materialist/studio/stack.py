@@ -59,6 +59,14 @@ class Stack:
         return places[-1] if places else None
 
     @property
+    def light(self) -> int | None:
+        """The place of the light that its controls move: the one in hand, else the last that is switched on."""
+        places = [k for k, step in enumerate(self.steps) if step.kind == "relight"]
+        if self.current in places:
+            return self.current
+        return next((k for k in reversed(places) if not self.steps[k].skipped), None)
+
+    @property
     def active(self) -> tuple[Step, ...]:
         return tuple(step for step in self.steps if not step.skipped)
 

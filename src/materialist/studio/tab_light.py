@@ -126,7 +126,7 @@ def place_lamp(session: Session, x: float, y: float) -> None:
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
     new = [f"{x:.0f}", f"{y:.0f}", f"{depth * before:.4g}", f"{kelvin:g}", f"{power:.3g}"]
-    place = session.stack.last("relight")
+    place = session.stack.light
     known = session.stack.steps[place].options.get("lamps", []) if place is not None else []
     session.light(lamps=[*known, new])
 
