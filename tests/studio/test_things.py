@@ -1,14 +1,16 @@
 """What falls, what is glass and what is painted, on a small scene with a real preview."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_meshes import floor_scene
-from studio_scenes import click
+from studio_scenes import click, named
 
 from materialist.edit.recipe import apply, read_recipe
 from materialist.errors import InputError, SetupError
 from materialist.studio import things
-from materialist.studio.context import glass_values
+from materialist.studio.context import glass_values, thing_values
 from materialist.studio.glass import State
 from materialist.studio.live import Live
 from materialist.studio.selection import read_pick
@@ -41,6 +43,33 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     assert session.undo() and session.undo()
     assert [s.kind for s in session.stack.steps] == ["insert"]
     floor.close()
+
+
+def test_choosing_an_object_brings_its_values(session):
+    session.thing_option("mesh", library_file(session, "Ring"))
+    for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):
+        session.thing_option(name, value)
+    session.place(50, 40)
+    session.thing_option("mesh", library_file(session, "Cube"))
+    for name, value in (("scale", "2"), ("turn", None), ("material", "mirror")):
+        session.thing_option(name, value)
+    assert thing_values(session) == {}  # nothing in hand: the controls are for the next
+    session.place(15, 40)
+    session.act("choose", 0)
+    ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
+    assert thing_values(session) == ring
+    shown = named().everything(session)
+    assert {name: shown[name] for name in ring} == ring
+    session.deselect()
+    session.place(30, 40)  # the next is as the controls show it
+    assert session.stack.steps[2].options == {**session.stack.steps[0].options, "at": ["30", "40"]}
+    session.act("choose", 1)
+    values = thing_values(session)
+    assert (values["thing"], values["scale"], values["turn"], values["made_of"]) == ("Cube", 2, 0, "mirror")
+    fallen = things.fallen(session.stack.steps[1], 2.5)
+    session.stack = Stack((replace(fallen, options={**fallen.options, "mesh": "mesh-1.glb"}),), 0)
+    values = thing_values(session)
+    assert (values["thing"], values["scale"], values["height"]) == (None, 2, 2.5)
 
 
 def test_what_rolls_out_of_the_picture_is_told(session):

@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from materialist.studio import things
 from materialist.studio.hub import Hub
 from materialist.studio.session import Session
 from materialist.studio.stack import summary
@@ -41,7 +42,7 @@ class Context:
         if session.live is None:
             return {}
         values: dict[str, Any] = {}
-        for read in (material_values, light_values, glass_values):
+        for read in (material_values, light_values, glass_values, thing_values):
             with suppress(TypeError, ValueError):
                 values |= read(session)
         return {self[name]: value for name, value in values.items()}
@@ -52,12 +53,13 @@ class Context:
 
     @property
     def all_parts(self) -> list[Any]:
-        return [*self.picture_parts, *(self[name] for name in (*MATERIAL, *LIGHT, *GLASS))]
+        return [*self.picture_parts, *(self[name] for name in (*MATERIAL, *LIGHT, *GLASS, *THING))]
 
 
 MATERIAL = (*SLIDERS, "colour", "texture_scale")
 LIGHT = ("rotate", "ambient", "sun_on", "azimuth", "elevation", "sun_power")
 GLASS = ("glass_ior", "glass_transmission", "glass_roughness", "glass_tint", "glass_hollow")
+THING = ("thing", "scale", "turn", "made_of", "thing_colour", "height")
 _DEFAULTS = {"rotate": 0.0, "ambient": 1.0, "azimuth": 45.0, "elevation": 40.0, "sun_power": 1.0}
 
 
@@ -115,3 +117,22 @@ def glass_values(session: Session) -> dict[str, Any]:
     hollow = str(options.get("hollow", "")).lower()
     values["glass_hollow"] = hollow if hollow == "open" else "true" if hollow in ("true", "yes", "on", "1") else ""
     return values
+
+
+def thing_values(session: Session) -> dict[str, Any]:
+    """Values of the controls of objects, where there is one in hand; else they stay."""
+    from materialist.studio.tab_glass import tint_colour
+    from materialist.studio.tab_object import LIBRARY, MATERIALS, file_of
+
+    step = things.in_hand(session)
+    if step is None:
+        return {}
+    options = step.options
+    values: dict[str, Any] = {"thing": next((n for n in LIBRARY if file_of(n) == options.get("mesh")), None)}
+    values |= {name: float(options.get(name, plain)) for name, plain in (("scale", 1.0), ("turn", 0.0))}
+    if "height" in options:
+        values["height"] = float(options["height"])
+    made_of = options.get("material", "as-is")
+    if made_of in [value for _, value in MATERIALS]:
+        return {**values, "made_of": made_of}
+    return {**values, "made_of": "colour", "thing_colour": tint_colour(made_of)}

@@ -235,6 +235,7 @@ class Session:
             self.stack = after
             if region is not None:
                 self._select(region)
+                things.take_up(self)
             self.save()
 
     def undo(self) -> bool:

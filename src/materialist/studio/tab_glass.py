@@ -103,9 +103,11 @@ def tint_text(colour: str) -> str | None:
 
 
 def tint_colour(tint: Any) -> str:
-    """The option `tint`, linear, as #rrggbb."""
+    """The option `tint`, linear numbers or #rrggbb, as #rrggbb."""
     from materialist.color import linear_to_srgb
 
+    if isinstance(tint, str) and tint.startswith("#"):
+        return tint
     numbers = tint.split(",") if isinstance(tint, str) else tint
     encoded = np.round(255 * linear_to_srgb(np.array([float(v) for v in numbers], np.float32)))
     return "#" + "".join(f"{int(v):02x}" for v in encoded)

@@ -17,7 +17,7 @@ from materialist.studio.session import Session
 from materialist.studio.tab_material import hex_colour
 
 LIBRARY = ("Ball", "Cube", "Cylinder", "Cone", "Ring", "Slab")
-_MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
+MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
 
 
 def layout(context: Context) -> None:
@@ -33,7 +33,7 @@ def layout(context: Context) -> None:
         parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
         parts["turn"] = gr.Slider(-180, 180, 0, step=1, label="Turn, degrees", buttons=[])
         with gr.Row():
-            parts["made_of"] = gr.Dropdown(list(_MATERIALS), value="as-is", label="Material", min_width=120)
+            parts["made_of"] = gr.Dropdown(list(MATERIALS), value="as-is", label="Material", min_width=120)
             parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
         gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
         with gr.Accordion("Turn the selection to glass", open=False) as parts["glass_part"]:
@@ -178,9 +178,14 @@ def _wire_fall(context: Context) -> None:
     parts["fall_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 
+def file_of(name: str) -> str:
+    """What the file of a computed mesh is called."""
+    return f"thing-{name.lower()}.ply"
+
+
 def library_file(session: Session, name: str) -> str:
     """A computed mesh as a file on the desk, +Y up."""
-    file = session.desk / f"thing-{name.lower()}.ply"
+    file = session.desk / file_of(name)
     if not file.is_file():
         shape(name).export(file)
     return file.name

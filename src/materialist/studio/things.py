@@ -59,6 +59,13 @@ def option(session: Session, name: str, value: str | None) -> None:
             session.change(f"{name} of {after.current}", after, moving=name in ("scale", "turn") or colours)
 
 
+def take_up(session: Session) -> None:
+    """The next thing is like the one in hand, as the controls show it."""
+    step = in_hand(session)
+    if step is not None and isinstance(step.options.get("mesh"), str):
+        session.thing = {k: step.options[k] for k in ("mesh", "scale", "turn", "material") if k in step.options}
+
+
 def let_fall(session: Session, height: float) -> list[str]:
     """The thing in hand, else the last one, falls where it stands and lies where it comes to rest.
 
