@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 
 from materialist.edit.recipe import Step, read_recipe
 from materialist.errors import InputError
@@ -17,6 +19,8 @@ FILES = ("mask", "texture", "envmap", "mesh", "background")
 """Options that name a file."""
 WORDS = ("thickness", "inpaint")
 """Options that name a method, or a file."""
+_LEFT = re.compile(r"(?:final|job)-(?:(\d+)-)?[0-9a-f]+\.(?:png|exr|jpg|yaml)")
+"""What `session.Session` writes for a while: which process, and a mark of the page or the content."""
 
 
 def new_name(desk: Path, stem: str, suffix: str) -> Path:
@@ -40,6 +44,14 @@ def write_mask(desk: Path, mask: Array) -> str:
     file = new_name(desk, "mask", ".png")
     write_png_bytes(file, mask.astype(np.uint8) * 255)
     return file.name
+
+
+def tidy(desk: Path) -> None:
+    """Remove path-traced pictures and lists of jobs that pages have left; those of another studio that runs stay."""
+    for file in desk.iterdir():
+        left = _LEFT.fullmatch(file.name)
+        if left and (left[1] is None or int(left[1]) == os.getpid() or not psutil.pid_exists(int(left[1]))):
+            file.unlink(missing_ok=True)
 
 
 def read_steps(desk: Path, file: Path) -> tuple[Step, ...]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
+from materialist.studio.desk import tidy
 from materialist.studio.jobs import Jobs
 from materialist.studio.session import Session
 from materialist.studio.work import Project, WorkFolder
@@ -100,14 +101,24 @@ class Hub:
         free()
         if psutil.virtual_memory().available < _LEAST_FREE:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
+        self._tidy(project, session.person)
         session.open(project)
         self.work.touch(project)
 
+    def _tidy(self, project: Project, person: str) -> None:
+        """Clear a desk that no page has open, and no job writes to, of what earlier ones left."""
+        desk = project.desk(person)
+        with self._lock:
+            pages = [one for one in self._sessions.values() if one.person == person and one.project == project]
+        if not pages and not any(job.folder == desk and not job.over for job in self.jobs.of(person)):
+            tidy(desk)
+
     def leave(self, page: str | None) -> None:
-        """Forget a page that was closed, and its memory; its work stays in the work folder, its jobs run on."""
+        """Forget a page that was closed, its memory, and its renderings; its work and its inversions go on."""
         with self._lock:
             session = self._sessions.pop(page or "", None)
         if session is not None:
+            session.end(self.jobs)
             session.close()
             del session
             free()

@@ -171,7 +171,7 @@ def _wire_final(context: Context) -> None:
                 "final", session.person, session.desk, scene=str(session.project.scene), edits=edits,
                 output=str(target), spp=spp,
             )  # fmt: skip
-            session.running["final"] = job
+            session.asked("final", job)
             for html in follow(hub.jobs, job):
                 yield {context["progress"]: html, context["stop"]: gr.update(visible=not job.over)}
             if job.state == "done":

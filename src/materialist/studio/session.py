@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import secrets
 import threading
 from pathlib import Path
@@ -22,6 +23,8 @@ from materialist.studio.work import Project
 from materialist.types import Scene
 
 EDITS = "edits.yaml"
+ENDING = ("final", "take", "fall")
+"""Kinds of jobs that end with the page that asked for them."""
 _UNDO = 60
 """How many steps back there are."""
 DRAGGED = (
@@ -51,7 +54,8 @@ class Session:
         self.mask_urls = views.mask_urls(None)
         self.running: dict[str, Job] = {}
         """The last job of each kind (invert, final, take, fall) that this page asked for."""
-        self._mark = secrets.token_hex(4)
+        self._ending: list[Job] = []
+        self._mark = f"{os.getpid()}-{secrets.token_hex(4)}"
         self._kept: bytes | None = None
         """The list of edits as this page last read or wrote it."""
         self.final: Final | None = None
@@ -74,6 +78,17 @@ class Session:
     def final_file(self) -> Path:
         """Where this page's path-traced pictures lie, without the ending: two pages may show one photo."""
         return self.desk / f"final-{self._mark}"
+
+    def asked(self, kind: str, job: Job) -> None:
+        """Note a job that this page asked for, to stop it, and to take it along where it ends with the page."""
+        self.running[kind] = job
+        if kind in ENDING:
+            self._ending = [*(one for one in self._ending if not one.over), job]
+
+    def end(self, jobs: Jobs) -> None:
+        """Stop the jobs that nobody can see any more when the page is gone; an inversion runs on."""
+        for job in self._ending:
+            jobs.stop(job)
 
     def stop(self, jobs: Jobs, kind: str) -> None:
         """Stop the last job of a kind that this page asked for."""
@@ -277,7 +292,7 @@ class Session:
             if not self.write_edits():
                 return ""
             content = (self.desk / EDITS).read_bytes()
-            copy = self.desk / f"job-{hashlib.sha256(content).hexdigest()[:12]}.yaml"
+            copy = self.desk / f"job-{os.getpid()}-{hashlib.sha256(content).hexdigest()[:12]}.yaml"
             copy.write_bytes(content)
             return str(copy)
 

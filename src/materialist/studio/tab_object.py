@@ -151,7 +151,7 @@ def _wire_fall(context: Context) -> None:
             "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
             at=[float(v) for v in step.options["at"]], output=str(file), **told,
         )  # fmt: skip
-        session.running["fall"] = job
+        session.asked("fall", job)
         for html in follow(hub.jobs, job):
             yield {parts["fall_progress"]: html, parts["fall_stop"]: gr.update(visible=not job.over)}
         if job.state == "done":

@@ -197,7 +197,7 @@ def _unpacked(context: Context, session: Session, file: Path) -> Project:
 def _following(context: Context, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
     """Progress and first pictures of an inversion until it is over."""
     parts, hub = context.parts, context.hub
-    session.running["invert"] = job
+    session.asked("invert", job)
     yield {
         parts["last"]: hub.kept(project),
         parts["cancel"]: gr.update(visible=True),

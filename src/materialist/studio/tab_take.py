@@ -75,7 +75,7 @@ def wire(context: Context) -> None:
             steps, final = session.stack.active, session.final
             job = _asked(context, session, what, file)
             if job is not None:
-                session.running["take"] = job
+                session.asked("take", job)
                 for html in follow(hub.jobs, job):
                     yield {parts["make_progress"]: html, parts["make_stop"]: gr.update(visible=not job.over)}
                 if job.state != "done":
