@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -31,19 +34,25 @@ def new_name(desk: Path, stem: str, suffix: str) -> Path:
 
 
 def keep(desk: Path, file: Path, stem: str, suffix: str) -> str:
-    """Copy an uploaded file (checked before) to the desk; returns its name there."""
-    place = new_name(desk, stem, suffix)
-    shutil.copyfile(file, place)
+    """Copy an uploaded file (checked before) to the desk; returns its name there, which tells its content."""
+    place = desk / _name(stem, file.read_bytes(), suffix)
+    if not place.is_file():
+        shutil.copyfile(file, place)
     return place.name
 
 
 def write_mask(desk: Path, mask: Array) -> str:
-    """Write a mask [H, W] bool; returns its name."""
+    """Write a mask [H, W] bool; returns its name, which tells its content: no other photo has one of that name."""
     from materialist.io.image import write_png_bytes
 
-    file = new_name(desk, "mask", ".png")
-    write_png_bytes(file, mask.astype(np.uint8) * 255)
+    file = desk / _name("mask", f"{mask.shape}".encode() + np.packbits(mask).tobytes(), ".png")
+    if not file.is_file():
+        write_png_bytes(file, mask.astype(np.uint8) * 255)
     return file.name
+
+
+def _name(stem: str, content: bytes, suffix: str) -> str:
+    return f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
 
 
 def tidy(desk: Path) -> None:
@@ -56,22 +65,40 @@ def tidy(desk: Path) -> None:
 
 def read_steps(desk: Path, file: Path) -> tuple[Step, ...]:
     """The steps of a list of edits, which may name files of this desk only. Raises InputError."""
+    return tuple(confined(step, desk) for step in read_list(file))
+
+
+def read_list(file: Path) -> list[Step]:
+    """`read_recipe`, with messages that do not say where the file lies."""
     try:
-        steps = read_recipe(file)
+        return read_recipe(file)
     except InputError as error:
         raise InputError(str(error).replace(str(file), "the file")) from error
-    return tuple(confined(step, desk) for step in steps)
 
 
 def confined(step: Step, desk: Path) -> Step:
     """The step with its files on the desk. Raises InputError where it names a file elsewhere or one that is missing."""
-    for name in (*FILES, *WORDS):
-        given = step.options.get(name)
-        for value in given if isinstance(given, list) else [] if given is None else [given]:
-            if name in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value):
-                continue
-            if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
-                raise InputError(f"The {name} {value!r} must be a plain file name; upload the file as well.")
-            if not (desk / value).is_file():
-                raise InputError(f"The {name} {value} of the list of edits is not here; make that edit again by hand.")
-    return replace(step, folder=desk)
+
+    def here(option: str, name: str) -> str:
+        if not (desk / name).is_file():
+            raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
+        return name
+
+    return replace(with_files(step, here), folder=desk)
+
+
+def with_files(step: Step, use: Callable[[str, str], str]) -> Step:
+    """The step with `use(option, name)` in the place of each file that it names. Raises InputError for odd names."""
+
+    def used(option: str, value: Any) -> Any:
+        if option in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value):
+            return value
+        if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
+            raise InputError(f"The {option} {value!r} must be a plain file name, as in mask-1.png.")
+        return use(option, value)
+
+    options = dict(step.options)
+    for option in {*FILES, *WORDS} & {*options}:
+        given = options[option]
+        options[option] = [used(option, value) for value in given] if isinstance(given, list) else used(option, given)
+    return replace(step, options=options)

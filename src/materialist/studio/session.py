@@ -16,6 +16,7 @@ from materialist.studio.desk import keep, new_name, read_steps, write_mask
 from materialist.studio.glass import Tracer
 from materialist.studio.jobs import Job, Jobs
 from materialist.studio.live import Live
+from materialist.studio.pack import unpack
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.showing import Final, stage
 from materialist.studio.stack import Stack, told
@@ -264,15 +265,14 @@ class Session:
             return True
 
     def read_edits(self, file: Path) -> None:
-        """Put the steps of an uploaded edits.yaml in place of the stack. Raises InputError, and changes nothing."""
+        """Put the steps of an uploaded edits.yaml, or of a zip of it and its files, in place of the stack.
+
+        Raises InputError, and changes nothing then.
+        """
         with self.lock:
-            scene, desk = self.scene, self.desk
-            steps = read_steps(desk, file)
-            if self.live is not None and scene is not None:
-                self.live.edited(tuple(step for step in steps if not step.skipped))
-            self.remember("load")
-            self.stack = Stack(steps)
-            self.save()
+            _ = self.scene
+            read = unpack if file.suffix.lower() == ".zip" else read_steps
+            self.change("load", Stack(read(self.desk, file)))
 
     # Showing
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ _PLAIN = {"remove": "the object", "glass": "clear"}
 """What to say of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness")
 """Options that a summary leaves out: the picture shows them."""
+_OWN = re.compile(r"[a-z]+-[0-9a-f]{12}")
+"""What `desk.keep` calls a file that was uploaded."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,10 @@ def summary(step: Step) -> str:
 def _short(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"({len(value)})" if value and isinstance(value[0], list | tuple) else ",".join(_short(v) for v in value)
-    return Path(value).stem if isinstance(value, str) and "." in value and not _number(value) else str(value)
+    if isinstance(value, str) and "." in value and not _number(value):
+        stem = Path(value).stem
+        return "own" if _OWN.fullmatch(stem) else stem
+    return str(value)
 
 
 def _number(text: str) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
 from inspect import signature
 from pathlib import Path
 from shlex import join, quote
@@ -17,6 +16,7 @@ from materialist.studio.context import Context
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
+from materialist.studio.pack import pack
 from materialist.studio.session import EDITS, Session
 from materialist.studio.showing import Final
 from materialist.studio.tab_open import PREDICTORS
@@ -49,7 +49,10 @@ def layout(context: Context) -> None:
             parts["make_stop"] = gr.Button("Stop", variant="stop", visible=False, min_width=80)
         parts["make_progress"] = gr.HTML("", js_on_load=None, elem_id="make_progress")
         parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
-        parts["recipe"] = gr.File(label="Load an edits.yaml", type="filepath", height=150, file_types=[".yaml", ".yml"])
+        parts["recipe"] = gr.File(
+            label="Load an edits.yaml, or the zip with its masks", type="filepath", height=150, elem_id="recipe",
+            file_types=[".zip", ".yaml", ".yml"],
+        )  # fmt: skip
         parts["commands"] = gr.Textbox(
             "", label="The same on the command line", lines=4, interactive=False, buttons=["copy"], elem_id="commands"
         )
@@ -135,13 +138,7 @@ def _pack_edits(session: Session, file: Path) -> None:
     """edits.yaml and every file it names."""
     if not session.write_edits():
         raise InputError("There is no edit to take away yet: change something first.")
-    desk = session.desk
-    names = {EDITS}
-    for step in session.stack.steps:
-        names |= {v for v in step.options.values() if isinstance(v, str) and (desk / v).is_file()}
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as pack:
-        for name in sorted(names):
-            pack.write(desk / name, name)
+    pack(session.stack.steps, session.desk / EDITS, file)
 
 
 def commands(session: Session) -> str:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 import shutil
 import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import InputError
@@ -33,10 +36,10 @@ def checked_picture(path: Path, name: str) -> str:
     `name` is what the user called it: shown in the message, and looked at for its ending alone.
     """
     suffix = Path(name).suffix.lower()
-    shown = " ".join(Path(name).name.split())[:60] or "The file"
+    shown = shown_name(name)
     if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
-    _check_bytes(path, shown)
+    check_bytes(path, shown)
     size = None if suffix in RAW_SUFFIXES else header_size(path, shown)
     if size is not None:
         width, height = size
@@ -108,17 +111,14 @@ def unpack_scene(archive: Path, target: Path, name: str) -> None:
 
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
-    shown = " ".join(Path(name).name.split())[:60]
-    _check_bytes(archive, shown)
+    shown = shown_name(name)
+    check_bytes(archive, shown)
     try:
-        with zipfile.ZipFile(archive) as pack:
+        with readable_zip(shown, "zip the scene folder again"), zipfile.ZipFile(archive) as pack:
             members = _members(pack, shown)
             target.mkdir()
             for entry, inside in members:
-                _unpack(pack, entry, target / inside, shown)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
-        shutil.rmtree(target, ignore_errors=True)
-        raise InputError(f"{shown} is not a readable zip file ({error}); zip the scene folder again.") from error
+                unpack_member(pack, entry, target / inside, shown)
     except InputError:
         shutil.rmtree(target, ignore_errors=True)
         raise
@@ -141,7 +141,7 @@ def _members(pack: zipfile.ZipFile, shown: str) -> list[tuple[zipfile.ZipInfo, s
     return found
 
 
-def _unpack(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, shown: str) -> None:
+def unpack_member(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, shown: str) -> None:
     """One member, never more than its header promises."""
     target.parent.mkdir(exist_ok=True)
     left = entry.file_size
@@ -149,7 +149,7 @@ def _unpack(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, shown: 
         while block := source.read(1 << 20):
             left -= len(block)
             if left < 0:
-                raise InputError(f"{shown} is not what its index says; zip the scene folder again.")
+                raise InputError(f"{shown} is not what its index says; zip it again.")
             out.write(block)
 
 
@@ -159,10 +159,10 @@ def checked_mesh(path: Path, name: str) -> str:
     PLY, STL and binary glTF hold everything in one file; OBJ is taken without its material library.
     """
     suffix = Path(name).suffix.lower()
-    shown = " ".join(Path(name).name.split())[:60]
+    shown = shown_name(name)
     if suffix not in (".ply", ".obj", ".stl", ".glb"):
         raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
-    _check_bytes(path, shown)
+    check_bytes(path, shown)
     content = path.read_bytes()
     if suffix == ".glb" and re.search(rb'"uri"\s*:\s*"(?!data:)', content):
         raise InputError(f"{shown} refers to other files; export it with everything embedded.")
@@ -172,7 +172,22 @@ def checked_mesh(path: Path, name: str) -> str:
     return suffix
 
 
-def _check_bytes(path: Path, shown: str) -> None:
+def shown_name(name: str) -> str:
+    """What the user called a file, fit for a message."""
+    return " ".join(Path(name).name.split())[:60] or "The file"
+
+
+@contextmanager
+def readable_zip(shown: str, advice: str) -> Iterator[None]:
+    """Whatever is wrong with a zip file as an InputError that ends with the advice."""
+    try:
+        yield
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+        raise InputError(f"{shown} is not a readable zip file ({error}); {advice}.") from error
+
+
+def check_bytes(path: Path, shown: str) -> None:
+    """Raises InputError for an empty file, and for one that is too large."""
     size = path.stat().st_size
     if size == 0:
         raise InputError(f"{shown} is empty (0 bytes); copy it again.")

@@ -1,0 +1,142 @@
+"""Lists of edits with their files: taken away, and loaded on the same photo or another."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from studio_scenes import block, click
+
+from materialist.edit.recipe import Step, apply
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+from materialist.io.image import write_png_bytes
+from materialist.studio import uploads
+from materialist.studio.desk import keep, write_mask
+from materialist.studio.pack import pack, unpack
+from materialist.studio.session import Session
+from materialist.studio.stack import Stack, summary
+from materialist.studio.tab_object import library_file
+
+
+@pytest.fixture
+def packed(session, tmp_path):
+    """A session with edits that name files of each kind, and the zip of them."""
+    write_png_bytes(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
+    write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
+    click(session)
+    session.materials({"texture": session.keep(tmp_path / "wood.png", "texture", ".png"), "roughness": "0.3"})
+    session.light(envmap=session.keep(tmp_path / "sky.exr", "light", ".exr"), gain="auto")
+    session.thing_option("mesh", library_file(session, "Cube"))
+    session.place(50, 40)
+    session.stack = session.stack.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))
+    session.save()
+    pack(session.stack.steps, session.desk / "edits.yaml", tmp_path / "edits.zip")
+    return session, tmp_path / "edits.zip"
+
+
+def other_photo(hub, session) -> Session:
+    """Another photo of the same shape, without edits."""
+    other = Session("me")
+    other.open(hub.work.new("Another", "me", scene=session.project.scene))
+    return other
+
+
+def test_what_was_taken_away_comes_back_on_another_photo(hub, packed):
+    session, file = packed
+    with zipfile.ZipFile(file) as made:
+        assert len(made.namelist()) == 5  # the list, a mask, a texture, a light, a mesh: also one in a list of meshes
+    other = other_photo(hub, session)
+    other.read_edits(file)
+    assert [step.kind for step in other.stack.steps] == ["edit", "relight", "insert", "drop"]
+    ours, theirs = (apply(page.scene, list(page.stack.steps)) for page in (session, other))
+    assert np.array_equal(ours.materials.albedo, theirs.materials.albedo) and len(theirs.bodies) == 1
+    assert not list(other.desk.glob("thing-*")) and not list(other.desk.glob(".load-*"))
+    assert len(list(other.desk.iterdir())) == 5
+    other.read_edits(file)  # again: the same files
+    assert len(list(other.desk.iterdir())) == 5
+    other.close()
+
+
+def test_a_list_of_another_photo_does_not_take_this_one_s_files(hub, session, tmp_path):
+    other = other_photo(hub, session)
+    for page, at in ((session, (25, 24)), (other, (50, 40))):
+        click(page, *at)
+        page.material("hue", "40")
+    masks = [page.stack.steps[0].options["mask"] for page in (session, other)]
+    assert masks[0] != masks[1]
+    before = other.stack
+    with pytest.raises(InputError, match="is not here; load the zip"):
+        other.read_edits(session.desk / "edits.yaml")
+    assert other.stack == before
+    other.close()
+
+
+def test_old_names_still_count(session, tmp_path):
+    write_png_bytes(session.desk / "mask-1.png", block().astype(np.uint8) * 255)
+    (tmp_path / "edits.yaml").write_text("- edit: {mask: mask-1.png, hue: 40}")
+    session.read_edits(tmp_path / "edits.yaml")
+    assert session.stack.steps[0].options["mask"] == "mask-1.png"
+
+
+def test_files_are_called_by_their_content(tmp_path):
+    first = write_mask(tmp_path, block())
+    assert write_mask(tmp_path, block()) == first != write_mask(tmp_path, ~block())
+    (tmp_path / "a").write_text("a")
+    (tmp_path / "b").write_text("b")
+    names = [keep(tmp_path, tmp_path / name, "mesh", ".ply") for name in "aab"]
+    assert names[0] == names[1] != names[2] and (tmp_path / names[2]).read_text() == "b"
+    assert summary(Step("insert", {"mesh": names[0], "scale": "2"})) == "Object: mesh own, scale 2"
+
+
+def zipped(folder, members):
+    with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in members.items():
+            made.writestr(name, content)
+    return folder / "a.zip"
+
+
+LIST = "- edit: {mask: m.png, hue: 3}"
+
+
+@pytest.mark.parametrize(
+    ("members", "words"),
+    [
+        ({"readme.txt": "x"}, "holds no edits.yaml"), ({"edits.yaml": LIST}, "lacks the file m.png"),
+        ({"edits.yaml": "- edit: {mask: ../m.png}", "../m.png": "x"}, "plain file name"),
+        ({"edits.yaml": "- edit: {mask: /etc/hostname}"}, "plain file name"),
+        ({"edits.yaml": LIST, "m.png": "no picture"}, "not an image"),
+        ({"edits.yaml": LIST, "a/m.png": "x"}, "lacks the file"),
+        ({"edits.yaml": LIST, "m.png": "x" * 3_000_000}, "takes up to 2 MB a file"),
+        ({"edits.yaml": "- drop: {mesh: [a.exe], at: [1, 2]}", "a.exe": "MZ"}, "not a mesh"),
+        ({"edits.yaml": "- explode: {}"}, "must be one of"),
+    ],
+)  # fmt: skip
+def test_zips_that_are_refused(tmp_path, monkeypatch, members, words):
+    monkeypatch.setattr(uploads, "MAX_MEGABYTES", 2)
+    desk = tmp_path / "desk"
+    desk.mkdir()
+    with pytest.raises(InputError, match=words) as error:
+        unpack(desk, zipped(tmp_path, members))
+    assert str(tmp_path) not in str(error.value) and not list(desk.iterdir())
+
+
+def test_a_zip_that_would_fill_the_disk_or_is_none(tmp_path, monkeypatch):
+    desk = tmp_path / "desk"
+    desk.mkdir()
+    monkeypatch.setattr(uploads, "MAX_UNPACKED", 1_000_000)
+    with pytest.raises(InputError, match="unpacks to"):
+        unpack(desk, zipped(tmp_path, {"edits.yaml": LIST, "m.png": "x" * 2_000_000}))
+    (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
+    with pytest.raises(InputError, match="not a readable zip"):
+        unpack(desk, tmp_path / "a.zip")
+    assert not list(desk.iterdir())
+
+
+def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):
+    write_png_bytes(tmp_path / "m.png", block().astype(np.uint8) * 255)
+    members = {"room/edits.yaml": LIST, "room/m.png": (tmp_path / "m.png").read_bytes(), "room/x.py": "x", "../e": "x"}
+    desk = tmp_path / "desk"
+    desk.mkdir()
+    (step,) = unpack(desk, zipped(tmp_path, members))
+    assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
+    assert not (tmp_path / "e").exists() and Stack((step,)).active
