@@ -45,6 +45,30 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     floor.close()
 
 
+def test_what_fell_in_vain_tumbles_in_another_way(session, monkeypatch):
+    session.thing_option("mesh", library_file(session, "Ball"))
+    session.place(50, 40)
+    real, seeds = session.live.edited, []
+
+    def falls(steps):
+        if steps and steps[0].kind == "drop":
+            seeds.append(steps[0].options["seed"])
+            if len(seeds) < 3:
+                raise InputError("choose another seed")
+            return session.scene
+        return real(steps)
+
+    monkeypatch.setattr(session.live, "edited", falls)
+    for _ in range(2):
+        with pytest.raises(InputError, match="seed"):
+            things.let_fall(session, 1.0)
+    assert things.tries(session, session.stack.steps[0]) == 2
+    for _ in range(2):
+        things.let_fall(session, 1.0)
+    assert seeds[:3] == ["0", "1", "2"] and session.stack.steps[0].options["seed"] == "3"
+    assert things.tries(session, session.stack.steps[0]) == 0  # one that has landed counts anew
+
+
 def test_choosing_an_object_brings_its_values(session):
     session.thing_option("mesh", library_file(session, "Ring"))
     for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):

@@ -48,6 +48,8 @@ class Session:
         self.selection = Selection()
         self.thing: dict[str, str] = {}
         """Options of the next object."""
+        self.failed_fall: tuple[Step | None, int] = (None, 0)
+        """The thing that fell last in vain, and how often."""
         self.lamp = (2700.0, 1.0, 0.75)
         """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.stack = Stack()

@@ -69,7 +69,8 @@ def take_up(session: Session) -> None:
 def let_fall(session: Session, height: float) -> list[str]:
     """The thing in hand, else the last one, falls where it stands and lies where it comes to rest.
 
-    One that has fallen falls again, and tumbles in another way. The fall takes seconds, in which the page goes on.
+    One that has fallen falls again, and tumbles in another way, as does one that fell in vain. The fall takes seconds,
+    in which the page goes on.
     Returns sentences on what did not go as expected.
 
     Raises:
@@ -81,10 +82,14 @@ def let_fall(session: Session, height: float) -> list[str]:
         stack, live, index = session.stack, session.live, last(session)
         if index is None or live is None:
             raise InputError("Place an object first; it falls where it stands.")
-        step = fallen(stack.steps[index], height)
-        trial = stack.put(index, step)
+        thing = stack.steps[index]
+        trial = stack.put(index, fallen(thing, height, tries(session, thing)))
     known = set(live.edited(stack.active).report.warnings)
-    notes = live.edited(trial.active).report.warnings  # kept there: the picture that follows finds it
+    try:
+        notes = live.edited(trial.active).report.warnings  # kept there: the picture that follows finds it
+    except InputError:
+        fell_in_vain(session, thing)
+        raise
     with session.lock:
         if session.stack.steps != stack.steps:
             raise InputError("The list of edits was changed while the object fell; let it fall again.")
@@ -94,8 +99,19 @@ def let_fall(session: Session, height: float) -> list[str]:
     return [note for note in notes if note not in known]
 
 
-def fallen(step: Step, height: float) -> Step:
-    """The `drop` that takes the place of an `insert`; of a `drop`, one with the next seed."""
+def tries(session: Session, step: Step) -> int:
+    """How often a thing fell in vain."""
+    thing, count = session.failed_fall
+    return count if thing == step else 0
+
+
+def fell_in_vain(session: Session, step: Step) -> None:
+    """Let a thing tumble in another way the next time."""
+    session.failed_fall = (step, tries(session, step) + 1)
+
+
+def fallen(step: Step, height: float, tried: int = 0) -> Step:
+    """The `drop` that takes the place of an `insert`; of a `drop`, one with the next seed, and so on when tried."""
     options = {k: v for k, v in step.options.items() if k in (*DROP, "skip") and k not in ("height", "seed")}
-    seed = int(step.options.get("seed", 0)) + 1 if step.kind == "drop" else 0
+    seed = tried + (int(step.options.get("seed", 0)) + 1 if step.kind == "drop" else 0)
     return replace(step, kind="drop", options={**options, "height": f"{height:.3g}", "seed": str(seed)})
