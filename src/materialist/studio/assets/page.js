@@ -8,6 +8,13 @@
   note.hidden = true;
   note.onclick = () => { note.hidden = true; };
   document.body.append(note);
+  // Gradio's label of a text box with a copy button names the button alone.
+  new MutationObserver(() => {
+    for (const box of document.querySelectorAll(".block textarea:not([aria-label])")) {
+      const name = box.closest(".block").querySelector("[data-testid=block-info]");
+      if (name) box.setAttribute("aria-label", name.textContent.trim());
+    }
+  }).observe(document.body, { childList: true, subtree: true });
   let timer;
   const say = (text) => {
     // The server has made markup of a message harmless; here it is text again.
