@@ -188,3 +188,39 @@ def test_what_a_mesh_was_refused_for_is_said_and_it_is_not_kept(page, running, t
     page.get_by_role("option", name="Cube").click()
     page.wait_for_function("!document.querySelector('#own_mesh').textContent.includes('leaf')")
     page.errors.clear()
+
+
+def test_a_refused_file_leaves_its_field(page, running, tmp_path):
+    opened(page, running[0])
+    (tmp_path / "broken.png").write_bytes(b"not an image")
+    (tmp_path / "empty.yaml").write_text("nothing")
+    for tab, part, name, words in (
+        ("Open", "file", "broken.png", "not an image"), ("Light", "own_map", "broken.png", "not an image"),
+        ("Take away", "recipe", "empty.yaml", "holds no list"),
+    ):  # fmt: skip
+        page.get_by_role("tab", name=tab).click()
+        page.set_input_files(f"#{part} input[type=file]", str(tmp_path / name))
+        page.wait_for_selector(f"text=/{words}/")
+        page.wait_for_function(
+            "([part, name]) => !document.querySelector(`#${part}`).textContent.includes(name)",
+            arg=[part, name.split(".")[0]],
+        )
+        page.wait_for_selector(f"#{part} input[type=file]", state="attached")
+    page.errors.clear()
+
+
+def test_the_commands_follow_the_list(page, running):
+    opened(page, running[0])
+    page.get_by_role("tab", name="Take away").click()
+    page.wait_for_selector("#commands textarea")
+    said = "document.querySelector('#commands textarea').value.includes('materialist apply')"
+    assert not page.evaluate(said)
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    page.get_by_role("tab", name="Material").click()
+    slide(page, "hue", 120)
+    page.get_by_role("tab", name="Take away").click()
+    page.wait_for_function(said)
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function(f"!{said}")
+    assert not page.errors

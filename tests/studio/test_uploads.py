@@ -135,3 +135,12 @@ def test_meshes_name_no_other_files(tmp_path):
         uploads.checked_mesh(glb, "a.glb")
     with pytest.raises(InputError, match="not a mesh"):
         uploads.checked_mesh(glb, "a.gltf")
+
+
+def test_messages_name_no_folders(tmp_path):
+    from materialist.edit.meshes import read_model
+
+    (tmp_path / "mesh-1.ply").write_text("ply\nnonsense\n")
+    with pytest.raises(InputError) as error, uploads.called(tmp_path / "mesh-1.ply", "My chair.ply"):
+        read_model(tmp_path / "mesh-1.ply")
+    assert "My chair.ply is not a readable" in str(error.value) and str(tmp_path) not in str(error.value)

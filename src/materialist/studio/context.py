@@ -31,7 +31,13 @@ class Context:
 
     def picture(self, session: Session) -> dict[Any, Any]:
         """Updates after a change of edits."""
-        return {self["stage"]: session.stage(), self["steps"]: steps(session)}
+        return {self["stage"]: session.stage(), **self.listed(session)}
+
+    def listed(self, session: Session) -> dict[Any, Any]:
+        """The list of edits, and the commands that do the same."""
+        from materialist.studio.tab_take import commands
+
+        return {self["steps"]: steps(session), self["commands"]: commands(session)}
 
     def everything(self, session: Session) -> dict[Any, Any]:
         """Updates after a change of the selection, of the step in hand, or of the scene."""
@@ -49,7 +55,7 @@ class Context:
 
     @property
     def picture_parts(self) -> list[Any]:
-        return [self["stage"], self["steps"]]
+        return [self["stage"], self["steps"], self["commands"]]
 
     @property
     def all_parts(self) -> list[Any]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from html import escape
+from pathlib import Path
 
 from materialist.studio.jobs import FAILED, QUEUED, STOPPED, Job, Jobs
+from materialist.studio.uploads import without_paths
 
 _EVERY = 0.3
 """Seconds between two looks at a job."""
@@ -46,10 +48,20 @@ def shown(jobs: Jobs, job: Job) -> str:
     if job.state == STOPPED:
         return box("Stopped; nothing was changed.")
     if job.state == FAILED:
-        return box(job.message, bad=True)
+        return box(failure(job), bad=True)
     if job.over:
         return box(f"Done in {job.seconds:.0f} s.")
     return box(f"{words(job.stage)} … {job.seconds:.0f} s", share(job))
+
+
+def failure(job: Job) -> str:
+    """Why a job failed, its files by their names alone; the photo as its owner calls it."""
+    text = job.message
+    for key in ("photo", "scene", "edits", "output", "mesh"):
+        if key in job.spec:
+            file = Path(job.spec[key])
+            text = without_paths(text, file, str(job.spec.get("title", file.name)) if key == "photo" else file.name)
+    return text
 
 
 def words(stage: str) -> str:

@@ -37,10 +37,11 @@ class Final:
 def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
     """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
 
-    Without `edits` it is the photo, at once; with them it waits for the preview where there are any, and is the photo
-    with the reason on it where they cannot be applied: what is wrong can be taken out of the list. Glass in hand is
-    asked for; `asked` counts these wishes, and `waiting` says whether the last is not fulfilled yet. The page ignores a
-    picture with an older `serial` than the one it shows.
+    Without `edits` it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
+    page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
+    reason on it: what is wrong can be taken out of the list. Glass in hand is asked for; `asked` counts these wishes,
+    and `waiting` says whether the last is not fulfilled yet. The page ignores a picture with an older `serial` than
+    the one it shows.
     """
     serial = time()
     with session.lock:
@@ -58,6 +59,8 @@ def stage(session: Session, *, edits: bool = True) -> dict[str, Any]:
         return {**shown, "picture": views.file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
     state = _asked(tracer, stack) if edits and tracer is not None else None
     waiting = state is not None and state.waiting
+    if steps and not live.ready:
+        return {**shown, "badge": "Getting the live preview ready …", "waiting": False}
     try:
         linear = live.picture(steps, tracer)
     except MaterialistError as error:

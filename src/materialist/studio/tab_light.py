@@ -30,7 +30,7 @@ def layout(context: Context) -> None:
             object_fit="cover", interactive=False, buttons=[], elem_id="lights", format="jpeg",
         )  # fmt: skip
         parts["own_map"] = gr.File(
-            label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150,
+            label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150, elem_id="own_map",
             file_types=[".exr", ".hdr", ".png", ".jpg"],
         )  # fmt: skip
         parts["rotate"] = gr.Slider(-180, 180, 0, step=1, label="Turn the light, degrees", elem_id="rotate", buttons=[])
@@ -76,7 +76,8 @@ def wire(context: Context) -> None:
         from materialist.edit.relight import read_envmap
 
         suffix = uploads.checked_picture(Path(file), Path(file).name)
-        read_envmap(file)
+        with uploads.called(Path(file), Path(file).name):
+            read_envmap(file)
         session.light(envmap=session.keep(Path(file), "light", suffix), gain="auto")
         return context.picture(session)
 
@@ -107,7 +108,8 @@ def wire(context: Context) -> None:
         return context.everything(session)
 
     parts["lights"].select(choose, None, context.picture_parts, **live)
-    parts["own_map"].upload(uploaded, parts["own_map"], context.picture_parts, **live)
+    sent = parts["own_map"].upload(uploaded, parts["own_map"], context.picture_parts, **live)
+    sent.failure(lambda: None, None, parts["own_map"], **live)  # what was refused is not there
     parts["rotate"].input(setter("rotate", 0), parts["rotate"], context.picture_parts, **live)
     parts["ambient"].input(setter("ambient", 1), parts["ambient"], context.picture_parts, **live)
     sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]

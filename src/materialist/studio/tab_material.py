@@ -84,14 +84,16 @@ def wire(context: Context) -> None:
         from materialist.edit.recipe import read_texture
 
         suffix = uploads.checked_picture(Path(file), Path(file).name)
-        read_texture(file)
+        with uploads.called(Path(file), Path(file).name):
+            read_texture(file)
         session.materials({"albedo": None, "texture": session.keep(Path(file), "texture", suffix)})
         return context.everything(session)
 
     parts["colour"].input(coloured, parts["colour"], context.picture_parts, **live)
     parts["own"].click(own, None, context.all_parts, **live)
     parts["as_fitted"].click(as_fitted, None, context.all_parts, **live)
-    parts["texture"].upload(textured, parts["texture"], context.all_parts, **live)
+    sent = parts["texture"].upload(textured, parts["texture"], context.all_parts, **live)
+    sent.failure(lambda: None, None, parts["texture"], **live)  # what was refused is not there
 
 
 def hex_colour(value: str) -> str:

@@ -87,7 +87,8 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
         suffix = uploads.checked_mesh(Path(file), Path(file).name)
         kept = session.keep(Path(file), "mesh", suffix)
         try:
-            read_model(session.desk / kept)
+            with uploads.called(session.desk / kept, Path(file).name):
+                read_model(session.desk / kept)
         except Exception:
             (session.desk / kept).unlink(missing_ok=True)
             raise

@@ -14,7 +14,7 @@ import gradio as gr
 from materialist.errors import InputError
 from materialist.io.examples import EXAMPLES, example_path
 from materialist.studio import uploads
-from materialist.studio.context import Context, steps
+from materialist.studio.context import Context
 from materialist.studio.follow import box, follow
 from materialist.studio.guard import guarded
 from materialist.studio.jobs import Job
@@ -125,7 +125,8 @@ def wire(context: Context, page: gr.Blocks) -> None:
         parts["projects"], parts["progress"],
     ]  # fmt: skip
     wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov", "token")]
-    parts["file"].change(uploaded, parts["file"], parts["facts"], **free)
+    sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **free)
+    sent.failure(lambda: None, None, parts["file"], **free)  # what was refused is not there
     parts["example"].input(exemplified, parts["example"], parts["file"], **free)
     parts["start"].click(start, wanted, opening, **free)
     parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **free)
@@ -142,7 +143,7 @@ def _facts(context: Context, session: Session, path: Path, name: str) -> str:
             "photo", session.person, thumbnail.parent, photo=str(path), thumbnail=str(thumbnail)
         )
         if job.state != "done":
-            raise InputError(job.message.replace(str(path), name))
+            raise InputError(uploads.without_paths(job.message, path, name))
         facts = job.result
         source = _SOURCES.get(facts["fov_source"], facts["fov_source"])
         lines = [f"{facts['width']} × {facts['height']} pixels", f"Field of view {facts['fov']:.1f}° ({source})"]
@@ -187,7 +188,8 @@ def _unpacked(context: Context, session: Session, file: Path) -> Project:
     project = context.hub.work.new(file.stem, session.person)
     try:
         uploads.unpack_scene(file, project.scene, file.name)
-        load_scene(project.scene)
+        with uploads.called(project.scene, file.name):
+            load_scene(project.scene)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise
@@ -245,7 +247,7 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
         return
     known = _projects(context, session)
     yield {
-        **context.controls(session), parts["stage"]: session.stage(edits=False), parts["steps"]: steps(session),
+        **context.controls(session), parts["stage"]: session.stage(edits=False), **context.listed(session),
         parts["last"]: context.hub.kept(project),
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),

@@ -40,8 +40,7 @@ SPP, FRAMES, FRAME_SPP = 256, 24, 32
 def layout(context: Context) -> None:
     """The components."""
     parts = context.parts
-    with gr.Tab("Take away", id="take") as tab:
-        parts["take_tab"] = tab
+    with gr.Tab("Take away", id="take"):
         choices = [(title, kind) for kind, (title, _) in KINDS.items()]
         parts["what"] = gr.Radio(choices, value="png", label="What to take", elem_id="what")
         with gr.Row():
@@ -106,15 +105,10 @@ def wire(context: Context) -> None:
             session.read_edits(Path(file))
         return context.everything(session)
 
-    @guarded
-    def tell(request: gr.Request) -> str:
-        session = context.session(request)
-        return commands(session) if session.live is not None else ""
-
     parts["make"].click(make, parts["what"], outputs, **free)
     parts["make_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
-    parts["recipe"].upload(load, parts["recipe"], context.all_parts, **free)
-    parts["take_tab"].select(tell, None, parts["commands"], **free)
+    sent = parts["recipe"].upload(load, parts["recipe"], context.all_parts, **free)
+    sent.failure(lambda: None, None, parts["recipe"], **free)  # what was refused is not there
 
 
 def _asked(context: Context, session: Session, what: str, file: Path) -> Job | None:
@@ -142,9 +136,13 @@ def _pack_edits(session: Session, file: Path) -> None:
 
 
 def commands(session: Session) -> str:
-    """What to type for the same result. The photo is taken apart again only where its scene is not there any more."""
+    """What to type for the same result; nothing where no photo is open.
+
+    The photo is taken apart again only where its scene is not there any more.
+    """
     project = session.project
-    assert project is not None
+    if project is None:
+        return ""
     lines, scene = [f"cd {quote(str(project.folder))}"], quote(str(project.scene))
     if project.photo is not None:
         scene = project.scene.name

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from materialist.errors import InputError
+from materialist.errors import InputError, MaterialistError
 from materialist.io.decode import RAW_SUFFIXES, check_size
 
 MAX_MEGABYTES = 60
@@ -175,6 +175,20 @@ def checked_mesh(path: Path, name: str) -> str:
 def shown_name(name: str) -> str:
     """What the user called a file, fit for a message."""
     return " ".join(Path(name).name.split())[:60] or "The file"
+
+
+def without_paths(text: str, path: str | Path, name: str) -> str:
+    """A message that names a file as the user does, and no folder of this machine."""
+    return text.replace(str(path), name).replace(f"{Path(path).parent}/", "")
+
+
+@contextmanager
+def called(path: Path, name: str) -> Iterator[None]:
+    """What goes wrong with a file, told `without_paths`."""
+    try:
+        yield
+    except MaterialistError as error:
+        raise type(error)(without_paths(str(error), path, shown_name(name))) from error
 
 
 @contextmanager
