@@ -55,6 +55,9 @@ def test_what_was_taken_away_comes_back_on_another_photo(hub, packed):
     other.read_edits(file)  # again: the same files
     assert len(list(other.desk.iterdir())) == 5
     other.close()
+    options = [step.options for step in session.stack.steps]
+    session.read_edits(file)  # where the files are still there
+    assert [step.options for step in session.stack.steps] == options
 
 
 def test_a_list_of_another_photo_does_not_take_this_one_s_files(hub, session, tmp_path):

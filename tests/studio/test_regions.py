@@ -64,7 +64,7 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     other.live.wait()
     shown = named().everything(other)
     assert len(shown["steps"]) == 2 and shown["stage"]["picture"] and shown["stage"]["bad"]
-    assert words in shown["stage"]["badge"]
+    assert words in shown["stage"]["badge"] and shown["steps"][1]["text"] in shown["stage"]["badge"]
     other.act("remove", 1)
     assert other.stage()["badge"] == "Live preview" and not other.stage()["bad"]
     other.close()

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from materialist.edit.recipe import Step, apply
+from materialist.errors import InputError
 from materialist.studio import glass
 from materialist.studio.ghost import glazed, with_bodies, with_pane
+from materialist.studio.stack import summary
 from materialist.types import Array, Scene
 
 
@@ -63,7 +65,7 @@ class Live:
                 known, start = hit, count
                 break
         for count in range(start + 1, len(steps) + 1):
-            known = apply(known, [steps[count - 1]])
+            known = _after(known, steps[count - 1])
             self._edited[_key(steps[:count])] = known
         while len(self._edited) > _KEPT:
             self._edited.popitem(last=False)
@@ -112,6 +114,15 @@ class Live:
             while len(self._panes) > _KEPT:
                 self._panes.popitem(last=False)
         return self._panes[key]
+
+
+def _after(scene: Scene, step: Step) -> Scene:
+    """The scene after one more step; an error names it as the list does."""
+    try:
+        return apply(scene, [step])
+    except InputError as error:
+        reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
+        raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
 
 def _build(scene: Scene) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import re
 import tempfile
 import zipfile
@@ -27,7 +28,7 @@ def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
 
 
 def unpack(desk: Path, archive: Path) -> tuple[Step, ...]:
-    """The steps of a zip that `pack` wrote, their files copied to the desk under names of ours.
+    """The steps of a zip that `pack` wrote, their files on the desk: under names of ours, where it lacks them.
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
@@ -56,8 +57,10 @@ def unpack(desk: Path, archive: Path) -> tuple[Step, ...]:
 
             def moved(option: str, name: str) -> str:
                 file = taken(name)
-                check = uploads.checked_mesh if option == "mesh" else uploads.checked_picture
-                return keep(desk, file, _STEMS.get(option, option), check(file, name))
+                suffix = (uploads.checked_mesh if option == "mesh" else uploads.checked_picture)(file, name)
+                if (desk / name).is_file() and filecmp.cmp(desk / name, file, shallow=False):
+                    return name
+                return keep(desk, file, _STEMS.get(option, option), suffix)
 
             steps = read_list(taken(found.removeprefix(root)))
             total = sum(members[root + name].file_size for name in named(steps) if root + name in members)
