@@ -35,6 +35,8 @@ CHECKS = Surface(
     np.zeros((1, 1), np.float32),
 )  # fmt: skip
 GLASS = constant(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
+FROSTED = constant(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
+COATED = constant((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
 
 
 def document(scene):
@@ -123,7 +125,9 @@ def test_glb_has_light_that_is_given_off():
     assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 3
 
 
-@pytest.mark.parametrize("surface", [CHECKS, GLASS, GLOW], ids=["texture", "glass", "glow"])
+@pytest.mark.parametrize(
+    "surface", [CHECKS, GLASS, GLOW, FROSTED, COATED], ids=["texture", "glass", "glow", "frosted", "coated"]
+)
 def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     from materialist.render.scene import GLASS_DEPTH, RenderScene
 
@@ -133,7 +137,8 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     target.set_envmap(scene.envmap)
     expected = target.render_path(spp=64, seed=1, max_depth=GLASS_DEPTH)
     done = export(scene, tmp_path / "scene", to="mitsuba")
-    loaded = load_xml(target.mi, done.path, bsdf="materialist_disney", spp=64, max_depth=GLASS_DEPTH)
+    own = done.path.with_name("scene_materialist.xml")
+    loaded = load_xml(target.mi, own, spp=64, max_depth=GLASS_DEPTH)
     picture = np.array(target.mi.render(loaded, seed=2))[..., :3]
     plate = np.s_[16:24, 14:26]
     np.testing.assert_allclose(picture[plate].mean((0, 1)), expected[plate].mean((0, 1)), rtol=0.05, atol=0.01)

@@ -240,3 +240,26 @@ def test_what_is_transparent_is_outside_of_a_mask(tmp_path):
     cv2.imwrite(str(tmp_path / "m.png"), pixels)
     assert read_mask(tmp_path / "m.png", (20, 30)).sum() == 100
     assert read_map(tmp_path / "m.png").min() == 1, "a map has no alpha"
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.exr"])
+def test_errors_name_the_file_that_was_asked_for(tmp_path, name, monkeypatch):
+    from materialist.io import image
+
+    def fails(path, linear):
+        raise OutputError(f"{path} cannot be written: no space left.")
+
+    monkeypatch.setattr(image, f"write_{name[2:]}", fails)
+    with pytest.raises(OutputError) as error:
+        image.write_image(tmp_path / name, np.zeros((2, 2, 3), np.float32))
+    assert str(error.value) == f"{tmp_path / name} cannot be written: no space left." and not list(tmp_path.iterdir())
+
+
+def test_a_file_in_place_of_a_folder_is_named(tmp_path):
+    from materialist.io.image import ensure_image_writable
+    from materialist.io.target import ensure_writable
+
+    (tmp_path / "photo.png").touch()
+    for check, name in ((ensure_image_writable, "deep/out.png"), (ensure_writable, "out.scene")):
+        with pytest.raises(OutputError, match=r"photo\.png is a file, not a folder"):
+            check(tmp_path / "photo.png" / name)

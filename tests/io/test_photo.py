@@ -78,6 +78,20 @@ def test_float_tiff_is_scene_linear(tmp_path):
     assert photo.hdr
 
 
+@pytest.mark.parametrize("turned", [1, 6])
+def test_half_float_tiff_is_read_as_the_same_in_single(tmp_path, turned):
+    import tifffile
+
+    values = (np.random.default_rng(0).random((12, 13, 3)) * 4).astype(np.float16)
+    found = []
+    for kind in (np.float16, np.float32):
+        tag = [(274, "H", 1, turned, False)]
+        tifffile.imwrite(tmp_path / "a.tif", values.astype(kind), photometric="rgb", extratags=tag)
+        found.append(decode_photo(tmp_path / "a.tif"))
+    assert found[0].scene_linear and found[0].linear.shape[:2] == ((12, 13) if turned == 1 else (13, 12))
+    np.testing.assert_array_equal(found[0].linear, found[1].linear)
+
+
 @pytest.mark.parametrize("unit", [1e-4, 1, 30, 4000])
 def test_exr_of_any_unit_is_exposed_by_whole_stops_and_clipped_to_ten(tmp_path, unit):
     values = np.random.default_rng(0).random((40, 50, 3), np.float32) * np.float32(unit)

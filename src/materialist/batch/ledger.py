@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
+from materialist.io.beside import make_folder
 
 LEDGER = "batch.jsonl"
 LOCK = ".batch.lock"
@@ -78,7 +79,7 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
     path = folder / LEDGER
     options = json.loads(json.dumps(options))  # as they will be read again: tuples are lists
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         held = [name for name in os.listdir(folder) if name != LOCK]
         if held and not path.is_file():
             raise InputError(f"{folder} is not empty and holds no batch; name another folder.")

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import OutputError
+from materialist.io.beside import make_folder
 from materialist.plain import plain
 
 CEILING = "ceiling"
@@ -70,7 +71,7 @@ def claim(folder: Path, *, force: bool = False) -> Path:
     try:
         if folder.is_dir() and any(folder.iterdir()) and not force:
             raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from error
     return folder

@@ -64,16 +64,34 @@ def read_recipe(path: str | Path) -> list[Step]:
 
     path = Path(path)
     try:
-        # Scalars stay texts: YAML would read the shift +0.5 as the value 0.5.
-        content = yaml.load(path.read_text("utf-8"), Loader=yaml.BaseLoader)
+        content = yaml.load(path.read_text("utf-8"), Loader=_loader())
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
+    unknown = [str(key) for key in content if key != "edits"] if isinstance(content, dict) else []
+    if unknown and "edits" in content:
+        raise InputError(f"{path} says '{unknown[0]}' beside its edits; it knows edits alone.")
     entries = content.get("edits") if isinstance(content, dict) else content
     if not isinstance(entries, list) or not entries:
         raise InputError(f"{path} holds no list of edits; begin each with '- edit:' or '- relight:'.")
     return [_step(entry, number, path) for number, entry in enumerate(entries, 1)]
+
+
+def _loader() -> Any:
+    import yaml
+
+    class Texts(yaml.BaseLoader):
+        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice."""
+
+        def construct_mapping(self, node, deep=False):
+            names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            twice = [name for k, name in enumerate(names) if name in names[:k]]
+            if twice:
+                raise yaml.constructor.ConstructorError(None, None, f"'{twice[0]}' is given twice", node.start_mark)
+            return super().construct_mapping(node, deep)
+
+    return Texts
 
 
 def _step(entry: Any, number: int, path: Path) -> Step:
@@ -87,6 +105,10 @@ def _step(entry: Any, number: int, path: Path) -> Step:
     unknown = sorted(set(options) - {*KINDS[kind], "skip"})
     if unknown:
         raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
+    try:
+        _switch(options.get("skip", "false"), "skip")
+    except InputError as error:
+        raise InputError(f"Step {number} of {path}: {error}") from error
     return Step(kind, options, path.parent)
 
 

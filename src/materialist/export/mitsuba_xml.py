@@ -1,7 +1,7 @@
-"""Mitsuba 3 scene: `scene.xml`, binary PLY meshes and float32 EXR maps, for `mi.load_file` or the `mitsuba` program.
+"""Mitsuba 3 scene: two XML files over the same binary PLY meshes and float32 EXR maps.
 
-The material is Mitsuba's own `principled` by default. With `mi.load_file(..., bsdf="materialist_disney")`, after
-`materialist.render.variant.setup()`, it is the paper's, and the picture this program's but for noise.
+`scene.xml` has Mitsuba's own materials, for `mi.load_file` or the `mitsuba` program. `scene_materialist.xml` has the
+paper's, after `materialist.render.variant.setup()`: its picture is this program's but for noise.
 """
 
 from __future__ import annotations
@@ -13,17 +13,37 @@ import numpy as np
 
 from materialist.export.parts import Part
 from materialist.io.exr import write_exr
-from materialist.render.bodies import SMOOTH
+from materialist.render.bodies import OUTSIDE, SMOOTH
+from materialist.render.bsdf import PLUGIN
 from materialist.render.envmap import on_mitsuba_grid
-from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
+from materialist.render.frosted import PLUGIN as FROSTED
+from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH, beside_u
 from materialist.types import Array, Camera, Lamp, Materials, Mesh, Scene, Surface
 
-DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH), "bsdf": "principled"}
-"""Parameters of the file and their values: `mi.load_file(path, spp=256)` sets another."""
+DEFAULTS = {"spp": "64", "max_depth": str(MAX_DEPTH)}
+"""Parameters of the files and their values: `mi.load_file(path, spp=256)` sets another."""
+FILES = {"scene.xml": False, "scene_materialist.xml": True}
+"""The files, and whether their materials are this program's own plugins."""
+MAPS = {"base_color": "albedo", "roughness": "roughness", "metallic": "metallic"}
+"""Textures, of the same names in `principled` and in `materialist_disney`, and the maps that they show."""
 
 
 def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
-    """Fill an empty folder with `scene.xml` and what it refers to, all by relative names."""
+    """Fill an empty folder with FILES and what they refer to, all by relative names."""
+    # The light on Mitsuba's own grid, whose rows run from pole to pole; its columns are padded on loading.
+    write_exr(folder / "envmap_mitsuba.exr", on_mitsuba_grid(scene.envmap, np)[:, 1:-1])
+    for part in parts:
+        (folder / f"{part.name}.ply").write_bytes(_ply(part.mesh))
+        if part.surface is None or part.surface.transmission < 1:
+            for key in MAPS.values():
+                write_exr(folder / f"{part.name}_{key}.exr", _at_least_2x2(part.materials, key))
+    for name, own in FILES.items():
+        root = _document(scene, parts, own)
+        ET.indent(root)
+        ET.ElementTree(root).write(folder / name, encoding="utf-8", xml_declaration=True)
+
+
+def _document(scene: Scene, parts: list[Part], own: bool) -> ET.Element:
     root = ET.Element("scene", version="3.0.0")
     clear = any(part.surface is not None and part.surface.transmission > 0 for part in parts)
     for name, value in (DEFAULTS | ({"max_depth": str(GLASS_DEPTH)} if clear else {})).items():
@@ -31,23 +51,19 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
     _value(root, "boolean", "embree_use_robust_intersections", "true")
     _value(_node(root, "integrator", "path"), "integer", "max_depth", "$max_depth")
     _sensor(root, scene.camera)
-    # The light on Mitsuba's own grid, whose rows run from pole to pole; its columns are padded on loading.
-    write_exr(folder / "envmap_mitsuba.exr", on_mitsuba_grid(scene.envmap, np)[:, 1:-1])
     light = _node(root, "emitter", "envmap")
     _value(light, "string", "filename", "envmap_mitsuba.exr")
     ET.SubElement(_transform(light), "rotate", y="1", angle="180")
     for part in parts:
-        (folder / f"{part.name}.ply").write_bytes(_ply(part.mesh))
         shape = _node(root, "shape", "ply")
         _value(shape, "string", "filename", f"{part.name}.ply")
-        _material(folder, shape, part)
+        _material(shape, part, own)
         if part.surface is not None and max(part.surface.emission) > 0:
             glow = ", ".join(repr(float(c)) for c in part.surface.emission)
             _value(_node(shape, "emitter", "area"), "rgb", "radiance", glow)
     for lamp in scene.lamps:
         _lamp(root, lamp)
-    ET.indent(root)
-    ET.ElementTree(root).write(folder / "scene.xml", encoding="utf-8", xml_declaration=True)
+    return root
 
 
 def _lamp(root: ET.Element, lamp: Lamp) -> None:
@@ -76,36 +92,41 @@ def _sensor(root: ET.Element, camera: Camera) -> None:
     _node(film, "rfilter", "box")
 
 
-def _material(folder: Path, shape: ET.Element, part: Part) -> None:
-    """Both sides shade alike; the three textures have the same names in `principled` and in `materialist_disney`."""
+def _material(shape: ET.Element, part: Part, own: bool) -> None:
+    """Both sides shade alike: `principled` needs a wrapper for that, which our own plugin must not have, since it
+    would take what leans away from the eye for a back."""
     surface = part.surface
     if surface is None or surface.transmission <= 0:
-        _opaque(folder, _node(_node(shape, "bsdf", "twosided"), "bsdf", "$bsdf"), part)
+        _opaque(shape if own else _node(shape, "bsdf", "twosided"), part, own)
     elif surface.transmission >= 1:
-        _glass(shape, surface)
+        _glass(shape, surface, own)
     else:
-        mixed = _node(shape, "bsdf", "blendbsdf")
-        _value(mixed, "float", "weight", repr(float(surface.transmission)))
-        _opaque(folder, _node(mixed, "bsdf", "$bsdf"), part)
-        _glass(mixed, surface)
+        mixed, weight = _node(shape, "bsdf", "blendbsdf"), repr(float(surface.transmission))
+        if own:
+            _value(_node(mixed, "texture", OUTSIDE, name="weight"), "float", "value", weight)
+        else:
+            _value(mixed, "float", "weight", weight)
+        _opaque(mixed, part, own)
+        _glass(mixed, surface, own)
 
 
-def _opaque(folder: Path, bsdf: ET.Element, part: Part) -> None:
-    names = {"base_color": "albedo", "roughness": "roughness", "metallic": "metallic"}
-    for name, key in names.items():
-        file = f"{part.name}_{key}.exr"
-        write_exr(folder / file, _at_least_2x2(part.materials, key))
+def _opaque(parent: ET.Element, part: Part, own: bool) -> None:
+    bsdf = _node(parent, "bsdf", PLUGIN if own else "principled")
+    for name, key in MAPS.items():
         texture = _node(bsdf, "texture", "bitmap", name=name)
-        _value(texture, "string", "filename", file)
+        _value(texture, "string", "filename", f"{part.name}_{key}.exr")
         _value(texture, "boolean", "raw", "true")
         _value(texture, "string", "filter_type", "nearest" if part.surface is None else "bilinear")
         _value(texture, "string", "wrap_mode", "clamp" if part.surface is None else "repeat")
 
 
-def _glass(parent: ET.Element, surface: Surface) -> None:
+def _glass(parent: ET.Element, surface: Surface, own: bool) -> None:
     """As `render.bodies` has it: each interface the root of the tint, smooth below the least roughness."""
     roughness = surface.interface_roughness
-    bsdf = _node(parent, "bsdf", "dielectric" if roughness < SMOOTH else "roughdielectric")
+    if own and roughness >= SMOOTH:
+        bsdf = _node(_node(parent, "bsdf", FROSTED), "bsdf", "roughdielectric", name="interface")
+    else:
+        bsdf = _node(parent, "bsdf", "dielectric" if roughness < SMOOTH else "roughdielectric")
     _value(bsdf, "float", "int_ior", repr(max(float(surface.ior), 1.0001)))
     _value(bsdf, "float", "ext_ior", "1.0")
     _value(bsdf, "rgb", "specular_transmittance", ", ".join(repr(float(np.sqrt(c))) for c in surface.tint))
@@ -128,7 +149,7 @@ def _ply(mesh: Mesh) -> bytes:
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}"]
     header += [f"property float {name}" for name in columns]
     header += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""]
-    vertices = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], 1).astype("<f4")  # [V, 8]
+    vertices = np.concatenate([mesh.vertices, beside_u(mesh.normals), mesh.uv], 1).astype("<f4")  # [V, 8]
     faces = np.empty(len(mesh.faces), [("count", "u1"), ("indices", "<i4", 3)])
     faces["count"], faces["indices"] = 3, mesh.faces
     return "\n".join(header).encode() + vertices.tobytes() + faces.tobytes()

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import OutputError
-from materialist.io.beside import own
+from materialist.io.beside import make_folder, own
 from materialist.io.target import files_below
 
 MARKER = "materialist-export.json"
@@ -33,7 +33,7 @@ def ensure_free(path: Path, force: bool, *, folder: bool) -> None:
                 raise OutputError(f"{path} is no export, so --force will not replace it; give another name.")
             if folder and (reason := _not_ours(path)):
                 raise OutputError(f"{path} {reason}, so --force will not replace it; move that, or give another name.")
-        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.absolute().parent)
         probe = _beside(path, "probe")
         probe.touch()
         probe.unlink()

@@ -18,6 +18,15 @@ def host() -> str:
     return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it; the OSError says which file stands in the way, if one does."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        file = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+        raise NotADirectoryError(error.errno, f"{file} is a file, not a folder") from error
+
+
 def partial(path: Path, suffix: str | None = None) -> Path:
     """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
     return path.with_name(f".partial-{own()}{path.suffix.lower() if suffix is None else suffix}")

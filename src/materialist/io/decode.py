@@ -157,7 +157,7 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
 
 
-PHOTOMETRIC, PLANAR, EXTRA = 262, 284, 338
+PHOTOMETRIC, ORIENTATION, PLANAR, EXTRA = 262, 274, 284, 338
 """Tags of TIFF: what values mean, whether channels lie apart, and what those beyond colour are (1: alpha that colours
 are multiplied by)."""
 
@@ -186,7 +186,7 @@ def _is_float_tiff(path: Path) -> bool:
 
 
 def _float_tiff(path: Path, over: float) -> Decoded:
-    """Float RGB TIFF, scene-linear; OpenCV applies the orientation itself."""
+    """Float RGB TIFF, scene-linear, of 16, 32 or 64 bits; OpenCV applies the orientation itself."""
     import cv2
     from tifffile import TiffFile
 
@@ -194,13 +194,18 @@ def _float_tiff(path: Path, over: float) -> Decoded:
         tags = file.pages[0].tags  # type: ignore[union-attr]
         apart = int(tags.valueof(PLANAR, 1))
         extra = np.atleast_1d(tags.valueof(EXTRA, 2))
+        half = file.pages[0].asarray() if file.pages[0].dtype == np.float16 else None  # OpenCV does not know it
     if apart == 2:
         raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if half is None:
+        pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+        order = [2, 1, 0, 3]
+    else:
+        pixels, order = _upright(half, int(tags.valueof(ORIENTATION, 1))), [0, 1, 2, 3]
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3 or pixels.dtype.kind != "f":
         raise InputError(f"{path} is a damaged TIFF, or one of an unusual layout; save it as 8- or 16-bit RGB.")
     check_size(pixels.shape[1], pixels.shape[0], path)
-    colour, laid = np.ascontiguousarray(pixels[..., 2::-1], np.float32), False
+    colour, laid = np.ascontiguousarray(pixels[..., order[:3]], np.float32), False
     if pixels.shape[2] == 4:
         alpha = np.clip(pixels[..., 3:].astype(np.float32), 0, 1)
         laid = over > 0 and bool(np.any(alpha < 1))

@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
-from materialist.io.beside import partial
+from materialist.io.beside import make_folder, partial
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
@@ -45,6 +45,8 @@ def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None
         os.replace(temporary, path)
     except OSError as error:
         raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(temporary), str(path))) from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -64,7 +66,7 @@ def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
 def probe_beside(path: Path) -> None:
     """Write and remove a file next to PATH, whose folder is made; raises OutputError where that fails."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         probe = partial(path, ".probe")
         probe.touch()
         probe.unlink()

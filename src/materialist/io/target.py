@@ -20,7 +20,7 @@ from pathlib import Path
 import psutil
 
 from materialist.errors import OutputError
-from materialist.io.beside import host, own
+from materialist.io.beside import host, make_folder, own
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
@@ -46,7 +46,7 @@ def ensure_writable(path: str | Path, force: bool = False) -> None:
     try:
         if target.is_symlink() or target.exists():
             _require_replaceable(path, target, force)
-        target.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(target.parent)
         probe.mkdir()
         probe.rmdir()
     except OSError as error:

@@ -233,7 +233,7 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     }  # fmt: skip
 
 
-def _beside_u(normals: Array) -> Array:
+def beside_u(normals: Array) -> Array:
     """[V, 3] unit normals, none of them exactly along X: u runs there on what faces the camera, and a shading frame
     about a normal along u is not a number."""
     along = np.abs(normals[:, :1]) > 1 - 1e-6
@@ -251,7 +251,7 @@ def _shape(mi, mesh: Mesh | Body, bsdf: dict, emitter=None):
     )
     params = mi.traverse(shape)
     params["vertex_positions"] = floats(mi, mesh.vertices)
-    params["vertex_normals"] = floats(mi, _beside_u(mesh.normals))
+    params["vertex_normals"] = floats(mi, beside_u(mesh.normals))
     params["vertex_texcoords"] = floats(mi, mesh.uv)
     params["faces"] = integers(mi, mesh.faces)
     params.update()

@@ -9,6 +9,7 @@ from typing import Any
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.io.beside import make_folder
 
 NAME = "checkpoint.pt"
 VERSION = 1
@@ -50,7 +51,7 @@ def begun(folder: Path, kind: str, *, resume: bool, device: Any = "cpu") -> dict
 def make(folder: Path) -> None:
     """Make the folder of a run, where it is not there; raises OutputError when it cannot be made."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
     except OSError as error:
         raise OutputError(f"{folder} cannot be made ({error.strerror or error}); choose another folder.") from error
 
