@@ -337,6 +337,57 @@ def test_under_a_body_nothing_of_the_photo_is_left(native):
     np.testing.assert_array_equal(out[outside], scene.photo.original[outside])
 
 
+def test_glass_goes_on_under_the_rim_of_what_stands_before_it():
+    from materialist.edit.portrait import Portrait
+    from materialist.edit.revealed import RIM, _under
+
+    covered = np.zeros((20, 30), bool)
+    covered[:, :12] = True
+    inside = np.zeros(covered.shape, np.float32)
+    inside[5:15, 10:25] = 1
+    covered &= inside == 0
+    shown = np.where(covered[..., None], 0.2, np.where(inside[..., None] > 0, 9, 0.7)).astype(np.float32)
+    more, under = _under(Portrait(inside, inside, shown), covered, shown)
+    assert more[6:14, 10:12].all() and not more[6:14, 10 + int(RIM) : 21].any()
+    np.testing.assert_array_equal(under[more], np.full((more.sum(), 1), np.float32(0.2)))
+    np.testing.assert_array_equal(under[~more], shown[~more])
+    assert _under(None, covered, shown)[0] is covered
+
+
+def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
+    """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
+    from materialist.edit.composite import into_photo
+    from materialist.edit.layers import Layers
+    from materialist.edit.portrait import Portrait
+
+    photo = rendered_scene(4).photo
+    shape = photo.linear.shape[:2]
+    grey = replace(photo, linear=np.full_like(photo.linear, 0.6), original=np.full_like(photo.original, 0.6))
+    changed, inside, everywhere = np.zeros(shape, bool), np.zeros(shape, np.float32), np.ones(shape, bool)
+    changed[:21] = True
+    inside[10:20, 14:34] = 1
+    inside[20, 14:34] = 0.25
+    changed[20, :14] = changed[20, 34:] = False
+    share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
+    base = np.full_like(grey.linear, 0.6)
+    edited = np.where(inside[..., None] > 0, 5, 0.3).astype(np.float32)  # all in shade, but for the body
+    layers = Layers(base, edited, everywhere, changed, edited, portrait=Portrait(inside, share, 0 * grey.original))
+    out = into_photo(grey, layers)
+    np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
+
+
+def test_crumbs_of_a_shadow_s_edge_are_filled_and_a_handle_s_hole_is_not():
+    from materialist.edit.hole import ISLAND, _islands
+
+    painted = np.zeros((60, 80), bool)
+    painted[10:50, 10:70] = True
+    painted[20:30, 20:30] = False  # a handle
+    painted[40:42, 40:43] = painted[45, 60] = False  # crumbs
+    painted[48:50, 30] = False  # a bay
+    found = _islands(painted, ISLAND * 2400)
+    assert found.sum() == 7 and found[40:42, 40:43].all() and found[45, 60]
+
+
 def test_what_was_removed_leaves_no_ghost_of_its_pattern():
     """The composite of a patterned block that goes is the filled photo."""
     scene = rendered_scene()

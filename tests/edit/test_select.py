@@ -1,53 +1,19 @@
 """Masks of known shapes, and what cannot be selected."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from edit_scenes import flat_scene
 from PIL import Image
+from table_top import overlap, table_top
 
-from materialist.camera import unproject
 from materialist.edit.objects import borne_out, contrast, convexity, edge_map
 from materialist.edit.select import Features, select
 from materialist.errors import InputError, MaterialistError
-from materialist.types import Camera
 
 
 @pytest.fixture(scope="module")
 def table():
-    """A textured ball with a handle, and a second ball, on a shaded floor; and the masks of the two."""
-    h, w = 120, 160
-    rng = np.random.default_rng(3)
-    y, x = np.mgrid[:h, :w]
-    ball = (x - 60) ** 2 + (y - 60) ** 2 < 28**2
-    ring = np.abs(np.hypot(x - 94, y - 60) - 12) < 3.5
-    first, second = ball | (ring & (x > 85)), (x - 130) ** 2 + (y - 85) ** 2 < 14**2
-    colour = np.broadcast_to([0.45, 0.42, 0.38], (h, w, 3)) * (0.7 + 0.4 * y / h)[..., None]
-    colour = np.where(
-        first[..., None], np.array([0.7, 0.2, 0.05]) * (0.7 + 0.5 * (60 - x) / 60)[..., None].clip(0.4, 1.3), colour
-    )
-    colour = np.where(second[..., None], [0.1, 0.2, 0.5], colour)
-    photo = (colour * rng.uniform(0.85, 1.15, (h, w, 1))).astype(np.float32).clip(0.01, 1)
-    depth = np.where(first, 2.0, np.where(second, 2.3, 3.0)).astype(np.float32)
-    depth[:4] = 0
-    base = flat_scene()
-    camera = Camera(w, h, 40.0)
-    normal = np.zeros((h, w, 3), np.float32)
-    normal[..., 2] = 1
-    scene = replace(
-        base,
-        camera=camera,
-        photo=replace(base.photo, linear=photo, original=photo, camera=camera),
-        depth=depth,
-        normal=normal,
-    )
-    assert unproject(depth, camera).shape == (h, w, 3)
-    return scene, first, second
-
-
-def overlap(a, b):
-    return (a & b).sum() / (a | b).sum()
+    return table_top()
 
 
 @pytest.mark.parametrize("click", [(50, 50), (75, 70), (45, 75)])

@@ -161,10 +161,15 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     changed, clear = layers.changed, np.ones_like(layers.changed)
     if layers.portrait is not None:
         clear = layers.portrait.inside == 0
-    if layers.relit and clear.any() and not clear.all():
+    if clear.any() and not clear.all():
         # The rim of a body: what light changes beside it goes on under it, where there is nothing to look up.
         away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
-        stack, changed, clear = stack[row, column], changed[row, column], away <= RIM
+        if layers.relit:
+            stack, changed, clear = stack[row, column], changed[row, column], away <= RIM
+        else:
+            lost = ~clear & (away <= RIM) & ~_looked_up(changed, clear)
+            stack = np.where(lost[..., None], stack[row, column], stack)
+            clear = clear | lost
     reached = (stack[..., :3] != 0).any(-1)
     if not reached.any():
         return _in_front(out, layers.portrait, photo.hdr)
@@ -187,6 +192,15 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
     return _in_front(out, layers.portrait, photo.hdr)
+
+
+def _looked_up(changed: Array, clear: Array) -> Array:
+    """[H, W] bool: where a `clear` pixel on the same side of `changed` [H, W] bool is near enough to be enlarged."""
+    import cv2
+
+    kernel = np.ones((3, 3), np.uint8)
+    near = [cv2.dilate((clear & side).astype(np.uint8), kernel) > 0 for side in (changed, ~changed)]
+    return np.where(changed, *near)
 
 
 def _in_front(picture: Array, portrait: Portrait | None, hdr: bool) -> Array:

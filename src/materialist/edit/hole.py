@@ -15,6 +15,8 @@ GROW = 0.006
 """Part of the picture's longer side by which a hole is larger than the object: pixels at a silhouette show both."""
 MOST = 0.9
 """Share of the picture's surfaces beyond which nothing is left to tell what stood behind."""
+ISLAND = 0.01
+"""What is surrounded by pixels to fill, and smaller than this part of the object, is the rest of a shadow's edge."""
 UPWARD = 0.5
 """Least Y of the normal of what a thing can stand on."""
 
@@ -57,7 +59,19 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | 
         painted = gone | cast(scene.photo.linear, plane, upward, own, gone)
     else:
         painted = gone | ((plane >= 0) & upward & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
-    return Hole(own, gone, painted)
+    return Hole(own, gone, painted | _islands(painted, ISLAND * own.sum()))
+
+
+def _islands(painted: Array, most: float) -> Array:
+    """[H, W] bool: parts of at most so many pixels that are surrounded by `painted` [H, W] bool."""
+    from scipy.ndimage import label
+
+    parts, _ = label(~painted)
+    area = np.bincount(parts.ravel())
+    area[0] = 0
+    framed = np.unique(np.concatenate([parts[0], parts[-1], parts[:, 0], parts[:, -1]]))
+    area[framed] = 0
+    return np.isin(parts, np.flatnonzero((area > 0) & (area <= most)))
 
 
 def told_shadow(value: object) -> float | None:

@@ -11,6 +11,7 @@ from dataclasses import astuple, replace
 import numpy as np
 
 from materialist.edit.layers import Layers, denoised
+from materialist.edit.portrait import Portrait
 from materialist.edit.region import placed
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Materials, Photo, Scene
@@ -67,6 +68,7 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     if covered is not None:
         covered = covered & ~studio.photo_lights(edited)  # these stay the photo's
     if covered is not None and covered.any():
+        covered, shown = _under(layers.portrait, covered, shown)
         base = np.where(covered[..., None], shown, base)
         photo = _as_body(photo, covered, shown)
     return photo, replace(
@@ -176,6 +178,18 @@ def _continued(change: Array, filled: Array, plane: Array) -> Array:
             own = filled & here
             out[own] = membrane(change, beside)[own]
     return out
+
+
+def _under(portrait: Portrait | None, covered: Array, shown: Array) -> tuple[Array, Array]:
+    """`covered` [H, W] bool and `shown` [H, W, 3], which go on under the rim of what stands before them: pixels there
+    show both."""
+    from scipy.ndimage import distance_transform_edt
+
+    if portrait is None or not (portrait.inside == 0).any():
+        return covered, shown
+    away, (row, column) = distance_transform_edt(portrait.inside > 0, return_indices=True)
+    own = (away > 0) & (away <= RIM) & covered[row, column]
+    return covered | own, np.where(own[..., None], shown[row, column], shown)
 
 
 def _as_body(photo: Photo, covered: Array, shown: Array) -> Photo:

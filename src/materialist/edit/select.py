@@ -31,8 +31,8 @@ def select(
         click: (x, y) at working size, or several, all of them on the object.
         box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
-        method: `network` (colour, depth, normals, and ClickNet; in a box as `grabcut`), `grabcut` (without ClickNet) or
-            `sam2` (needs its weights).
+        method: `network` (colour, depth, normals, and ClickNet), `grabcut` (without ClickNet) or `sam2` (needs its
+            weights).
         device: `auto`, `cpu` or `cuda`, for `sam2`.
 
     Raises:
@@ -52,14 +52,17 @@ def select(
 
         found = segment(scene.photo.linear, points, frame, device=device)
     elif frame is not None:
-        found = from_box(scene, frame)
+        from materialist.edit.boxes import in_box
+
+        found = in_box(scene, frame, network=method == "network")
     elif method == "network":
         found = from_clicks(scene, points, likely(scene, points))
     else:
         found = from_clicks(scene, points)
     found = found & (scene.depth > 0)
     if not found.any():
-        raise InputError("Nothing was found there; click another place on the object, or give a mask.")
+        other = "draw the box a little larger" if frame is not None else "click another place on the object"
+        raise InputError(f"Nothing was found there; {other}, or give a mask.")
     return found
 
 
@@ -84,16 +87,6 @@ def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | 
     shrunk = None if share is None else np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
     rough = object_around(small, seeds, shrunk)
     return refined(scene, _larger(rough, scene), points, share)
-
-
-def from_box(scene: Scene, box: tuple[int, int, int, int]) -> Array:
-    """[H, W] bool of the object inside (x0, y0, x1, y1), by GrabCut."""
-    from materialist.edit.refine import grabcut, tidy
-
-    x0, y0, x1, y1 = box
-    label = np.zeros(scene.depth.shape, np.uint8)  # cv2.GC_BGD
-    label[y0:y1, x0:x1] = 3  # cv2.GC_PR_FGD
-    return tidy(grabcut(scene, label, rounds=5), None)
 
 
 class Features:
