@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from materialist import bench
-from materialist.bench.select import clicks
+from materialist.bench.select import boxes, clicks
 from materialist.errors import InputError
 
 
@@ -26,11 +26,22 @@ def test_both_maps_are_scored(tmp_path, mitsuba):
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     rows = report["rows"]
     assert {row["method"] for row in rows} == {
-        f"{how}, {maps} maps" for how in ("network", "grabcut") for maps in ("bundled", "true")
+        f"{how}, {what}{maps} maps"
+        for how in ("network", "grabcut")
+        for what in ("", "exact box, ", "loose box, ")
+        for maps in ("bundled", "true")
     } and len(rows) >= 4
     assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)
     true = [row["iou"] for row in rows if row["method"] == "grabcut, true maps"]
     assert np.mean(true) > 0.5
+    boxed = [row["iou"] for row in rows if row["method"] == "network, exact box, true maps"]
+    assert np.mean(boxed) > 0.7
+
+
+def test_boxes_are_exact_and_loose():
+    mask = np.zeros((40, 50), bool)
+    mask[10:30, 10:40] = True
+    assert boxes(mask) == {"exact box": (10, 10, 40, 30), "loose box": (8, 8, 42, 32)}
 
 
 def test_bad_input(tmp_path):

@@ -1,4 +1,4 @@
-"""`bench select`: how well one click finds the object that it is on."""
+"""`bench select`: how well one click, or a box, finds the object that is meant."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import numpy as np
 from materialist.bench.report import Column, Report, write
 from materialist.bench.scenes import arrangement
 from materialist.bench.synthetic import SyntheticSample, make_sample
+from materialist.edit.boxes import Box, grown
 from materialist.errors import InputError
 from materialist.types import Array, Prediction, Scene
 
 NOTE = """Synthetic pictures whose objects are known (those of `bench light`); two clicks on every object of at least
-400 pixels, one in its middle and one anywhere. `bundled` maps are the bundled network's, `true` ones the truth;
-`network` is what `select` does by itself, `grabcut` the same without ClickNet. IoU is intersection over union with the
-object's mask; `good` and `lost` are the shares of clicks above 0.8 and below 0.3."""
+400 pixels, one in its middle and one anywhere, and two boxes around it, exact and a tenth too large. `bundled` maps are
+the bundled network's, `true` ones the truth; `network` is what `select` does by itself, `grabcut` the same without
+ClickNet. IoU is intersection over union with the object's mask; `good` and `lost` are the shares above 0.8 and below
+0.3."""
 COLUMNS = (
     Column("iou", "IoU", "higher"),
     Column("good", "good", "higher", 2),
@@ -28,6 +30,8 @@ LEAST = 400
 """Pixels of an object that is clicked on."""
 INSIDE = 2.5
 """Pixels from an object's border at which it is clicked on anywhere."""
+LOOSE = 0.1
+"""How much larger than the object a loose box is on every side, in units of its shorter side."""
 SPP = 100
 """Samples a pixel of the pictures."""
 
@@ -49,7 +53,7 @@ def run(
         arrangement(0, seed=seed, data=data)  # that there are meshes
     rows: list[dict[str, Any]] = []
     settings = {"scenes": scenes, "size": size, "seed": seed, "data": data is not None}
-    report = Report("Objects by one click", NOTE, settings, COLUMNS, rows, plotted=("iou",))
+    report = Report("Objects by one click, or a box", NOTE, settings, COLUMNS, rows, plotted=("iou",))
     predictor = BundledPredictor()
     for folder in (None,) if data is None else (None, data):
         for k in range(scenes):
@@ -74,7 +78,7 @@ def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[i
 def _rows(
     sample: SyntheticSample, scene: Scene, maps: str, method: str, name: str, number: int
 ) -> list[dict[str, Any]]:
-    """A row a click."""
+    """A row a click, and a box."""
     from materialist.edit.select import select
 
     rows = []
@@ -83,10 +87,23 @@ def _rows(
             continue
         for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
             found = select(scene, click=click, method=method)
-            iou = float((found & mask).sum() / (found | mask).sum())
-            row = {"method": f"{method}, {maps} maps", "sample": f"{name} object {j} click {k}", "iou": iou}
-            rows.append(row | {"good": float(iou > 0.8), "lost": float(iou < 0.3)})
+            rows.append(_row(found, mask, f"{method}, {maps} maps", f"{name} object {j} click {k}"))
+        for what, box in boxes(mask).items():
+            found = select(scene, box=box, method=method)
+            rows.append(_row(found, mask, f"{method}, {what}, {maps} maps", f"{name} object {j}"))
     return rows
+
+
+def _row(found: Array, mask: Array, method: str, sample: str) -> dict[str, Any]:
+    iou = float((found & mask).sum() / (found | mask).sum())
+    return {"method": method, "sample": sample, "iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
+
+
+def boxes(mask: Array) -> dict[str, Box]:
+    """The boxes around a mask [H, W] bool: exact, and LOOSE."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    exact = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+    return {"exact box": exact, "loose box": grown(exact, LOOSE, mask.shape)}
 
 
 def _scene(sample: SyntheticSample, found: Prediction) -> Scene:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.edit.objects import certainty
-from materialist.edit.refine import grabcut, tidy
+from materialist.edit.refine import grabcut, overlap, tidy
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
@@ -20,6 +20,8 @@ SURE, LIKELY = 0.75, 0.4
 """Certainty from which ClickNet is believed, and likelihood from which a pixel may well be of the object."""
 FITS, AGREES = 0.95, 0.8
 """Overlap of a result's own box with the given one, and with what ClickNet finds, from which it needs no such help."""
+LOST = 0.6
+"""Overlap with what ClickNet finds below which GrabCut has lost an object with the colours of its surroundings."""
 FILLS, GROWTH = 0.8, (0.04, 0.08, 0.16)
 """Overlap of boxes below which a larger one is tried, and how much larger, in units of the shorter side."""
 POSSIBLE, PROBABLE = 2, 3
@@ -38,10 +40,10 @@ def in_box(scene: Scene, box: Box, *, network: bool = True) -> Array:
         return plain
     label = _label(scene, grown(box, SLACK, scene.depth.shape), POSSIBLE)
     label[(likely > LIKELY) & (label == POSSIBLE)] = PROBABLE
-    told = tidy(grabcut(scene, label, rounds=5), None)
-    if overlap_of_boxes(plain, box) >= FITS and (plain & told).sum() >= AGREES * (plain | told).sum():
-        return plain
-    return told if told.any() else plain
+    rough, told = tidy(likely > 0.5, None), tidy(grabcut(scene, label, rounds=5), None)
+    if overlap(told, rough) < LOST:
+        told = rough
+    return plain if overlap_of_boxes(plain, box) >= FITS and overlap(plain, told) >= AGREES else told
 
 
 def grown(box: Box, share: float, shape: tuple[int, ...]) -> Box:

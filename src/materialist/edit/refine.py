@@ -34,7 +34,7 @@ def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likel
     mask = _moved(scene, rough, points, likely)
     for _ in range(_PASSES - 1):
         wider = _moved(scene, mask, points, likely)
-        settled = _overlap(wider, mask) > _SETTLED
+        settled = overlap(wider, mask) > _SETTLED
         mask = wider
         if settled:
             break
@@ -58,10 +58,10 @@ def _moved(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely
         label[y, x] = cv2.GC_FGD
     found = tidy(grabcut(scene, label.astype(np.uint8)), points)
     # GrabCut can lose an object whose colours are those of its surroundings; the rough mask is then better.
-    return found if _overlap(found, rough) > 0.6 else tidy(rough, points)
+    return found if overlap(found, rough) > 0.6 else tidy(rough, points)
 
 
-def _overlap(a: Array, b: Array) -> float:
+def overlap(a: Array, b: Array) -> float:
     """Intersection over union of two masks [H, W]."""
     return float((a & b).sum() / max((a | b).sum(), 1))
 
