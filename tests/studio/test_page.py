@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from studio_browser import READY, click_photo, opened, pixels, slide
-from studio_scenes import png_header
+from studio_scenes import package, png_header
 from studio_server import start
 
 
@@ -189,8 +189,17 @@ def test_a_password_closes_the_door(tmp_path):
 
 
 @pytest.mark.slow
-def test_two_people_at_once(browser, running):
-    address = running[0]
+def test_two_people_at_once(browser, tmp_path):
+    """Where others can reach it: on one's own machine two browsers are one person, and share the edits."""
+    process, address = start(tmp_path / "work", str(package(tmp_path)), "--host", "0.0.0.0", "--open")
+    try:
+        _two_people(browser, address)
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def _two_people(browser, address):
     contexts = [browser.new_context() for _ in range(2)]
     pages = [context.new_page() for context in contexts]
     for page in pages:
