@@ -20,7 +20,7 @@ SURE, LIKELY = 0.75, 0.4
 """Certainty from which ClickNet is believed, and likelihood from which a pixel may well be of the object."""
 FITS, AGREES = 0.95, 0.8
 """Overlap of a result's own box with the given one, and with what ClickNet finds, from which it needs no such help."""
-LOST = 0.6
+LOST = 0.5
 """Overlap with what ClickNet finds below which GrabCut has lost an object with the colours of its surroundings."""
 FILLS, GROWTH = 0.8, (0.04, 0.08, 0.16)
 """Overlap of boxes below which a larger one is tried, and how much larger, in units of the shorter side."""
