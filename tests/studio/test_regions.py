@@ -69,3 +69,18 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     assert other.stage()["badge"] == "Live preview" and not other.stage()["bad"]
     other.close()
     (session.desk / "thing-cube.ply").unlink()
+
+
+def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
+    """What was taken away can not be painted: the page says so, not only `apply`."""
+    click(session)
+    session.live.wait()
+    session.region_step("remove", shadow=None)
+    session.stack = session.stack.chosen(None)
+    session.material("hue", "90")
+    for check in (session.live.edited, lambda steps: apply(session.scene, list(steps))):
+        with pytest.raises(InputError, match="An earlier step took away what is there"):
+            check(session.stack.active)
+    assert "took away" in session.stage()["badge"]
+    session.stack = session.stack.without(0)
+    assert "took away" not in session.stage()["badge"]

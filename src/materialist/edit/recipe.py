@@ -144,12 +144,14 @@ def _plain(value: Any) -> Any:
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
-def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto") -> Scene:
+def apply(
+    scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto", onto: Scene | None = None
+) -> Scene:  # fmt: skip
     """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
 
-    `seed` is that of the steps that name none, where chance has a part in them.
+    `seed` is that of the steps that name none, where chance has a part in them; `onto` the scene after earlier steps.
     """
-    edited = scene
+    edited = scene if onto is None else onto
     for number, step in enumerate(steps, 1):
         if step.skipped:
             continue

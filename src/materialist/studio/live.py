@@ -65,7 +65,7 @@ class Live:
                 known, start = hit, count
                 break
         for count in range(start + 1, len(steps) + 1):
-            known = _after(known, steps[count - 1])
+            known = _after(self.scene, known, steps[count - 1])
             self._edited[_key(steps[:count])] = known
         while len(self._edited) > _KEPT:
             self._edited.popitem(last=False)
@@ -116,10 +116,10 @@ class Live:
         return self._panes[key]
 
 
-def _after(scene: Scene, step: Step) -> Scene:
-    """The scene after one more step; an error names it as the list does."""
+def _after(scene: Scene, edited: Scene, step: Step) -> Scene:
+    """The scene `edited` of `scene` after one more step; an error names it as the list does."""
     try:
-        return apply(scene, [step])
+        return apply(scene, [step], onto=edited)
     except InputError as error:
         reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
         raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
