@@ -95,10 +95,11 @@ def _likely(scene: Scene, box: Box) -> Array | None:
     x0, y0, x1, y1 = grown(box, SLACK, scene.depth.shape)
     inside = np.zeros(scene.depth.shape, bool)
     inside[y0:y1, x0:x1] = True
-    found = []
+    found = np.zeros(scene.depth.shape, np.float32)
     for across, down in SEEDS:
         x, y = (int(a + share * (b - a)) for a, b, share in zip(box[:2], box[2:], (across, down)))
-        share = likely(scene, [(x, y)]) if scene.depth[y, x] > 0 else None
-        if share is not None and (share * inside).sum() > WITHIN * share.sum():
-            found.append(share * inside)
-    return np.max(found, axis=0) if found else None
+        if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of what was found already
+            share = likely(scene, [(x, y)])
+            if (share * inside).sum() > WITHIN * share.sum():
+                found = np.maximum(found, share * inside)
+    return found if found.any() else None
