@@ -80,6 +80,20 @@ def test_a_run_writes_rows_with_their_ceilings(mitsuba, monkeypatch, tmp_path):
     assert (out / "plot.png").stat().st_size > 1000
 
 
+def test_what_people_wait_for_is_timed(mitsuba, monkeypatch, tmp_path):
+    from materialist.bench import edit as module
+
+    monkeypatch.setattr(module, "LARGE", 300)
+    out = bench.run("edit", output=tmp_path / "out", scenes=0, latency=64, device="cpu")
+    rows = json.loads((out / "report.json").read_text())["rows"]
+    found = {row["method"]: row for row in rows}
+    assert [*found] == [
+        "preview: built once", "preview: material", "preview: light", "final: material, 256 paths",
+        "final: into a large photo",
+    ]  # fmt: skip
+    assert all(row["seconds"] > 0 for row in rows) and found["final: into a large photo"]["sample"] == "300 x 300"
+
+
 def test_options_that_make_no_sense(tmp_path):
     for options in ({"kinds": "repaint"}, {"size": 8}, {"spp": 1}, {"latency": 3}):
         with pytest.raises(InputError):

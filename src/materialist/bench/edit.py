@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,11 @@ from materialist.bench.report import CEILING, Column, Report, write
 from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.types import Array, Scene
+from materialist.types import Array, Photo, Scene
 
 KINDS = ("hue", "metal", "relight", "insert")
+LARGE, GRAIN = 4900, 0.03
+"""Sides of the large photo that an edit is brought into, pixels, and its noise."""
 COLUMNS = (
     Column("inside", "PSNR inside", "higher", 2),
     Column("outside", "PSNR outside", "higher", 2),
@@ -37,7 +40,8 @@ object; for `insert` the cup and every pixel in which the true picture changes b
 it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited;
 `edit, predicted` with the predictor that is named; `w/o backs`: on meshes whose objects are open behind. `untouched`
 is the photo as it was. `preview` rows: seconds of one preview by cached transport, `final` those of the composite at
-256 paths, both at the latency size; CPU seconds hardly depend on what else the computer does."""
+256 paths, both at the latency size, and of bringing it into a photo of 24 megapixels (without the paths); CPU seconds
+hardly depend on what else the computer does."""
 
 
 def run(
@@ -160,7 +164,9 @@ def _scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:
 
 def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator[dict[str, Any]]:
     """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
-    from materialist.edit.composite import composite
+    from materialist.edit.composite import composite, into_photo
+    from materialist.edit.layers import render_layers
+    from materialist.edit.lights import Studio
     from materialist.edit.material import edit
     from materialist.edit.preview import Preview
     from materialist.edit.relight import relight
@@ -184,6 +190,20 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     clock = _Clock()
     composite(scene, changes[0], spp=256, seed=seed, device=device)
     yield {"method": "final: material, 256 paths", "sample": sample, **clock.read()}
+    layers = render_layers(Studio(scene, device=device), changes[0], spp=16, seed=seed)
+    photo = _enlarged(scene.photo)
+    clock = _Clock()
+    into_photo(photo, layers)
+    yield {"method": "final: into a large photo", "sample": f"{LARGE} x {LARGE}", **clock.read()}
+
+
+def _enlarged(photo: Photo) -> Photo:
+    """The same photo with an original of LARGE pixels, and grain."""
+    import cv2
+
+    large = np.asarray(cv2.resize(photo.original, (LARGE, LARGE), interpolation=cv2.INTER_CUBIC))
+    grain = GRAIN * np.random.default_rng(0).standard_normal((LARGE, LARGE, 1), np.float32)
+    return replace(photo, original=np.clip(large * (1 + grain), 0, 1))
 
 
 class _Clock:
