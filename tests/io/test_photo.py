@@ -70,6 +70,18 @@ def test_16_bits_stay_16_bits(tmp_path, suffix, channels):
     assert photo.warnings == ()
 
 
+@pytest.mark.parametrize("white", [255, 1023, 4095, 65535])
+@pytest.mark.parametrize("kind", ["P5", "P6"])
+def test_pnm_of_any_number_of_levels(tmp_path, white, kind):
+    values = np.linspace(0, white, 20 * 30).reshape(20, 30, 1).repeat(1 if kind == "P5" else 3, 2)
+    pixels = np.rint(values).astype("u1" if white < 256 else ">u2")
+    head = f"{kind}\n# of a camera\n30 20\n{white}\n".encode()
+    (tmp_path / "a.pnm").write_bytes(head + pixels.tobytes())
+    found = decode_photo(tmp_path / "a.pnm")
+    assert not found.scene_linear and found.linear.shape == (20, 30, 3)
+    np.testing.assert_allclose(linear_to_srgb(found.linear[..., 0]), pixels[..., 0] / white, atol=2 / 65535)
+
+
 def test_float_tiff_is_scene_linear(tmp_path):
     values = np.random.default_rng(0).random((12, 13, 3), np.float32) * 4
     cv2.imwrite(str(tmp_path / "a.tiff"), values[..., ::-1])

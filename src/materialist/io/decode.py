@@ -84,7 +84,16 @@ def _is_deep(image: Image.Image, path: Path) -> bool:
             return file.read(25)[24] == 16
     if image.format == "TIFF":
         return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
+    if image.format == "PPM" and image.mode != "F":
+        return _white(path) > 255
     return image.mode in ("I", "F") or image.mode.startswith("I;16")
+
+
+def _white(path: Path) -> int:
+    """The value of white in a binary PGM or PPM; 255 in other files."""
+    with path.open("rb") as file:
+        words = re.sub(rb"#[^\n]*", b" ", file.read(4096)).split(None, 4)
+    return int(words[3]) if words[0] in (b"P5", b"P6") else 255
 
 
 def _shallow(image: Image.Image, warnings: list[str]) -> Array:
@@ -135,6 +144,8 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
         raise InputError(f"{path} has an unusual pixel layout; save it as 8- or 16-bit RGB.")
     pixels = np.atleast_3d(np.asarray(decoded))
     scale = {"uint8": 255, "uint16": 65535}.get(pixels.dtype.name, 1)
+    if image.format == "PPM" and pixels.dtype == np.uint16:  # of any number of levels
+        pixels = np.rint(pixels * (scale / _white(path))).astype(np.uint16)
     grey, alpha = pixels.shape[2] <= 2, None
     if pixels.shape[2] in (2, 4):
         alpha = pixels[..., -1:].astype(np.float32) / np.float32(scale)
