@@ -376,18 +376,6 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
 
 
-def test_crumbs_of_a_shadow_s_edge_are_filled_and_a_handle_s_hole_is_not():
-    from materialist.edit.hole import ISLAND, _islands
-
-    painted = np.zeros((60, 80), bool)
-    painted[10:50, 10:70] = True
-    painted[20:30, 20:30] = False  # a handle
-    painted[40:42, 40:43] = painted[45, 60] = False  # crumbs
-    painted[48:50, 30] = False  # a bay
-    found = _islands(painted, ISLAND * 2400)
-    assert found.sum() == 7 and found[40:42, 40:43].all() and found[45, 60]
-
-
 def test_what_was_removed_leaves_no_ghost_of_its_pattern():
     """The composite of a patterned block that goes is the filled photo."""
     scene = rendered_scene()

@@ -14,6 +14,8 @@ SEEDS = ((0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7))
 """Places in a box, shares of its sides, at which ClickNet is asked what lies there."""
 WITHIN = 0.8
 """Part of what ClickNet finds at a place that must lie in the box: a table's does not."""
+VAIN = 3
+"""So many places where nothing of the kind lies are enough."""
 SLACK = 0.05
 """How far outside of a box drawn too small the object may reach, as a share of the box's shorter side."""
 SURE, LIKELY = 0.75, 0.4
@@ -95,11 +97,15 @@ def _likely(scene: Scene, box: Box) -> Array | None:
     x0, y0, x1, y1 = grown(box, SLACK, scene.depth.shape)
     inside = np.zeros(scene.depth.shape, bool)
     inside[y0:y1, x0:x1] = True
-    found = np.zeros(scene.depth.shape, np.float32)
+    found, vain = np.zeros(scene.depth.shape, np.float32), 0
     for across, down in SEEDS:
         x, y = (int(a + share * (b - a)) for a, b, share in zip(box[:2], box[2:], (across, down)))
         if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of what was found already
             share = likely(scene, [(x, y)])
             if (share * inside).sum() > WITHIN * share.sum():
                 found = np.maximum(found, share * inside)
+            else:
+                vain += 1
+        if vain == VAIN:
+            break
     return found if found.any() else None

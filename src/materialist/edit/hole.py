@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.edit.cast import cast
+from materialist.edit.halo import softness
 from materialist.edit.region import checked_region
 from materialist.errors import InputError
 from materialist.types import Array, Scene
@@ -15,6 +16,10 @@ GROW = 0.006
 """Part of the picture's longer side by which a hole is larger than the object: pixels at a silhouette show both."""
 MOST = 0.9
 """Share of the picture's surfaces beyond which nothing is left to tell what stood behind."""
+POCKET = 0.15
+"""Part of the object's size up to which what lies on no plane at its foot is of the ground."""
+BEFORE = 0.97
+"""What is nearer than the object by this factor stands before it."""
 ISLAND = 0.01
 """What is surrounded by pixels to fill, and smaller than this part of the object, is the rest of a shadow's edge."""
 UPWARD = 0.5
@@ -28,7 +33,7 @@ class Hole:
     object: Array
     """[H, W] bool: the object itself."""
     gone: Array
-    """[H, W] bool: the object and a rim of mixed pixels; depth and normals end here."""
+    """[H, W] bool: the object and a rim of mixed pixels, wide where it is out of focus; depth and normals end here."""
     painted: Array
     """[H, W] bool: where materials and photo are filled: `gone`, and what it casts on the ground."""
 
@@ -42,7 +47,7 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | 
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     height, width = own.shape
-    gone = _grown(own, round(grow * max(height, width)))
+    gone = _grown(own, round(grow * max(height, width))) | _soft_rim(scene, own)
     surface = scene.depth > 0
     if (gone & surface).sum() > MOST * surface.sum() or (gone | ~surface).all():
         if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
@@ -56,10 +61,46 @@ def make_hole(scene: Scene, mask: Array, *, grow: float = GROW, shadow: float | 
         )
     plane, upward = scene.geometry.plane_label, scene.normal[..., 1] > UPWARD
     if shadow is None:
-        painted = gone | cast(scene.photo.linear, plane, upward, own, gone)
+        ground = pockets(plane, upward, gone, POCKET * own.sum())
+        found = cast(scene.photo.linear, ground, upward | (ground != plane), own, gone)
+        gone = gone | (found & (ground != plane))
+        painted = gone | found
     else:
         painted = gone | ((plane >= 0) & upward & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
     return Hole(own, gone, painted | _islands(painted, ISLAND * own.sum()))
+
+
+def pockets(plane: Array, upward: Array, gone: Array, most: float) -> Array:
+    """`plane` [H, W] int where small parts of none (-1) beside what is `gone`, and else within one plane, are of it.
+
+    A guessed depth is that of an object a little beyond its foot. `upward` [H, W] bool: what things stand on.
+    """
+    import cv2
+    from scipy.ndimage import find_objects, label
+
+    out = plane.copy()
+    parts, count = label((plane < 0) & ~gone)
+    area = np.bincount(parts.ravel(), minlength=count + 1)
+    for number, box in enumerate(find_objects(parts), 1):
+        box = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)
+        part = parts[box] == number
+        rim = cv2.dilate(part.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        beside = plane[box][rim & ~part & ~gone[box]]
+        known = np.unique(beside[beside >= 0])
+        within = area[number] <= most and (rim & gone[box]).any() and len(known) == 1 and (beside >= 0).all()
+        if within and upward[plane == known[0]].mean() > 0.5:
+            out[box][part] = known[0]
+    return out
+
+
+def _soft_rim(scene: Scene, own: Array) -> Array:
+    """[H, W] bool: the object as far as it colours its surroundings, but for what stands before it."""
+    from scipy.ndimage import distance_transform_edt
+
+    rim = _grown(own, softness(scene.photo.linear, own))
+    row, column = distance_transform_edt(~own, return_distances=False, return_indices=True)
+    depth = scene.depth[row, column]
+    return rim & ((scene.depth == 0) | (scene.depth > BEFORE * depth) | own)
 
 
 def _islands(painted: Array, most: float) -> Array:

@@ -13,6 +13,8 @@ STRIP = 128
 """Native rows handled at a time: bounds the memory."""
 TILE, BORDER = 32, 4
 """Working pixels: sides of the parts in which a matte is made, and how far from the mask's border one may reach."""
+MOST = 0.4
+"""Part of a picture near the border from which it is made at once: parts overlap."""
 NEARBY, COARSE = 2.5, 0.2
 """Working pixels over which a matte takes means of colours (standard deviation), and the grid of these in its units."""
 _RANGE = 0.06
@@ -107,6 +109,8 @@ def matte(mask: Array, large: Array) -> Array:
         return soft
     wide = np.ones((2 * BORDER + 1,) * 2, np.uint8)
     border = np.asarray(cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide))
+    if border.mean() > MOST:
+        return _shares(soft, large, scale)
     alpha = (soft >= 0.5).astype(np.float32)
     margin = int(np.ceil((3 * NEARBY + 4) * scale))
     for tile in strips(mask.shape[0], TILE):

@@ -23,7 +23,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError) as error:
-        file = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+        file = next((path for path in (folder, *folder.parents) if os.path.lexists(path)), folder)
         raise NotADirectoryError(error.errno, f"{file} is a file, not a folder") from error
 
 

@@ -205,7 +205,7 @@ def _float_tiff(path: Path, over: float) -> Decoded:
         tags = file.pages[0].tags  # type: ignore[union-attr]
         apart = int(tags.valueof(PLANAR, 1))
         extra = np.atleast_1d(tags.valueof(EXTRA, 2))
-        half = file.pages[0].asarray() if file.pages[0].dtype == np.float16 else None  # OpenCV does not know it
+        half = _half(file, path) if file.pages[0].dtype == np.float16 else None
     if apart == 2:
         raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
     if half is None:
@@ -222,6 +222,16 @@ def _float_tiff(path: Path, over: float) -> Decoded:
         laid = over > 0 and bool(np.any(alpha < 1))
         colour = (colour if extra[0] == 1 else colour * alpha) + np.float32(over) * (1 - alpha)
     return Decoded(colour, True, {}, ["Transparent parts are laid over white."] * laid, laid)
+
+
+def _half(file: Any, path: Path) -> Array:
+    """Pixels [H, W, C] of 16-bit floats, which OpenCV does not know."""
+    try:
+        return np.asarray(file.pages[0].asarray())
+    except ValueError as error:  # a compression that needs a library of its own
+        if "imagecodecs" not in str(error):
+            raise
+        raise InputError(f"{path} is compressed in an unusual way; save it uncompressed, or with ZIP.") from error
 
 
 def _exr(path: Path, over: float) -> Decoded:

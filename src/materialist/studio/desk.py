@@ -16,6 +16,7 @@ import psutil
 
 from materialist.edit.recipe import Step, read_recipe
 from materialist.errors import InputError
+from materialist.io.beside import partial
 from materialist.types import Array
 
 FILES = ("mask", "texture", "envmap", "mesh", "background")
@@ -35,10 +36,7 @@ def new_name(desk: Path, stem: str, suffix: str) -> Path:
 
 def keep(desk: Path, file: Path, stem: str, suffix: str) -> str:
     """Copy an uploaded file (checked before) to the desk; returns its name there, which tells its content."""
-    place = desk / _name(stem, file.read_bytes(), suffix)
-    if not place.is_file():
-        shutil.copyfile(file, place)
-    return place.name
+    return _whole(desk / _name(stem, file.read_bytes(), suffix), lambda place: shutil.copyfile(file, place))
 
 
 def write_mask(desk: Path, mask: Array) -> str:
@@ -46,8 +44,18 @@ def write_mask(desk: Path, mask: Array) -> str:
     from materialist.io.image import write_png_bytes
 
     file = desk / _name("mask", f"{mask.shape}".encode() + np.packbits(mask).tobytes(), ".png")
+    return _whole(file, lambda place: write_png_bytes(place, mask.astype(np.uint8) * 255))
+
+
+def _whole(file: Path, write: Callable[[Path], Any]) -> str:
+    """The name of a file that is there whole, or is written so."""
     if not file.is_file():
-        write_png_bytes(file, mask.astype(np.uint8) * 255)
+        temporary = partial(file)
+        try:
+            write(temporary)
+            os.replace(temporary, file)
+        finally:
+            temporary.unlink(missing_ok=True)
     return file.name
 
 

@@ -121,7 +121,7 @@ def _after(scene: Scene, edited: Scene, step: Step) -> Scene:
     try:
         return apply(scene, [step], onto=edited)
     except InputError as error:
-        reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
+        reason = str(error).removeprefix(f"Step 1 ({step.kind}): ").replace(f"{step.folder}/", "")
         raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
 

@@ -37,7 +37,8 @@ def unpack(desk: Path, archive: Path) -> tuple[Step, ...]:
     with tempfile.TemporaryDirectory(dir=desk, prefix=".load-") as place, uploads.readable_zip(shown, _ADVICE):
         folder = Path(place)
         with zipfile.ZipFile(archive) as given:
-            members = {info.filename: info for info in given.infolist()[:10_000]}
+            members = {info.filename.replace("\\", "/"): info for info in given.infolist()[:10_000]}
+            members = {name: info for name, info in members.items() if not name.startswith("__MACOSX/")}
             found = next((name for name in members if re.fullmatch(r"([^/]+/)?edits\.ya?ml", name)), None)
             if found is None:
                 raise InputError(f"{shown} holds no edits.yaml; {_ADVICE}.")

@@ -261,7 +261,10 @@ class Session:
         with self.lock:
             if not self._past:
                 return False
+            self._mine()
             _, self.stack, selection = self._past.pop()
+            if self._past:  # a slider that moves on now begins anew
+                self._past[-1] = ("", *self._past[-1][1:])
             self._select(selection)
             self.save()
             return True
@@ -327,6 +330,8 @@ class Session:
 
     def remember(self, what: str, *, moving: bool = False) -> None:
         """Keep the state for undo; a slider (or colour) that is moving on adds no further entry."""
+        if what != "select":
+            self._mine()
         if not (moving and self._past and self._past[-1][0] == what):
             self._past = [*self._past[-_UNDO:], (what, self.stack, self.selection)]
 
@@ -339,7 +344,15 @@ class Session:
         step = stack.steps[stack.current] if stack.current is not None else None
         if step is None or not {*REGION} & {*step.options}:
             return Selection()
-        return Selection((region_of(self.scene, step),))
+        try:
+            return Selection((region_of(self.scene, step),))
+        except InputError as error:
+            raise InputError(str(error).replace(f"{step.folder}/", "")) from error
+
+    def _mine(self) -> None:
+        """Raises InputError where somebody else has written the edits since: another page, or a person."""
+        if self.project is not None and _content(self.desk / EDITS) != self._kept:
+            raise InputError("These edits were changed in another place; reload the page to go on with those.")
 
     def save(self) -> None:
         """Write edits.yaml, and let go of the glass that is no longer in it.
@@ -348,9 +361,8 @@ class Session:
         """
         if self.project is None:
             return
+        self._mine()
         file = self.desk / EDITS
-        if _content(file) != self._kept:
-            raise InputError("These edits were changed in another place; reload the page to go on with those.")
         if self.glass is not None:
             self.glass.keep(self.stack.steps)
         if self.stack.steps:

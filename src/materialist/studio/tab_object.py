@@ -149,7 +149,8 @@ def _wire_fall(context: Context) -> None:
         step, file = session.stack.steps[place], session.new_name("fall", ".mp4")
         told = {k: step.options[k] for k in ("scale", "material", "height", "seed") if k in step.options}
         told = {"height": f"{float(height):.3g}", **told}
-        told["seed"] = str(int(told.get("seed", 0)) + things.tries(session, step))
+        if step.kind == "insert":  # what has fallen falls in the video as it did
+            told["seed"] = str(things.tries(session, step))
         job = hub.jobs.submit(
             "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
             at=[float(v) for v in step.options["at"]], output=str(file), **told,
@@ -157,7 +158,7 @@ def _wire_fall(context: Context) -> None:
         session.asked("fall", job)
         for html in follow(hub.jobs, job):
             yield {parts["fall_progress"]: html, parts["fall_stop"]: gr.update(visible=not job.over)}
-        if job.state == FAILED:
+        if job.state == FAILED and step.kind == "insert":
             things.fell_in_vain(session, step)
         if job.state == "done":
             yield {parts["fall_video"]: gr.update(value=hub.handed(file), visible=True)}

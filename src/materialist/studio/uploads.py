@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import re
 import shutil
 import zipfile
@@ -191,12 +192,16 @@ def called(path: Path, name: str) -> Iterator[None]:
         raise type(error)(without_paths(str(error), path, shown_name(name))) from error
 
 
+_DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
+"""What the packers of a zip raise."""
+
+
 @contextmanager
 def readable_zip(shown: str, advice: str) -> Iterator[None]:
     """Whatever is wrong with a zip file as an InputError that ends with the advice."""
     try:
         yield
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+    except (*_DAMAGED, NotImplementedError, RuntimeError, EOFError, OSError) as error:
         raise InputError(f"{shown} is not a readable zip file ({error}); {advice}.") from error
 
 
