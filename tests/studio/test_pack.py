@@ -143,3 +143,26 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     (step,) = unpack(desk, zipped(tmp_path, members))
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
     assert not (tmp_path / "e").exists() and Stack((step,)).active
+
+
+@pytest.mark.parametrize("names", ["__MACOSX/edits.yaml room/edits.yaml room/m.png", "room\\edits.yaml room\\m.png"])
+def test_zips_of_other_systems(tmp_path, names):
+    write_png_bytes(tmp_path / "m.png", block().astype(np.uint8) * 255)
+    content = {"png": (tmp_path / "m.png").read_bytes(), "yaml": LIST}
+    members = {name: b"\0\5" if "MACOSX" in name else content[name.rpartition(".")[2]] for name in names.split()}
+    desk = tmp_path / "desk"
+    desk.mkdir()
+    (step,) = unpack(desk, zipped(tmp_path, members))
+    assert step.options["hue"] == "3" and (desk / step.options["mask"]).is_file()
+
+
+def test_a_zip_whose_packing_is_damaged(tmp_path):
+    desk = tmp_path / "desk"
+    desk.mkdir()
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_LZMA) as made:
+        made.writestr("edits.yaml", LIST * 50)
+    content = bytearray((tmp_path / "a.zip").read_bytes())
+    content[60:75] = b"\xff" * 15
+    (tmp_path / "a.zip").write_bytes(content)
+    with pytest.raises(InputError, match="not a readable zip"):
+        unpack(desk, tmp_path / "a.zip")

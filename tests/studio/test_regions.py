@@ -84,3 +84,16 @@ def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
     assert "took away" in session.stage()["badge"]
     session.stack = session.stack.without(0)
     assert "took away" not in session.stage()["badge"]
+
+
+def test_no_folders_in_what_is_said_of_a_region(session):
+    click(session)
+    session.live.wait()
+    session.material("hue", "20")
+    (session.desk / session.stack.steps[0].options["mask"]).write_bytes(b"no mask")
+    session.live._edited.clear()
+    session.stack = session.stack.chosen(None)
+    with pytest.raises(InputError, match="mask-") as error:
+        session.act("choose", 0)
+    assert str(session.desk) not in str(error.value) and str(session.desk) not in session.stage()["badge"]
+    assert "mask-" in session.stage()["badge"]

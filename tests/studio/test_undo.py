@@ -3,6 +3,7 @@
 import pytest
 from studio_scenes import click
 
+from materialist.errors import InputError
 from materialist.studio.tab_light import place_lamp
 from materialist.studio.tab_object import library_file
 
@@ -90,3 +91,29 @@ def test_an_object_put_elsewhere_is_a_change_each_time(session):
     assert back(session) == before + 7
     session.undo()
     assert session.stack.steps[0].options["material"] == "mirror"
+
+
+def test_a_drag_after_undo_is_a_change_of_its_own(session):
+    click(session)
+    for hue in ("10", "20", "30"):
+        session.material("hue", hue)
+    session.material("roughness", "0.4")
+    session.undo()
+    session.material("hue", "70")
+    session.undo()
+    assert session.stack.steps[0].options["hue"] == "30"
+
+
+def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_way_back(session):
+    click(session)
+    session.material("hue", "10")
+    stack, past = session.stack, session._past
+    (session.desk / "edits.yaml").write_text("- relight: {rotate: 20}\n")
+    for act in (
+        lambda: session.material("hue", "60"), session.undo, lambda: session.act("toggle", 0),
+        lambda: session.light(rotate="5"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match="changed in another place"):
+            act()
+        assert session.stack == stack and session._past == past
+    assert "rotate" in (session.desk / "edits.yaml").read_text()
