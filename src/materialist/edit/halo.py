@@ -13,7 +13,7 @@ INSIDE = 0.006
 """How deep inside an object its own colour is, as such a part."""
 APART = 0.15
 """Distance of object and surroundings (sRGB) from which a mixture of the two is told from either."""
-LEAST = 0.06
+LEAST = 0.04
 """Share of the object's colour, in the median along its outline, at which it has ended."""
 FEWEST = 20
 """Pixels at one distance that tell."""
