@@ -19,11 +19,11 @@ FEWEST = 20
 """Pixels at one distance that tell."""
 
 
-def softness(linear: Array, own: Array) -> int:
+def softness(linear: Array, own: Array, apart: Array | None = None) -> int:
     """Pixels outside of an object [H, W] bool that have some of its colour, in the photo [H, W, 3] linear.
 
     Each is compared with the nearest pixels well inside and well outside; the median at each distance does not see
-    neighbours and shadows, which lie on one side.
+    neighbours and shadows, which lie on one side. `apart` [H, W] bool: what else does not count.
     """
     import cv2
     from scipy.ndimage import distance_transform_edt
@@ -44,6 +44,8 @@ def softness(linear: Array, own: Array) -> int:
     share = ((encoded - outer) * line).sum(-1) / np.maximum(length, 1e-6)
     for pixels in range(1, reach + 1):
         ring = (np.abs(away - pixels) <= 0.5) & (length > APART**2)
+        if apart is not None:
+            ring &= ~apart
         if ring.sum() < FEWEST or np.median(share[ring]) <= LEAST:
             return pixels - 1
     return reach

@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.edit.cast import cast
 from materialist.edit.halo import softness
-from materialist.edit.region import checked_region
+from materialist.edit.region import checked_region, placed
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -97,7 +97,11 @@ def _soft_rim(scene: Scene, own: Array) -> Array:
     """[H, W] bool: the object as far as it colours its surroundings, but for what stands before it."""
     from scipy.ndimage import distance_transform_edt
 
-    rim = _grown(own, softness(scene.photo.linear, own))
+    body = placed(scene) > 0 if scene.bodies else np.zeros_like(own)
+    bare = own & ~body
+    if not bare.any():
+        return own
+    rim = _grown(bare, softness(scene.photo.linear, bare, body)) & ~body
     row, column = distance_transform_edt(~own, return_distances=False, return_indices=True)
     depth = scene.depth[row, column]
     return rim & ((scene.depth == 0) | (scene.depth > BEFORE * depth) | own)
