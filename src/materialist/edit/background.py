@@ -42,7 +42,8 @@ def without(
             or a file of that aspect, an EXR in the unit of the photo's file; it takes the place of inpainting, and
             its albedo is what makes the re-rendering equal to it.
         inpaint: another inpainter of the photo, used like a background (see `inpaint.diffusion`).
-        grow: rim around the mask that is filled as well, as a part of the picture's longer side, in [0, 0.2].
+        grow: rim around the mask that is filled as well, as a part of the picture's longer side, in [0, 0.2]; wider
+            where the object is out of focus.
         shadow: how far the surface it stands on is filled as well, as a part of the object's size, in [0, 2]; None:
             where its shadow and reflection are found (`cast.cast`). What the albedo kept of them goes with the object.
         seed: of the patch search.
