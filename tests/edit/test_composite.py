@@ -13,7 +13,7 @@ from materialist.edit.lights import Studio
 from materialist.edit.material import edit
 from materialist.edit.relight import lamp, relight
 from materialist.errors import InputError
-from materialist.types import Body, Surface
+from materialist.types import Body, Camera, Photo, Surface
 
 MASK = block_mask(36, 48)
 
@@ -292,3 +292,24 @@ def test_a_pattern_that_is_darker_is_one_all_the_same():
     albedo = np.where(columns % 6 < 3, 0.05, 0.8)
     for factor in (0.5, 0.1, 0.02):
         assert texture_held(albedo, factor * albedo).min() > 0.9
+
+
+@pytest.mark.parametrize("hdr", [False, True])
+def test_the_rim_of_what_is_brighter_than_white_is_as_soft_as_the_photo_s(hdr):
+    """A highlight of radiance 20 fills no pixel of which it has a tenth, but in an HDR photo."""
+    left, right = np.array([0.6, 0.3, 0.1]), np.array([0.05, 0.1, 0.3])
+    share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)[None, :, None]  # a border six native pixels wide
+    original = (share * left + (1 - share) * right).repeat(60, 0).astype(np.float32)
+    small = original.reshape(15, 4, 15, 4, 3).mean((1, 3))
+    changed = np.zeros((15, 15), bool)
+    changed[:, :8] = True
+    edited = np.where(changed[..., None], 20, small).astype(np.float32)
+    photo = Photo(small, Camera(15, 15, 40.0), original, hdr=hdr)
+    out = into_photo(photo, Layers(small, edited, changed, changed, edited))
+    rim = np.s_[20:40, 31:34]
+    if hdr:
+        assert out[rim].min() > 2
+    else:
+        expected = share * 1 + (1 - share) * right
+        assert np.abs(out[20:40] - expected)[:, 31:34].max() < 0.25 and (out[20:40, :26] > 1).all()
+    np.testing.assert_array_equal(out[:, 44:], original[:, 44:])

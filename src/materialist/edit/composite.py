@@ -178,20 +178,32 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     def laid(rows: slice) -> None:
         here, share = out[rows, columns], alpha[rows, columns]
         large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
+        above = np.zeros_like(here)
         for part, members in ((share, changed & clear), (1 - share, ~changed & clear)):
             where = np.flatnonzero((part > 0).any(0))
             if where.size:
                 own = slice(int(where[0]), int(where[-1]) + 1)
                 there = slice(columns.start + own.start, columns.start + own.stop)
-                large[:, own] += part[:, own, None] * upsample(stack, members, rows, there)
+                side = upsample(stack, members, rows, there)
+                large[:, own] += part[:, own, None] * side
+                if part is share and not photo.hdr:
+                    above[:, own] = _above_white(here[:, own], side, share[:, own, None])
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
         held = here if photo.hdr or layers.relit else _unclipped(here, reference)
-        moved = np.maximum(held + change + excess * (held - reference), 0)
+        moved = np.maximum(held + change + excess * (held - reference) - above, 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
     with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
     return _in_front(out, layers.portrait, photo.hdr)
+
+
+def _above_white(photo: Array, side: Array, share: Array) -> Array:
+    """[h, w, 3] what a mixed pixel would have too much of a surface brighter than white: white is what is mixed in, as
+    a photo's pixels would be enlarged, lest a few hundredths of a highlight fill it."""
+    change, excess, reference = side[..., :3], side[..., 3:6], side[..., 6:]
+    own = photo + change + excess * (photo - reference)
+    return np.where((share > 0) & (share < 1), share * np.maximum(own - np.maximum(photo, 1), 0), 0)
 
 
 def _looked_up(changed: Array, clear: Array) -> Array:
