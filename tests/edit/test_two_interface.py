@@ -114,6 +114,41 @@ def test_a_ball_lens_turns_the_background_round():
     assert row[middle - 3] > row[middle + 3] + 0.05
 
 
+def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
+    """A ball that crowds a striped background together, against a picture of five times the resolution."""
+
+    def glass(fine):
+        camera = Camera(48 * fine, 40 * fine, 40)
+        depth, normal, mask, cosine = ball(camera)
+        stripe = np.sin(2 * np.pi * (np.arange(camera.width) + 0.5) / (6 * fine)) > 0
+        picture = np.broadcast_to(stripe[None, :, None], (*mask.shape, 3)).astype(np.float32)
+        thickness = 1.2 * np.sqrt(1 - (1 - cosine**2) / 1.5**2)
+        far, dark = np.full(mask.shape, 9.0), np.zeros((8, 16, 3))
+        return ti.two_interface(camera, normal, depth, mask, thickness, far, picture, dark, ior=1.5), mask
+
+    fine, inside = glass(5)
+    twin = fine.reshape(40, 5, 48, 5, 3).mean((1, 3))
+    whole = inside.reshape(40, 5, 48, 5).all((1, 3))
+    error = {}
+    for sides in ((1, 1), ti.SIDES):
+        monkeypatch.setattr(ti, "SIDES", sides)
+        error[sides] = np.sqrt(np.mean((glass(1)[0] - twin)[whole] ** 2))
+    assert error[ti.SIDES] < 0.5 * error[1, 1], error
+
+
+def test_rays_are_spread_where_the_background_is_crowded_together():
+    inside = np.zeros((5, 9), bool)
+    inside[1:4, 1:8] = True
+    y, x = np.argwhere(inside).T
+    assert (ti.crowding(np.stack([x, y], -1) + 0.3, inside) == 0).all()  # as the picture is
+    assert (ti.crowding(np.stack([x / 2, y / 3], -1), inside) == 0).all()  # magnified
+    np.testing.assert_allclose(ti.crowding(np.stack([1.5 * x, y], -1), inside), 0.5)
+    found = np.zeros(inside.shape)
+    found[inside] = ti.crowding(np.stack([np.where(x < 4, x, x + 40), y], -1), inside)
+    np.testing.assert_array_equal(found[2] > 0, [0, 0, 0, 1, 1, 0, 0, 0, 0])  # either side of a crease
+    assert not ti.crowding(np.zeros((1, 2)), np.ones((1, 1), bool)).any()
+
+
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 def test_no_light_is_made_or_lost(roughness):
     depth, normal, mask, cosine = ball(CAMERA)

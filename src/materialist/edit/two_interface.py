@@ -32,9 +32,8 @@ LONGEST = 3.0
 """Longest way through the object, in units of its largest thickness."""
 STEPS = 96
 """Places along a ray where it is compared with the background's depth."""
-SAMPLES = 24
-"""Facets of a rough surface that a pixel looks through."""
-_GOLDEN = (0.7548776662466927, 0.5698402909980532)
+SIDES = (3, 5)
+"""Rays a pixel, along either side: of clear glass, and of a rough surface, whose every ray meets other facets."""
 
 
 @dataclass(frozen=True)
@@ -98,11 +97,15 @@ def two_interface(
                         ("background", background), ("back", normal if own is None else own)):  # fmt: skip
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
+    side = SIDES[roughness > 0]
     behind = Behind(background, background_depth, envmap)
     front = Front(camera, normal, depth, inside, own, None if own is None else thickness)
-    count = SAMPLES if roughness > 0 else 1
+    count = side**2
+    crossing = cross(front, thickness[inside], ior=ior, back=kind)
+    spread = crowding(meeting(crossing.exit, crossing.direction, behind, camera)[0], inside)
     total = np.zeros((int(inside.sum()), 3))
     for k in range(count):
+        front.through(spread[:, None] * ((np.array([k % side, k // side]) + 0.5) / side - 0.5))
         crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
         through = look(crossing.exit, crossing.direction, behind, camera)
         inside_still = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
@@ -139,17 +142,26 @@ class Front:
 
         self.camera = camera
         all_rays = pixel_rays(camera).astype(np.float64)
-        rays = all_rays[inside]
-        self.point = rays * depth[inside][:, None]  # [N, 3] x
-        self.direction = _unit(rays)  # [N, 3]
-        self.normal = _facing(normal[inside].astype(np.float64), self.direction)  # [N, 3]
+        self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
         rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
+        self._inverse = 1 / depth[rows, columns].astype(np.float64)[..., None]  # [H, W, 1], linear on planes
         self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
+        self.through(np.zeros(2))
         self._backs = None if back is None else back[rows, columns].astype(np.float64)
         self._ends: Array | None = None
         if thickness is not None:
             ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
             self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
+
+    def through(self, offset: Array) -> None:
+        """Look through all pixels at this distance, [2] or [N, 2] (x right, y down), from their centres."""
+        place = self._centres + offset
+        middle = np.array([self.camera.width, self.camera.height]) / 2
+        x, y = ((place - middle) / self.camera.focal).T
+        rays = np.stack([x, -y, -np.ones_like(x)], -1)
+        self.point = rays / bilinear(self._inverse, place)  # [N, 3] x
+        self.direction = _unit(rays)  # [N, 3]
+        self.normal = _facing(_unit(bilinear(self._normals, place)), self.direction)  # [N, 3]
 
     def normal_at(self, point: Array) -> Array:
         """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
@@ -183,8 +195,7 @@ def cross(
     `sample` (k, n) is the k-th of n facets of rough surfaces.
     """
     k, n = sample
-    points = [((k + 0.5) * g) % 1 for g in (*_GOLDEN, 0.6180339887, 0.4142135623)]
-    points[1] = (k + 0.5) / n
+    points = [((k + 0.5) * g) % 1 for g in (0.7320508076, 1 / n, 0.6180339887, 0.4142135623)]
     facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
     inner, _ = refract(front.direction, facet, 1 / ior)
     mirrored = reflect(front.direction, facet)
@@ -211,7 +222,13 @@ def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool
 
 
 def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
-    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment.
+    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
+    place, inside = meeting(origin, direction, behind, camera)
+    return np.where(inside[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
+
+
+def meeting(origin: Array, direction: Array, behind: Behind, camera: Camera) -> tuple[Array, Array]:
+    """[N, 2] where in the picture of the background rays end, S(x2), and [N] bool whether they end in it.
 
     Where a ray that meets no surface looks at the picture's sky, the picture knows it better than the environment map.
     """
@@ -222,7 +239,26 @@ def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Arr
     size = np.array([camera.width, camera.height])
     sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
     sky[sky] = bilinear(behind.depth[..., None], place[sky])[:, 0] == 0
-    return np.where((met | sky)[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
+    return place, met | sky
+
+
+def crowding(place: Array, inside: Array) -> Array:
+    """[N] 0 to 1: over how much of a pixel its rays are to be spread, from where its centre's and its neighbours' end.
+
+    One lookup between pixels is the mean of one pixel by itself: more is needed where the picture is crowded together.
+
+    place: [N, 2] pixels. inside: [H, W] bool, true for N pixels.
+    """
+    whole = np.full((*inside.shape, 2), np.nan)
+    whole[inside] = place
+    widest = np.zeros(inside.shape)
+    for axis in (0, 1):
+        step = np.nan_to_num(np.linalg.norm(np.diff(whole, axis=axis), axis=-1))  # 0 to what is outside
+        for beside in ((1, 0), (0, 1)):
+            pad = [(0, 0), (0, 0)]
+            pad[axis] = beside
+            widest = np.maximum(widest, np.pad(step, pad))
+    return np.clip(widest[inside] - 1, 0, 1)
 
 
 def background_distance(origin: Array, direction: Array, depth: Array, camera: Camera) -> Array:
