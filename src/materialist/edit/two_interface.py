@@ -97,23 +97,34 @@ def two_interface(
                         ("background", background), ("back", normal if own is None else own)):  # fmt: skip
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
-    side = SIDES[roughness > 0]
     behind = Behind(background, background_depth, envmap)
     front = Front(camera, normal, depth, inside, own, None if own is None else thickness)
-    count = side**2
-    crossing = cross(front, thickness[inside], ior=ior, back=kind)
-    spread = crowding(meeting(crossing.exit, crossing.direction, behind, camera)[0], inside)
-    total = np.zeros((int(inside.sum()), 3))
-    for k in range(count):
-        front.through(spread[:, None] * ((np.array([k % side, k // side]) + 0.5) / side - 0.5))
-        crossing = cross(front, thickness[inside], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
-        through = look(crossing.exit, crossing.direction, behind, camera)
+    d1 = thickness[inside]
+    middle = cross(front, d1, ior=ior, back=kind)
+    place, in_picture = meeting(middle.exit, middle.direction, behind, camera)
+    through = radiance(place, in_picture, middle.direction, behind)
+    mean = through.mean(0)
+
+    def shown(crossing: Crossing, through: Array) -> Array:
         inside_still = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
-        seen = crossing.share[:, None] * through + inside_still * through.mean(0)
+        seen = crossing.share[:, None] * through + inside_still * mean
         mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
-        total += seen * transmission * np.asarray(tint, float) + mirror
+        return seen * transmission * np.asarray(tint, float) + mirror
+
+    colour = shown(middle, through)
+    spread = crowding(place, inside)
+    several = np.full(len(spread), roughness > 0) | (spread > 0)
+    side = SIDES[roughness > 0]
+    count = side**2 if several.any() else 0
+    rays = []
+    for k in range(count):
+        front.through(spread[several, None] * ((np.array([k % side, k // side]) + 0.5) / side - 0.5), several)
+        crossing = cross(front, d1[several], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
+        rays.append(shown(crossing, look(crossing.exit, crossing.direction, behind, camera)))
+    if rays:
+        colour[several] = np.mean(rays, axis=0)
     result = np.zeros((*inside.shape, 3), np.float32)
-    result[inside] = total / count
+    result[inside] = colour
     return result
 
 
@@ -153,9 +164,9 @@ class Front:
             ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
             self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
 
-    def through(self, offset: Array) -> None:
-        """Look through all pixels at this distance, [2] or [N, 2] (x right, y down), from their centres."""
-        place = self._centres + offset
+    def through(self, offset: Array, which: Array | slice = np.s_[:]) -> None:
+        """Look through the pixels `which`, [N] bool, at this distance [n, 2] (x right, y down) from their centres."""
+        place = self._centres[which] + offset
         middle = np.array([self.camera.width, self.camera.height]) / 2
         x, y = ((place - middle) / self.camera.focal).T
         rays = np.stack([x, -y, -np.ones_like(x)], -1)
@@ -223,8 +234,12 @@ def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool
 
 def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
     """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
-    place, inside = meeting(origin, direction, behind, camera)
-    return np.where(inside[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
+    return radiance(*meeting(origin, direction, behind, camera), direction, behind)
+
+
+def radiance(place: Array, in_picture: Array, direction: Array, behind: Behind) -> Array:
+    """[N, 3] of rays that end in the picture at `place` [N, 2], or go to the environment along unit [N, 3]."""
+    return np.where(in_picture[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
 
 
 def meeting(origin: Array, direction: Array, behind: Behind, camera: Camera) -> tuple[Array, Array]:
