@@ -140,3 +140,14 @@ def test_bad_options_are_refused(tmp_path):
         bench.run("glass", output=tmp_path / "a", iors="0.9")
     with pytest.raises(InputError, match="choose room or envmap"):
         bench.run("glass", output=tmp_path / "b", background="sea")
+    with pytest.raises(InputError, match="choose two-interface or closed"):
+        bench.run("glass", output=tmp_path / "c", model="open")
+
+
+def test_one_model_alone_is_compared(tmp_path, mitsuba):
+    settings = {"shapes": 1, "envmaps": 1, "iors": "1.2", "size": 32, "spp": 4, "reference": 4, "draws": 1}
+    folder = bench.run("glass", output=tmp_path / "report", model="two-interface", background="envmap", **settings)
+    report = json.loads((folder / "report.json").read_text())
+    assert "two_interface, predicted d" in report["means"] and report["settings"]["model"] == "two-interface"
+    assert not [name for name in report["means"] if name.startswith("closed") or "mesh" in name]
+    assert (folder / "sheet.png").is_file()

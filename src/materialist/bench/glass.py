@@ -76,7 +76,7 @@ class Case:
 def run(
     *, data: Path | None, output: Path, shapes: int = 2, envmaps: int = 2, iors: str | float = "1.1,1.3",
     background: str = "room", size: int = 128, spp: int = 144, reference: int = 1024, full: bool = False,
-    draws: int = 10, pictures: int = 6, latency: int = 0, seed: int = 0, device: str = "auto",
+    draws: int = 10, pictures: int = 6, latency: int = 0, model: str = "", seed: int = 0, device: str = "auto",
 ) -> None:  # fmt: skip
     """Compare the two-interface model and the closed proxy with true glass.
 
@@ -84,7 +84,7 @@ def run(
     paper's 20 objects x 30 lights x 1.1 and 1.3. `background` is 'room', a patterned floor and wall, or 'envmap',
     nothing but the light. Predictions have `spp` paths a pixel, photos and truth `reference`. `draws` noisy
     thicknesses a case; `pictures` cases are drawn. `latency` is the size of a picture on which the preview is timed;
-    `shapes` may then be 0.
+    `shapes` may then be 0. `model` 'closed' or 'two-interface' leaves out the rows of the other.
     """
     from materialist.render.variant import setup
 
@@ -106,6 +106,8 @@ def run(
             f"{latency}: give at least 1, 1, 1, 1, 32 pixels, indices of refraction above 1 up to 3, and a latency of "
             "0 or 64 pixels or more."
         )
+    if model not in ("", *MODELS):
+        raise InputError(f"The model is {model!r}; choose {' or '.join(MODELS)}, or leave it out for both.")
     if background not in scenes.ENVMAP_ROWS:
         raise InputError(f"The background is {background!r}; choose room or envmap.")
     setup(device)
@@ -113,15 +115,15 @@ def run(
     drawn: list[Array] = []
     settings = {"data": None if data is None else str(data), "shapes": shapes, "envmaps": envmaps, "iors": str(iors),
                 "background": background, "size": size, "spp": spp, "reference": reference, "latency": latency,
-                "seed": seed}  # fmt: skip
+                "model": model, "seed": seed}  # fmt: skip
     report = Report("Glass", NOTE, settings, COLUMNS, rows, plotted=("psnr_symmetric", "psnr_asymmetric"))
     options: dict[str, Any] = {"background": background, "size": size, "reference": reference, "seed": seed}
     for case, behind in cases(data, shapes, envmaps, refraction, **options) if shapes else ():
-        found, strip = compared(case, behind, spp=spp, draws=draws, seed=seed)
+        found, titles, strip = compared(case, behind, spp=spp, draws=draws, seed=seed, only=model)
         rows.extend(found)
         if len(drawn) < pictures:
             drawn.append(strip)
-            _draw(drawn, output / "sheet.png")
+            _draw(drawn, titles, output / "sheet.png")
         write(report, output)  # what is there already is worth having when a long run is stopped
     if latency:
         rows.extend(latencies(data, latency, spp=16, seed=seed, device=device))
@@ -158,9 +160,9 @@ def cases(
 
 
 def compared(
-    case: Case, behind: dict[str, Background], *, spp: int, draws: int, seed: int
-) -> tuple[list[dict[str, Any]], Array]:
-    """The rows of all methods for one case, and a strip of pictures."""
+    case: Case, behind: dict[str, Background], *, spp: int, draws: int, seed: int, only: str = ""
+) -> tuple[list[dict[str, Any]], list[str], Array]:
+    """The rows of the methods for one case, and a strip of pictures with the title of each; `only` one of MODELS."""
     scene, shown = case.scene, {}
     seen = np.clip(case.photo * case.gain, 0, 1)
     d = models.thicknesses(scene, seen, behind["true"])
@@ -173,24 +175,27 @@ def compared(
 
     for kind, background in behind.items():
         add(f"background alone, {kind}", models.plain_background(scene, background))
-    ceiling = models.before(scene, scene.item.solid, behind["true"], case.envmap, case.ior, spp=spp)
-    add(f"{CEILING}, true mesh", ceiling)
+    chosen = (only,) if only else MODELS
+    if "closed" in chosen:
+        ceiling = models.before(scene, scene.item.solid, behind["true"], case.envmap, case.ior, spp=spp)
+        add(f"{CEILING}, true mesh", ceiling)
     again = scene.render(case.envmap, "glass", ior=case.ior, spp=spp, seed=4)
     add(f"{CEILING}, truth again", again)
-    for model in (_two_interface, _closed):
+    for model in (MODELS[name] for name in chosen):
         for source, found in d.items():
             add(f"{model.__name__[1:]}, {source} d", model(case, found, behind["true"], spp), found)
         name = f"{model.__name__[1:]}, {best} d, inpainted"
         add(name, model(case, d[best], behind["inpainted"], spp), d[best])
-    for source in ("true", "network"):
+    for source in ("true", "network") if "closed" in chosen else ():
         if source in d:
             leaning = replace(d[source], back=scene.front.back)
             add(f"closed, {source} d, true back", _closed(case, leaning, behind["true"], spp), leaning)
-    same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
-    add(f"two_interface, {best} d, back normal = front normal", same, d[best])
-    rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
-    order = ("two_interface, true d", f"two_interface, {best} d", f"closed, {best} d", f"closed, {best} d, inpainted")
-    return rows, _strip(case, behind["true"].picture, [shown[name] for name in order])
+    if "two-interface" in chosen:
+        same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
+        add(f"two_interface, {best} d, back normal = front normal", same, d[best])
+        rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
+    titles = [name for name in DRAWN if name in shown]
+    return rows, titles, _strip(case, behind["true"].picture, [shown[name] for name in titles])
 
 
 def _two_interface(case: Case, found: Thickness, behind: Background, spp: int) -> Array:
@@ -202,6 +207,9 @@ def _closed(case: Case, found: Thickness, behind: Background, spp: int) -> Array
 
 
 Model = Callable[[Case, Thickness, Background, int], Array]
+MODELS: dict[str, Model] = {"two-interface": _two_interface, "closed": _closed}
+DRAWN = ("two_interface, true d", "two_interface, predicted d", "closed, predicted d", "closed, predicted d, inpainted")
+"""The methods whose pictures are shown."""
 
 
 def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, seed: int) -> list[dict[str, Any]]:
@@ -261,12 +269,12 @@ def _strip(case: Case, room: Array, pictures: list[Array]) -> Array:
     return np.concatenate([linear_to_srgb(p * case.gain) for p in shown], 1)
 
 
-def _draw(strips: list[Array], path: Path) -> None:
-    """The strips as one picture with a line of headings."""
+def _draw(strips: list[Array], titles: list[str], path: Path) -> None:
+    """The strips as one picture with a line of headings: the photo, true glass, and these."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    titles = ("photo", "true glass", "two-interface, true d", "two-interface", "closed proxy", "closed, inpainted")
+    titles = ["photo", "true glass", *titles]
     wide = strips[0].shape[1] // len(titles)
     figure = Figure(figsize=(1.5 * len(titles), 1.5 * len(strips) + 0.2), dpi=110)
     FigureCanvasAgg(figure)
