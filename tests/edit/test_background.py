@@ -354,6 +354,29 @@ def test_glass_goes_on_under_the_rim_of_what_stands_before_it():
     assert _under(None, covered, shown)[0] is covered
 
 
+def test_what_is_revealed_has_glass_under_the_rim_of_what_stands_before_it():
+    from types import SimpleNamespace
+
+    from materialist.edit.layers import Layers
+    from materialist.edit.portrait import Portrait
+    from materialist.edit.revealed import revealed
+
+    scene = rendered_scene()
+    removed = without(scene, MASK)
+    base = scene.photo.linear
+    inside = np.zeros(MASK.shape, np.float32)
+    inside[14:20, 20:30] = 1
+    covered = MASK & (inside == 0)
+    glass = np.where(covered[..., None], np.float32([0.1, 0.6, 0.2]), base).astype(np.float32)
+    everywhere = np.ones(MASK.shape, bool)
+    portrait = Portrait(inside, inside, np.zeros_like(base))
+    layers = Layers(base, glass, everywhere, MASK, glass, portrait=portrait, covered=covered)
+    studio = SimpleNamespace(scene=scene, photo_lights=lambda edited: ~everywhere)
+    photo, found = revealed(studio, removed, layers, spp=1)
+    for picture in (found.base, found.edited, photo.linear):
+        np.testing.assert_allclose(picture[16, 20:22], np.full((2, 3), [0.1, 0.6, 0.2]), atol=1e-5)
+
+
 def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
     from materialist.edit.composite import into_photo

@@ -65,6 +65,22 @@ def test_a_pocket_at_the_foot_is_of_the_ground():
         assert (other[pocket & ~DISC] == -1).all()
 
 
+def test_a_hole_takes_the_shadow_in_a_pocket_along(monkeypatch):
+    scene, mask = flat_scene(120, 160), block_mask(120, 160)
+    bottom, left = np.flatnonzero(mask.any(1))[-1], np.flatnonzero(mask.any(0))[0]
+    label = np.where(mask, -1, 0).astype(scene.geometry.plane_label.dtype)
+    gone = make_hole(scene, mask).gone
+    pocket = np.zeros_like(mask)
+    pocket[bottom - 2 : bottom + 9, left + 10 : left + 24] = True
+    pocket &= ~gone
+    label[pocket] = -1
+    ground = replace(scene, normal=np.broadcast_to(np.float32([0, 1, 0]), scene.normal.shape))
+    ground = replace(ground, geometry=replace(scene.geometry, plane_label=label))
+    monkeypatch.setattr("materialist.edit.hole.cast", lambda linear, plane, upward, own, gone: pocket & (plane >= 0))
+    found = make_hole(ground, mask)
+    assert pocket.any() and found.painted[pocket].all() and found.gone[pocket].all()
+
+
 def test_crumbs_of_a_shadow_s_edge_are_filled_and_a_handle_s_hole_is_not():
     painted = np.zeros((60, 80), bool)
     painted[10:50, 10:70] = True
