@@ -282,5 +282,5 @@ def _draw(strips: list[Array], titles: list[str], path: Path) -> None:
     axis.imshow(np.concatenate(strips))
     axis.axis("off")
     for k, title in enumerate(titles):
-        axis.text((k + 0.5) * wide, -4, title, ha="center", va="bottom", fontsize=8)
+        axis.text((k + 0.5) * wide, -4, title, ha="center", va="bottom", fontsize=7)
     figure.savefig(path)
