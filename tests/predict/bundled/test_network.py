@@ -103,6 +103,18 @@ def test_large_photos_and_their_mirror_images_are_seen_small(network, monkeypatc
     assert seen == [(64, 96)] * 2 and prediction.depth.shape == (100, 150)
 
 
+def test_a_crowded_photo_is_seen_larger_than_a_bare_one(network, monkeypatch):
+    seen, run = [], inference._run
+    monkeypatch.setattr(inference, "_run", lambda n, photo, *r: seen.append(max(photo.shape)) or run(n, photo, *r))
+    rays = inference.rays_of(Camera(448, 32, 60.0))
+    bars = np.broadcast_to(((np.arange(448) // 8) % 2)[None, :, None], (32, 448, 3)).astype(np.float32)
+    inference.infer(network, bars, rays)
+    assert set(seen) == {384, 448}
+    seen.clear()
+    inference.infer(network, np.full_like(bars, 0.5), rays)
+    assert set(seen) == {192, 384}
+
+
 def test_rays_go_on_into_the_padding(network):
     """A picture of 40 columns is padded to 64, where the rays must be those of a wider camera."""
     captured = {}

@@ -13,14 +13,12 @@ from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import membrane
 from materialist.predict import resample
+from materialist.predict.bundled import views
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.predict.bundled.relief import smooth_relief, with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
-NETWORK_SIDES = (192, 384)
-"""Longest sides at which the network sees the photo, and its mirror image: the whole, and details. Answers are
-averaged, and brought to the photo's size with the photo as the guide."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
 EDGE_REACH = 0.03
@@ -43,21 +41,25 @@ LEAST_ISLAND = 0.0005
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = NETWORK_SIDES
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] | None = None
 ) -> Prediction:
     """Maps of a photo at its own size.
+
+    The network sees the photo, and its mirror image, at some sizes (`views`); its answers are averaged, and brought to
+    the photo's size with the photo as the guide.
 
     Args:
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-        sides: longest sides, in pixels, at which the network sees the photo.
+        sides: longest sides, in pixels, at which the network sees the photo; by default those that suit what is in it.
 
     Returns:
         A Prediction without a name: albedo linear, depth with median MEDIAN_DEPTH, 0 where the network sees no surface.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
+    sides = sides or views.sides(linear)
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
     maps = _mean_answer(network, linear, rays, sides, device)
