@@ -14,6 +14,20 @@ def pixel_rays(camera: Camera) -> Array:
     return rays
 
 
+def rays_at(rays: Array, height: int, width: int) -> Array:
+    """The rays [H, W, 2] (x and y at z = -1) of a picture or of a part of one, at height x width pixels.
+
+    x is even along rows and y along columns, so that they go on to pixels that are nearer to the border than the first
+    and the last were.
+    """
+    rows, columns = rays.shape[:2]
+    x, y = rays[0, :, 0].astype(np.float64), rays[:, 0, 1].astype(np.float64)
+    across = ((np.arange(width) + 0.5) * columns / width - 0.5) / max(columns - 1, 1)
+    down = ((np.arange(height) + 0.5) * rows / height - 0.5) / max(rows - 1, 1)
+    places = np.broadcast_arrays(x[0] + (x[-1] - x[0]) * across[None], (y[0] + (y[-1] - y[0]) * down)[:, None])
+    return np.stack(places, -1).astype(np.float32)
+
+
 def unproject(depth: Array, camera: Camera) -> Array:
     """[H, W, 3] camera-frame points of planar depth [H, W] (scene units)."""
     return pixel_rays(camera) * depth[..., None].astype(np.float32)

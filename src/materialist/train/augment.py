@@ -11,6 +11,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from materialist.camera import rays_at
 from materialist.train.samples import Sample
 from materialist.types import Array
 
@@ -61,7 +62,7 @@ def resized(sample: Sample, height: int, width: int) -> Sample:
 
     def work(array: Array, name: str) -> Array:
         if name == "rays":
-            return _rays_between(array, height, width)
+            return rays_at(array, height, width)
         if name in ("normal", "depth", "mask"):
             return scaled(array, cv2.INTER_NEAREST_EXACT)
         if name in ("albedo", "roughness", "metallic"):
@@ -70,17 +71,6 @@ def resized(sample: Sample, height: int, width: int) -> Sample:
         return scaled(array, smooth)
 
     return _each(sample, work)
-
-
-def _rays_between(rays: Array, height: int, width: int) -> Array:
-    """The rays [H, W, 2] of a picture at height x width pixels: x is even along rows and y along columns, so that they
-    go on to pixels that are nearer to the border than the first and the last were."""
-    rows, columns = rays.shape[:2]
-    x, y = rays[0, :, 0].astype(np.float64), rays[:, 0, 1].astype(np.float64)
-    across = ((np.arange(width) + 0.5) * columns / width - 0.5) / max(columns - 1, 1)
-    down = ((np.arange(height) + 0.5) * rows / height - 0.5) / max(rows - 1, 1)
-    places = np.broadcast_arrays(x[0] + (x[-1] - x[0]) * across[None], (y[0] + (y[-1] - y[0]) * down)[:, None])
-    return np.stack(places, -1).astype(np.float32)
 
 
 def flip(sample: Sample) -> Sample:

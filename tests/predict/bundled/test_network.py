@@ -1,6 +1,7 @@
 """The bundled network and what happens around it, with random weights."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,34 @@ def test_a_crowded_photo_is_seen_larger_than_a_bare_one(network, monkeypatch):
     seen.clear()
     inference.infer(network, np.full_like(bars, 0.5), rays)
     assert set(seen) == {192, 384}
+
+
+def test_what_is_seen_larger_than_the_photo_is_taken_from_the_finer_one(network, monkeypatch):
+    seen = []
+    run = inference._run
+    monkeypatch.setattr(inference, "_run", lambda n, *given: seen.append(given[:2]) or run(n, *given))
+    fine = np.random.default_rng(0).random((96, 192, 3), dtype=np.float32) * 1.4
+    linear = inference.resample.values(fine, (48, 96))
+    camera = Camera(96, 48, 60.0)
+    found = inference.infer(network, linear, inference.rays_of(camera), fine=fine, sides=(64, 192))
+    assert found.depth.shape == (48, 96)
+    assert [photo.shape[:2] for photo, _ in seen] == [(32, 64)] * 2 + [(96, 192)] * 2
+    photo, rays = seen[2]
+    np.testing.assert_array_equal(photo, np.clip(fine, 0, 1))
+    np.testing.assert_allclose(rays, pixel_rays(Camera(192, 96, 60.0))[..., :2], atol=1e-6)
+    seen.clear()
+    inference.infer(network, linear, inference.rays_of(camera), sides=(64, 192))
+    assert [photo.shape[:2] for photo, _ in seen] == [(32, 64)] * 2 + [(48, 96)] * 2
+
+
+def test_the_predictor_looks_at_the_original(file, monkeypatch):
+    seen = []
+    monkeypatch.setattr(inference.views, "sides", lambda _: (64, 128))
+    run = inference._run
+    monkeypatch.setattr(inference, "_run", lambda n, photo, *r: seen.append(photo.shape[:2]) or run(n, photo, *r))
+    photo = replace(_photo(32, 64), original=np.full((100, 200, 3), 0.5, np.float32))
+    assert BundledPredictor(file).predict(photo).depth.shape == (32, 64)
+    assert set(seen) == {(32, 64), (64, 128)}
 
 
 def test_rays_go_on_into_the_padding(network):

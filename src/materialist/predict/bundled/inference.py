@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
 import torch
 
-from materialist.camera import pixel_rays
+from materialist.camera import pixel_rays, rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import membrane
 from materialist.predict import resample
@@ -41,8 +41,9 @@ LEAST_ISLAND = 0.0005
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] | None = None
-) -> Prediction:
+    network: BundledNetwork, linear: Array, rays: Array, *, fine: Array | None = None, device: Any = "cpu",
+    sides: Sequence[int] | None = None,
+) -> Prediction:  # fmt: skip
     """Maps of a photo at its own size.
 
     The network sees the photo, and its mirror image, at some sizes (`views`); its answers are averaged, and brought to
@@ -52,6 +53,7 @@ def infer(
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
+        fine: [H0, W0, 3] the same photo with more pixels, for what it is to be seen larger than it is.
         sides: longest sides, in pixels, at which the network sees the photo; by default those that suit what is in it.
 
     Returns:
@@ -62,7 +64,7 @@ def infer(
     sides = sides or views.sides(linear)
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
-    maps = _mean_answer(network, linear, rays, sides, device)
+    maps = _mean_answer(network, linear, rays, sides, device, fine)
     surface = _without_specks(_surface(maps["mask"]) | _detailed(photo, rays))
     if not surface.any():
         surface[:] = True
@@ -134,13 +136,14 @@ def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float
 
 
 def _mean_answer(
-    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any
+    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any, fine: Array | None = None
 ) -> dict[str, Array]:
-    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest size."""
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest size that `linear`
+    has."""
     target = _network_size(linear.shape[:2], max(sides))
     answers = []
-    for size in sorted({_network_size(linear.shape[:2], side) for side in sides}):
-        photo, seen = resample.values(linear, size), resample.values(np.ascontiguousarray(rays), size)
+    for photo in _seen(linear, sides, fine):
+        seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
         mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
         found = {name: np.ascontiguousarray(m[:, ::-1]) for name, m in _run(network, *mirrored, device).items()}
@@ -148,6 +151,17 @@ def _mean_answer(
     for answer in answers:  # what depth is relative to is every answer's own
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
     return {n: np.mean([resample.values(a[n], target) for a in answers], axis=0) for n in answers[0]}
+
+
+def _seen(linear: Array, sides: Sequence[int], fine: Array | None) -> Iterator[Array]:
+    """The photo at each size at which the network sees it, the smallest first; sizes that it does not have, once."""
+    done = set()
+    for side in sorted(sides):
+        source = linear if fine is None or side <= max(linear.shape[:2]) else fine
+        size = _network_size(source.shape[:2], side)
+        if size not in done:
+            done.add(size)
+            yield np.clip(resample.values(source, size), 0, 1)
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:

@@ -52,7 +52,8 @@ class BundledPredictor:
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        found = infer(self.network, photo.linear, rays_of(photo.camera), device=self.device)
+        rays = rays_of(photo.camera)
+        found = infer(self.network, photo.linear, rays, fine=photo.original, device=self.device)
         m = found.materials
         if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
