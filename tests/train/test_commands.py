@@ -25,7 +25,7 @@ def test_one_step_and_its_weights(data, tmp_path):
     small = ("--size", 32, "--batch", 1, "--workers", 0, "--score-samples", 0, "--device", "cpu", "--json")
     first = _call("matnet", "--data", data, "-o", tmp_path / "run", "--steps", 1, *small)
     assert first["step"] == 1
-    again = _call("matnet", "--data", data, "-o", tmp_path / "run", "--steps", 1, "--resume", *small)
+    again = _call("matnet", "--data", data, "--data", data, "-o", tmp_path / "run", "--steps", 1, "--resume", *small)
     assert again["step"] == 2
     written = _call("export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--json")
     assert written["step"] == 2 and written["megabytes"] < 40, "what the package can hold"

@@ -8,7 +8,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.train.interiorverse import InteriorVerse
-from materialist.train.sources import open_source
+from materialist.train.sources import open_source, open_sources
 from materialist.types import Camera
 
 
@@ -55,6 +55,12 @@ def test_the_layout_in_our_conventions(folder):
     np.testing.assert_allclose(sample.roughness, 0.3, rtol=1e-3)
     np.testing.assert_allclose(sample.metallic, 0.7, rtol=1e-3)
     np.testing.assert_allclose(sample.image, 0.9, rtol=1e-3)
+
+
+def test_it_stands_alone(folder, tmp_path_factory):
+    assert isinstance(open_sources([folder]), InteriorVerse)
+    with pytest.raises(InputError, match=r"is InteriorVerse; only sets of materialist train data"):
+        open_sources([made_samples.write_set(tmp_path_factory.mktemp("own"), 1), folder])
 
 
 def test_the_folder_names_the_field_of_view(folder):

@@ -6,7 +6,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.train.samples import SampleFolder, read_sample
-from materialist.train.sources import open_source
+from materialist.train.sources import open_source, open_sources
 
 
 def test_a_sample_in_our_conventions(tmp_path):
@@ -32,6 +32,21 @@ def test_a_growing_set_is_listed_again(tmp_path):
     assert len(source) == 2
     source.refresh()
     assert len(source) == 5 and source.seed() == 5
+
+
+def test_several_sets_are_one(tmp_path):
+    folders = [made_samples.write_set(tmp_path / name, count) for name, count in (("a", 2), ("b", 3))]
+    source = open_sources(folders)
+    assert len(source) == 5
+    assert [source.number(k) for k in range(5)] == [0, 1, 0, 1, 2]
+    np.testing.assert_array_equal(source.read(4).albedo, open_source(folders[1]).read(2).albedo)
+    made_samples.write_set(tmp_path / "a", 4)
+    source.refresh()
+    assert [source.number(k) for k in range(len(source))] == [0, 1, 2, 3, 0, 1, 2]
+    with pytest.raises(IndexError):
+        source.read(7)
+    with pytest.raises(InputError, match="no data folder"):
+        open_sources([*folders, tmp_path / "nowhere"])
 
 
 def test_bad_sets_are_named(tmp_path):

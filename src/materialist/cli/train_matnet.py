@@ -38,7 +38,12 @@ def register(app: typer.Typer) -> None:
 
 
 def matnet(
-    data: Annotated[Path, typer.Option(help="A set made by `materialist train data`, or an InteriorVerse folder.")],
+    data: Annotated[
+        list[Path],
+        typer.Option(
+            help="A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
+        ),
+    ],
     output: Annotated[Path, output_option("RUN", "Folder of the run.")],
     config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled,
     resume: ResumeRun = False,
@@ -69,7 +74,7 @@ def matnet(
     from materialist.cli.progress import StageProgress
     from materialist.train import checkpoint
     from materialist.train.launch import join
-    from materialist.train.sources import open_source
+    from materialist.train.sources import open_sources
     from materialist.train.tasks import task
     from materialist.train.trainer import Habits, Trainer
 
@@ -83,7 +88,7 @@ def matnet(
     try:
         with StageProgress(quiet=quiet) as progress:
             trainer = Trainer(
-                chosen, task(chosen, {"init": init} if init else None), open_source(data), output,
+                chosen, task(chosen, {"init": init} if init else None), open_sources(data), output,
                 budget=budget, habits=habits, processes=processes, resume=resume,
                 note=note,
             )  # fmt: skip

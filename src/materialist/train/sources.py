@@ -1,12 +1,13 @@
-"""Which kind of data set a folder holds."""
+"""Which kind of data set a folder holds, and several sets as one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from materialist.errors import InputError
 from materialist.train.interiorverse import InteriorVerse, is_interiorverse
-from materialist.train.samples import SampleFolder, Source
+from materialist.train.samples import Sample, SampleFolder, Source
 
 
 def open_source(folder: str | Path, *, split: str = "train") -> Source:
@@ -24,3 +25,48 @@ def open_source(folder: str | Path, *, split: str = "train") -> Source:
     raise InputError(
         f"{folder} holds neither 'samples' (materialist train data) nor InteriorVerse scenes; check the path."
     )
+
+
+class SampleSets:
+    """Several sets of `materialist train data` as one. A sample keeps the number that it has in its own."""
+
+    def __init__(self, sets: Sequence[SampleFolder]):
+        self.sets = sets
+
+    def __len__(self) -> int:
+        return sum(map(len, self.sets))
+
+    def read(self, index: int) -> Sample:
+        """Sample number `index`: those of the first set come first."""
+        part, place = self._place(index)
+        return part.read(place)
+
+    def number(self, index: int) -> int:
+        """The number in the name of sample number `index`."""
+        part, place = self._place(index)
+        return part.number(place)
+
+    def refresh(self) -> None:
+        """List all folders again."""
+        for part in self.sets:
+            part.refresh()
+
+    def _place(self, index: int) -> tuple[SampleFolder, int]:
+        for part in self.sets:
+            if index < len(part):
+                return part, index
+            index -= len(part)
+        raise IndexError(index)
+
+
+def open_sources(folders: Sequence[Path]) -> Source:
+    """The data set in one folder, or the procedural sets of several as one. Raises InputError, also for an
+    InteriorVerse among several."""
+    if len(folders) == 1:
+        return open_source(folders[0])
+    sets = []
+    for folder, found in zip(folders, map(open_source, folders), strict=True):
+        if not isinstance(found, SampleFolder):
+            raise InputError(f"{folder} is InteriorVerse; only sets of materialist train data can be put together.")
+        sets.append(found)
+    return SampleSets(sets)
