@@ -70,6 +70,21 @@ def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
     assert (alpha[:, 40:46][dark[:, 40:46]] > 0.95).all()
 
 
+def test_a_bright_rim_is_no_mixture():
+    """The lip of a vase, brighter than vase and wall, is the vase's where the mask says so, and a lit edge behind its
+    outline is not."""
+    body, wall, lip = np.array([0.6, 0.25, 0.08]), np.array([0.25, 0.25, 0.25]), np.array([0.95, 0.8, 0.6])
+    rows = np.arange(80)[:, None, None]
+    large = np.where(rows < 32, wall, np.where(rows < 40, lip, body)) + np.zeros((80, 80, 3))
+    mask = np.zeros((20, 20), bool)
+    mask[8:] = True  # from native row 32 on
+    alpha = matte(mask, large.astype(np.float32))[:, 40]
+    assert (alpha[34:] > 0.95).all() and (alpha[:30] < 0.05).all()
+    mask[8:10] = False  # the lip belongs to what is behind
+    alpha = matte(mask, large.astype(np.float32))[:, 40]
+    assert (alpha[42:] > 0.95).all() and (alpha[:38] < 0.05).all()
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.06])
 def test_thin_parts_and_gaps_keep_their_mask(noise):
     """Where nothing is surely inside, or outside, nearby, colour tells nothing of that side."""

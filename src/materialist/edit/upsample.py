@@ -24,6 +24,9 @@ GRAIN = 0.03
 PATTERN = (0.2, 0.5)
 """Standard deviation of the colour of one side, in units of the distance between the two: none from the first is a
 pattern, and from the second on nothing else."""
+BESIDE = (0.3, 0.6)
+"""Distance of a colour from the line between those of both sides, in units of its length (grain comes on top): up to
+the first it may be a mixture of the two, from the second on it is none: a bright rim, a highlight, a shadow's edge."""
 _RADIUS = 0.8
 """Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
 
@@ -96,9 +99,9 @@ def matte(mask: Array, large: Array) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
     Within about two working pixels of the mask's border a native pixel lies somewhere between the colour of what is
-    well inside and well outside nearby; its place on the line between them is its share. Where both look the same the
-    enlarged mask decides, and where one has a pattern, whether the pixel can be of the other. Exactly 0 and 1 further
-    away.
+    well inside and well outside nearby; its place on the line between them is its share. Where both look the same, and
+    where it is no mixture of the two, the enlarged mask decides, and where one has a pattern, whether the pixel can be
+    of the other. Exactly 0 and 1 further away.
     """
     import cv2
 
@@ -145,7 +148,10 @@ def _shares(soft: Array, large: Array, scale: float) -> Array:
     spread = np.sqrt(np.maximum(front_spread, back_spread) / np.maximum(length, 1e-6))
     plain = np.clip((PATTERN[1] - spread) / (PATTERN[1] - PATTERN[0]), 0, 1)
     known = known_front * known_back
-    trust = np.clip(length / 0.1**2, 0, 1) * plain * known
+    away = np.sqrt(((encoded - back - share[..., None] * line) ** 2).sum(-1))
+    beside = np.maximum(away - 2 * GRAIN, 0) / np.sqrt(np.maximum(length, 1e-6))
+    mixture = np.clip((BESIDE[1] - beside) / (BESIDE[1] - BESIDE[0]), 0, 1)
+    trust = np.clip(length / 0.1**2, 0, 1) * plain * mixture * known
     no_back, no_front = (_unlike(encoded, *side) for side in ((back, back_spread), (front, front_spread)))
     guess = soft + known * ((1 - soft) * no_back * (1 - no_front) - soft * no_front * (1 - no_back))
     alpha = guess + trust * (share - guess)
