@@ -13,8 +13,10 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.predict.bundled.network import srgb
+from materialist.predict.bundled import weights
+from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
 from materialist.predict.bundled.predictor import BundledPredictor
+from materialist.predict.weights import sha256
 from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
 from materialist.train.export import export_run
@@ -119,6 +121,33 @@ def test_the_averaged_weights_are_exported_and_predict(run, tmp_path):
     assert moved > 0, "an average is not the last step"
     with pytest.raises(OutputError, match="exists"):
         export_run(folder, file)
+
+
+def test_the_mean_with_other_weights_is_exported(run, tmp_path):
+    folder, _ = run
+    alone, other, mean = (tmp_path / f"{name}.safetensors" for name in ("alone", "other", "mean"))
+    export_run(folder, alone)
+    network, facts = weights.load(alone)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter += 0.5
+    weights.save(other, network, facts)
+    export_run(folder, mean, average_with=other)
+    found, told = weights.load(mean)
+    assert told["averaged with"] == sha256(other)[:16]
+    mixed = found.state_dict()
+    for name, tensor in weights.load(alone)[0].named_parameters():
+        torch.testing.assert_close(mixed[name], tensor + 0.25, atol=4e-3, rtol=4e-3)
+
+
+def test_no_mean_with_another_network(run, tmp_path):
+    file, other = tmp_path / "w.safetensors", tmp_path / "other.safetensors"
+    with pytest.raises(WeightsError, match=r"no weights at .*nowhere"):
+        export_run(run[0], file, average_with=tmp_path / "nowhere.safetensors")
+    weights.save(other, BundledNetwork(Architecture.from_dict({**made_runs.NETWORK, "fine": 16})), {})
+    with pytest.raises(WeightsError, match="of other sizes"):
+        export_run(run[0], file, average_with=other)
+    assert not file.exists()
 
 
 def test_an_export_to_no_folder_is_refused(run, tmp_path):

@@ -109,12 +109,15 @@ def matnet(
 def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run of `train matnet`.")],
     output: Annotated[Path, output_option("FILE", "A .safetensors file.")],
+    average_with: Annotated[
+        Path | None, typer.Option(help="Exported weights, such as the run began from: the mean of both is written.")
+    ] = None,
     as_json: Json = False,
     force: Force = False,
 ) -> None:
     """Write the averaged weights of a run as float16 with everything needed to load them."""
     from materialist.train.export import export_run
 
-    facts = export_run(run, output, force=force)
+    facts = export_run(run, output, average_with=average_with, force=force)
     lines = [f"{output}: {facts['megabytes']:.1f} MB after {facts['step']} steps."]
     report_success("train export", as_json, lines, output=str(output), **facts)

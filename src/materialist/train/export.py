@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError, OutputError, WeightsError
 from materialist.predict.bundled.network import Architecture, BundledNetwork
-from materialist.predict.bundled.weights import save
+from materialist.predict.bundled.weights import load, save
 from materialist.predict.matnet.predictor import FORMAT
 from materialist.predict.own_weights import write
 from materialist.predict.weights import sha256
@@ -16,11 +16,16 @@ from materialist.train import checkpoint
 from materialist.train.trainer import KIND, SCORES
 
 
-def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any]:
+def export_run(
+    run: Path, output: Path, *, average_with: Path | None = None, force: bool = False
+) -> dict[str, Any]:  # fmt: skip
     """Write the weights of a run of `train matnet` as float16 .safetensors, of a bundled one the averaged ones.
 
-    Returns step, minutes, megabytes, hash. Raises WeightsError without a checkpoint, InputError for another kind of
-    file or of run, OutputError when `output` exists.
+    average_with: exported weights of the bundled network, such as those that the run began from; the mean of both is
+    written, which does better than either on what neither has seen (Wortsman et al. 2022, "Model soups").
+
+    Returns step, minutes, megabytes, hash. Raises WeightsError without a checkpoint, or for weights of another network,
+    InputError for another kind of file or of run, OutputError when `output` exists.
     """
     if output.suffix != ".safetensors":
         raise InputError(f"The weights are a .safetensors file, not {output.name}.")
@@ -37,6 +42,11 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "data": state["data"],
         "scores": scores[-1] if scores else {},
     }
+    if average_with is not None:
+        if state["recipe"]["task"] == "paper":
+            raise InputError("--average-with is for the bundled network; leave it out for the paper's.")
+        tensors = _mean(tensors, average_with, state["recipe"]["network"])
+        facts["averaged with"] = sha256(average_with)[:16]
     from safetensors import SafetensorError
 
     try:
@@ -54,3 +64,15 @@ def export_run(run: Path, output: Path, *, force: bool = False) -> dict[str, Any
         "megabytes": output.stat().st_size / 1e6,
         "hash": sha256(output)[:16],
     }
+
+
+def _mean(tensors: dict[str, Any], path: Path, network: dict[str, Any]) -> dict[str, Any]:
+    """Tensors half way to those in an exported file of the same network."""
+    if not path.is_file():
+        raise WeightsError(f"There are no weights at {path}; give a file of materialist train export.")
+    other, _ = load(path)
+    if other.architecture != Architecture.from_dict(network):
+        raise WeightsError(f"{path} is of a network of other sizes than the run's; give weights that it began from.")
+    mine = other.state_dict()
+    half = lambda a, b: ((a.float() + b.float()) / 2).to(a.dtype) if a.dtype.is_floating_point else a  # noqa: E731
+    return {name: half(tensor, mine[name]) for name, tensor in tensors.items()}
