@@ -70,6 +70,17 @@ def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
     assert (alpha[:, 40:46][dark[:, 40:46]] > 0.95).all()
 
 
+def test_the_halos_of_a_sharpened_edge_keep_it_sharp():
+    encoded = np.full(80, 0.30)
+    encoded[40:] = 0.55
+    encoded[38:40] -= 0.15
+    encoded[40:42] += 0.15
+    large = srgb_to_linear(np.broadcast_to(encoded[None, :, None], (80, 80, 3))).astype(np.float32)
+    mask = np.zeros((20, 20), bool)
+    mask[:, 10:] = True
+    np.testing.assert_array_equal(matte(mask, large)[40], np.arange(80) >= 40)
+
+
 def test_a_bright_rim_is_no_mixture():
     """The lip of a vase, brighter than vase and wall, is the vase's where the mask says so, and a lit edge behind its
     outline is not."""

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
+from materialist.predict.bundled import weights
 
 
 @pytest.fixture(scope="module")
@@ -25,10 +26,15 @@ def test_one_step_and_its_weights(data, tmp_path):
     small = ("--size", 32, "--batch", 1, "--workers", 0, "--score-samples", 0, "--device", "cpu", "--json")
     first = _call("matnet", "--data", data, "-o", tmp_path / "run", "--steps", 1, *small)
     assert first["step"] == 1
-    again = _call("matnet", "--data", data, "--data", data, "-o", tmp_path / "run", "--steps", 1, "--resume", *small)
+    more = made_samples.write_set(tmp_path / "more", 3)
+    again = _call("matnet", "--data", data, "--data", more, "-o", tmp_path / "run", "--steps", 1, "--resume", *small)
     assert again["step"] == 2
     written = _call("export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--json")
     assert written["step"] == 2 and written["megabytes"] < 40, "what the package can hold"
+    assert weights.load(tmp_path / "w.safetensors")[1]["data"] == {"samples": 5, "seed": [5, 5]}
+    mixed = ("-o", tmp_path / "mean.safetensors", "--average-with", tmp_path / "w.safetensors", "--json")
+    _call("export", tmp_path / "run", *mixed)
+    assert "averaged with" in weights.load(tmp_path / "mean.safetensors")[1]
 
 
 @pytest.mark.parametrize(

@@ -43,8 +43,10 @@ def test_several_sets_are_one(tmp_path):
     made_samples.write_set(tmp_path / "a", 4)
     source.refresh()
     assert [source.number(k) for k in range(len(source))] == [0, 1, 2, 3, 0, 1, 2]
-    with pytest.raises(IndexError):
-        source.read(7)
+    assert source.seed() == [5, 5]
+    for beyond in (7, -1):
+        with pytest.raises(IndexError):
+            source.read(beyond)
     with pytest.raises(InputError, match="no data folder"):
         open_sources([*folders, tmp_path / "nowhere"])
 

@@ -134,7 +134,7 @@ def test_the_mean_with_other_weights_is_exported(run, tmp_path):
     weights.save(other, network, facts)
     export_run(folder, mean, average_with=other)
     found, told = weights.load(mean)
-    assert told["averaged with"] == sha256(other)[:16]
+    assert told["averaged with"] == sha256(other)[:16] and "scores" not in told
     mixed = found.state_dict()
     for name, tensor in weights.load(alone)[0].named_parameters():
         torch.testing.assert_close(mixed[name], tensor + 0.25, atol=4e-3, rtol=4e-3)
@@ -145,8 +145,13 @@ def test_no_mean_with_another_network(run, tmp_path):
     with pytest.raises(WeightsError, match=r"no weights at .*nowhere"):
         export_run(run[0], file, average_with=tmp_path / "nowhere.safetensors")
     weights.save(other, BundledNetwork(Architecture.from_dict({**made_runs.NETWORK, "fine": 16})), {})
-    with pytest.raises(WeightsError, match="of other sizes"):
+    with pytest.raises(WeightsError, match="differ in fine; give weights of the same"):
         export_run(run[0], file, average_with=other)
+    state = checkpoint.load(run[0])
+    (tmp_path / "paper").mkdir()
+    checkpoint.save(tmp_path / "paper", state | {"recipe": state["recipe"] | {"task": "paper"}})
+    with pytest.raises(InputError, match="leave it out for the paper's"):
+        export_run(tmp_path / "paper", file, average_with=other)
     assert not file.exists()
 
 

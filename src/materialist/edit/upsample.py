@@ -24,9 +24,10 @@ GRAIN = 0.03
 PATTERN = (0.2, 0.5)
 """Standard deviation of the colour of one side, in units of the distance between the two: none from the first is a
 pattern, and from the second on nothing else."""
-BESIDE = (0.3, 0.6)
+BESIDE, BEYOND = (0.3, 0.6), 0.75
 """Distance of a colour from the line between those of both sides, in units of its length (grain comes on top): up to
-the first it may be a mixture of the two, from the second on it is none: a bright rim, a highlight, a shadow's edge."""
+the first it may be a mixture of the two, from the second on it is none: a bright rim, a highlight, a shadow's edge. The
+line goes on beyond its ends by so much of its length, as the halos of sharpened edges do."""
 _RADIUS = 0.8
 """Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
 
@@ -143,12 +144,14 @@ def _shares(soft: Array, large: Array, scale: float) -> Array:
     back, back_spread, known_back = _mean_of(encoded, sure_out, NEARBY * scale)
     line = front - back
     length = (line**2).sum(-1)
-    share = np.clip(((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6), 0, 1)
+    place = ((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6)  # on the line: 0 is back, 1 front
+    share = np.clip(place, 0, 1)
     # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
     spread = np.sqrt(np.maximum(front_spread, back_spread) / np.maximum(length, 1e-6))
     plain = np.clip((PATTERN[1] - spread) / (PATTERN[1] - PATTERN[0]), 0, 1)
     known = known_front * known_back
-    away = np.sqrt(((encoded - back - share[..., None] * line) ** 2).sum(-1))
+    nearest = np.clip(place, -BEYOND, 1 + BEYOND)[..., None]
+    away = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
     beside = np.maximum(away - 2 * GRAIN, 0) / np.sqrt(np.maximum(length, 1e-6))
     mixture = np.clip((BESIDE[1] - beside) / (BESIDE[1] - BESIDE[0]), 0, 1)
     trust = np.clip(length / 0.1**2, 0, 1) * plain * mixture * known

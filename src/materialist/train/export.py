@@ -16,13 +16,11 @@ from materialist.train import checkpoint
 from materialist.train.trainer import KIND, SCORES
 
 
-def export_run(
-    run: Path, output: Path, *, average_with: Path | None = None, force: bool = False
-) -> dict[str, Any]:  # fmt: skip
+def export_run(run: Path, output: Path, *, average_with: Path | None = None, force: bool = False) -> dict[str, Any]:
     """Write the weights of a run of `train matnet` as float16 .safetensors, of a bundled one the averaged ones.
 
     average_with: exported weights of the bundled network, such as those that the run began from; the mean of both is
-    written, which does better than either on what neither has seen (Wortsman et al. 2022, "Model soups").
+    written, which often does better than either on what neither has seen (Wortsman et al. 2022, "Model soups").
 
     Returns step, minutes, megabytes, hash. Raises WeightsError without a checkpoint, or for weights of another network,
     InputError for another kind of file or of run, OutputError when `output` exists.
@@ -47,6 +45,7 @@ def export_run(
             raise InputError("--average-with is for the bundled network; leave it out for the paper's.")
         tensors = _mean(tensors, average_with, state["recipe"]["network"])
         facts["averaged with"] = sha256(average_with)[:16]
+        facts["scores of the run"] = facts.pop("scores")  # the mean has others
     from safetensors import SafetensorError
 
     try:
@@ -71,8 +70,10 @@ def _mean(tensors: dict[str, Any], path: Path, network: dict[str, Any]) -> dict[
     if not path.is_file():
         raise WeightsError(f"There are no weights at {path}; give a file of materialist train export.")
     other, _ = load(path)
-    if other.architecture != Architecture.from_dict(network):
-        raise WeightsError(f"{path} is of a network of other sizes than the run's; give weights that it began from.")
-    mine = other.state_dict()
+    own = Architecture.from_dict(network)
+    if other.architecture != own:
+        differing = [n for n, value in own.as_dict().items() if other.architecture.as_dict()[n] != value]
+        raise WeightsError(f"{path} and the run differ in {', '.join(differing)}; give weights of the same network.")
+    theirs = other.state_dict()
     half = lambda a, b: ((a.float() + b.float()) / 2).to(a.dtype) if a.dtype.is_floating_point else a  # noqa: E731
-    return {name: half(tensor, mine[name]) for name, tensor in tensors.items()}
+    return {name: half(tensor, theirs[name]) for name, tensor in tensors.items()}

@@ -51,9 +51,13 @@ class SampleSets:
         for part in self.sets:
             part.refresh()
 
+    def seed(self) -> list[int | None]:
+        """The seeds that the sets were made with."""
+        return [part.seed() for part in self.sets]
+
     def _place(self, index: int) -> tuple[SampleFolder, int]:
         for part in self.sets:
-            if index < len(part):
+            if 0 <= index < len(part):
                 return part, index
             index -= len(part)
         raise IndexError(index)
@@ -65,7 +69,8 @@ def open_sources(folders: Sequence[Path]) -> Source:
     if len(folders) == 1:
         return open_source(folders[0])
     sets = []
-    for folder, found in zip(folders, map(open_source, folders), strict=True):
+    for folder in folders:
+        found = open_source(folder)
         if not isinstance(found, SampleFolder):
             raise InputError(f"{folder} is InteriorVerse; only sets of materialist train data can be put together.")
         sets.append(found)

@@ -153,7 +153,7 @@ class Trainer:
         checkpoint.append_line(self.folder / SCORES, {k: _rounded(v) for k, v in line.items()})
         names = ("albedo_psnr", "roughness_psnr_pooled", "metallic_psnr_pooled", "normal_angle", "depth_si_log_rmse")
         told = "  ".join(f"{n} {figures[n]:.3g}" for n in names if n in figures)
-        few = f"  (of samples trained on: none is kept aside of fewer than {stream.KEPT_ASIDE})"
+        few = f"  (of samples trained on: every {stream.KEPT_ASIDE}th of a set is kept aside, and there is none)"
         self.note(told + (few if self.scored_on == TRAINED_ON else ""))
         return figures
 

@@ -41,7 +41,7 @@ LEAST_ISLAND = 0.0005
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, fine: Array | None = None, device: Any = "cpu",
+    network: BundledNetwork, linear: Array, rays: Array, *, original: Array | None = None, device: Any = "cpu",
     sides: Sequence[int] | None = None,
 ) -> Prediction:  # fmt: skip
     """Maps of a photo at its own size.
@@ -53,7 +53,8 @@ def infer(
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-        fine: [H0, W0, 3] the same photo with more pixels, for what it is to be seen larger than it is.
+        original: [H0, W0, 3] float32 the same photo with more pixels, if there is one, for sizes that `linear` has not;
+            clipped likewise, once it is brought to such a size.
         sides: longest sides, in pixels, at which the network sees the photo; by default those that suit what is in it.
 
     Returns:
@@ -61,10 +62,12 @@ def infer(
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    sides = sides or views.sides(linear)
+    larger = linear if original is None or max(original.shape[:2]) <= max(size) else original
+    judged = larger if max(size) < views.JUDGED else linear
+    sides = sides or views.sides(judged, max(larger.shape[:2]))
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
-    maps = _mean_answer(network, linear, rays, sides, device, fine)
+    maps = _mean_answer(network, linear, rays, sides, device, larger)
     surface = _without_specks(_surface(maps["mask"]) | _detailed(photo, rays))
     if not surface.any():
         surface[:] = True
@@ -136,13 +139,13 @@ def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float
 
 
 def _mean_answer(
-    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any, fine: Array | None = None
+    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any, larger: Array
 ) -> dict[str, Array]:
-    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest size that `linear`
-    has."""
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes that
+    `linear` has; `larger` is the photo with the most pixels."""
     target = _network_size(linear.shape[:2], max(sides))
     answers = []
-    for photo in _seen(linear, sides, fine):
+    for photo in _seen(linear, larger, sides):
         seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
         mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
@@ -153,15 +156,15 @@ def _mean_answer(
     return {n: np.mean([resample.values(a[n], target) for a in answers], axis=0) for n in answers[0]}
 
 
-def _seen(linear: Array, sides: Sequence[int], fine: Array | None) -> Iterator[Array]:
+def _seen(linear: Array, larger: Array, sides: Sequence[int]) -> Iterator[Array]:
     """The photo at each size at which the network sees it, the smallest first; sizes that it does not have, once."""
     done = set()
     for side in sorted(sides):
-        source = linear if fine is None or side <= max(linear.shape[:2]) else fine
+        source = linear if side <= max(linear.shape[:2]) else larger
         size = _network_size(source.shape[:2], side)
         if size not in done:
             done.add(size)
-            yield np.clip(resample.values(source, size), 0, 1)
+            yield np.nan_to_num(np.clip(resample.values(source, size), 0, 1)).astype(np.float32)
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:

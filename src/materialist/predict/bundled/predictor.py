@@ -53,7 +53,7 @@ class BundledPredictor:
         sky. Raises WeightsError when the weights give values that are not finite.
         """
         rays = rays_of(photo.camera)
-        found = infer(self.network, photo.linear, rays, fine=photo.original, device=self.device)
+        found = infer(self.network, photo.linear, rays, original=photo.original, device=self.device)
         m = found.materials
         if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")

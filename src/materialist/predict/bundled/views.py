@@ -1,9 +1,9 @@
-"""How large the network sees a photo: as large as brings what is in it to the density of what it learnt from.
+"""How large the network sees a photo: as large as makes it no more crowded than the pictures that it learnt from.
 
-A pixel of a crowded photo shows more than one of the pictures that the network has learnt from, and things of a few
-pixels are not seen; a bare wall, seen too large, shows no border to any convolution. Miangoleh et al. 2021 ("Boosting
-Monocular Depth Estimation Models to High-Resolution via Content-Adaptive Multi-Resolution Merging") choose the
-resolution by how far pixels are from the nearest edge, and so does this.
+A pixel of a crowded photo shows more than one of those pictures, and things of a few pixels are not seen; a bare wall,
+seen too large, shows no border to any convolution. Miangoleh et al. 2021 ("Boosting Monocular Depth Estimation Models
+to High-Resolution via Content-Adaptive Multi-Resolution Merging") choose the resolution by how far pixels are from the
+nearest edge, and so does this.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ from materialist.predict import resample
 from materialist.types import Array
 
 PLAIN = (192, 384)
-"""Longest sides at which a photo with no more in it than the training pictures is seen: the whole, and details."""
+"""Longest sides at which a photo no more crowded than that is seen: the whole, and details."""
 LARGEST = 2.0
 """How much larger than that, at most, a crowded photo is seen."""
+WHOLE = 0.75
+"""Most of a photo's pixels along a side at which the whole is seen: two sizes know more than one."""
 JUDGED = 256
 """Longest side at which the density is judged: that of the training pictures."""
 EDGE = 0.1
@@ -28,9 +30,11 @@ SPACING = 38.0
 one in ten has less, and half have 58 or more."""
 
 
-def sides(linear: Array) -> tuple[int, ...]:
-    """Longest sides, in pixels, at which the network sees a photo [H, W, 3] linear in [0, 1]."""
-    factor = float(np.clip(SPACING / max(spacing(linear), 1e-6), 1, LARGEST))
+def sides(linear: Array, longest: int) -> tuple[int, ...]:
+    """Longest sides, in pixels, at which the network sees a photo [H, W, 3] linear in [0, 1], which is there with
+    `longest` pixels at most."""
+    most = float(np.clip(WHOLE * longest / PLAIN[0], 1, LARGEST))
+    factor = float(np.clip(SPACING / max(spacing(linear), 1e-6), 1, most))
     return tuple(round(factor * side) for side in PLAIN)
 
 
