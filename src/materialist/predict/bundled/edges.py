@@ -14,7 +14,8 @@ from materialist.types import Array
 
 HALVED = 8
 """Radius from which windows are summed at half the resolution (He and Sun 2015, "Fast Guided Filter"): a quarter of the
-work for sums that hardly differ; the colours that they are compared with stay whole."""
+work for sums that hardly differ (windows are one coarse pixel wider or narrower); the colours that they are compared
+with stay whole. Pictures narrower than twice that are summed as they are."""
 
 
 class Guide:
