@@ -22,7 +22,7 @@ from materialist.types import Array, FitReport, Photo, Prediction, Scene
 if TYPE_CHECKING:
     from materialist.fit.attempt import Attempt
 
-FINAL_SPP = 42
+FINAL_SPP = 32
 """Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")

@@ -31,7 +31,7 @@ class Studio:
     def twins(self, edited: Scene) -> tuple[Render, Render]:
         """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
 
-        The splitting tracer serves smooth light; with lamps, a peaked light or glass on either side both go to
+        The splitting tracer serves smooth light; with lamps, a sun or glass on either side both go to
         Mitsuba's path tracer, which aims at the lights and follows paths through glass.
         """
         depth = max(_path_depth(s) for s in (self.scene, edited))
@@ -186,6 +186,8 @@ class Studio:
             if other.geometry is scene.geometry and (other.lamps, other.bodies) == (scene.lamps, scene.bodies):
                 return target
         target = _built(scene, self.device)
+        if self._built:
+            target.aim_as(self._built[0][1])
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target
@@ -222,13 +224,13 @@ def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, de
 def _path_depth(scene: Scene) -> int:
     """Length of the paths that Mitsuba's tracer must follow; 0 where the splitting tracer does."""
     from materialist.render.bodies import is_glowing, is_transparent
-    from materialist.render.envmap import is_peaked
+    from materialist.render.envmap import is_sunny
     from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
 
     if any(is_transparent(body.surface) for body in scene.bodies):
         return GLASS_DEPTH
     glows = any(is_glowing(body.surface) for body in scene.bodies)
-    return MAX_DEPTH if glows or scene.lamps or is_peaked(scene.envmap) else 0
+    return MAX_DEPTH if glows or scene.lamps or is_sunny(scene.envmap) else 0
 
 
 def _built(scene: Scene, device: str):

@@ -7,7 +7,7 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf, body_emitter
 from materialist.render.buffers import floats, integers, tensor
-from materialist.render.envmap import check_envmap, half_turn, is_peaked, on_mitsuba_grid
+from materialist.render.envmap import check_envmap, half_turn, is_sunny, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Materials, Mesh
 
@@ -44,7 +44,10 @@ class RenderScene:
         if not (geometry.mesh.face_plane == -1).any():
             raise InputError("The mesh has no depth surface to render; give a depth map with some values above 0.")
         self.mi = mi = setup(device)
-        self._peaked = False
+        self._envmap = np.ones((4, 8, 3), np.float32)
+        self._sunny = False
+        self._aim = self._openness = None
+        self._like: RenderScene | None = None
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
         members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
@@ -83,14 +86,14 @@ class RenderScene:
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
-        self._peaked = is_peaked(envmap)
+        self._envmap, self._sunny, self._aim = np.asarray(envmap, np.float32), is_sunny(envmap), None
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
     def render(
         self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False, share=None
     ) -> Array:
-        """Path-trace the picture: by splitting paths (`render.split`), or under a peaked light by Mitsuba's `path`.
+        """Path-trace the picture: by splitting paths (`render.split`), or under a sun by Mitsuba's `path`.
 
         Args:
             spp: samples per pixel, at least this many: camera rays that split, or paths. seed: equal seeds give equal
@@ -105,14 +108,36 @@ class RenderScene:
         from materialist.render.split import DEEPEST, trace
 
         _check_options(spp, max_depth)
-        if self._peaked or not 2 <= max_depth <= DEEPEST:
+        if self._sunny or not 2 <= max_depth <= DEEPEST:
             if share is not None:
-                raise InputError("A share of the rays cannot be traced under a peaked light, or at this path length.")
+                raise InputError("A share of the rays cannot be traced under a sun, or at this path length.")
             return self.render_path(spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
         return trace(
-            self.mi_scene, self.camera, spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters,
-            share=share,
+            self.mi_scene, self.camera, self._aimed(), spp=spp, seed=seed, max_depth=max_depth,
+            hide_emitters=hide_emitters, share=share,
         )  # fmt: skip
+
+    def aim_as(self, other: RenderScene) -> None:
+        """Aim at the light as another scene does, whose geometry differs: pictures with the same random numbers."""
+        self._like, self._aim = other, None
+
+    def _from_where(self) -> Array:
+        """From where light reaches what the camera sees (`aim.openness`)."""
+        if self._like is not None:
+            return self._like._from_where()
+        if self._openness is None:
+            from materialist.render.aim import openness
+
+            self._openness = openness(self.mi_scene, self.camera)
+        return self._openness
+
+    def _aimed(self):
+        """The `Aim` at this light, None where it is not worth its rays."""
+        from materialist.render.aim import Aim
+
+        if self._aim is None:
+            self._aim = Aim(self._envmap, self._from_where())
+        return self._aim if self._aim.worth else None
 
     def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
         """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""

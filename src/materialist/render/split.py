@@ -1,9 +1,10 @@
-"""A path tracer that splits at the first hit, for light without small bright sources.
+"""A path tracer that splits at the first hit, for light without suns.
 
 Mitsuba's `path` spends three quarters of its rays beyond the first hit, where a quarter of the light and less of the
-noise is, and half of its direct ones on sampling the light. Here one camera ray sends SPLIT diffuse directions and one
-specular direction on their way, and all of a pixel's directions of a lobe form one lattice. Each of them goes on as a
-path of its own: where light is hidden by a surface, that surface's light takes its place in the same stratum.
+noise is. Here one camera ray sends SPLIT diffuse directions and one specular direction on their way, and all of a
+pixel's directions of a lobe form one lattice. Each of them goes on as a path of its own: where light is hidden by a
+surface, that surface's light takes its place in the same stratum. Where some light stands out, one more ray from every
+hit aims at it (`render.aim`), and each direction counts by how likely it was to be found that way (balance heuristic).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.render.aim import Aim
 from materialist.render.buffers import integers
 from materialist.render.share import Share
 from materialist.transport.sampling import point
@@ -21,6 +23,8 @@ from materialist.types import Array, Camera
 
 SPLIT = 2
 """Diffuse directions of a first hit; the specular lobe gets one."""
+ALL = 0xFFFFFFFF
+"""Component of a BSDF context: every lobe."""
 DEEPEST = 6
 """The largest path length that is traced this way: bounces are unrolled."""
 
@@ -29,12 +33,13 @@ _R2 = (0.7548776662466927, 0.5698402909980532)
 
 
 def trace(
-    scene: mi.Scene, camera: Camera, *, spp: int, seed: int, max_depth: int, hide_emitters: bool,
+    scene: mi.Scene, camera: Camera, aim: Aim | None, *, spp: int, seed: int, max_depth: int, hide_emitters: bool,
     share: Share | None = None,
 ) -> Array:  # fmt: skip
     """[H, W, 3] radiance of a scene whose one emitter is an environment map and whose BSDFs are `materialist_disney`.
 
     Args:
+        aim: directions to aim at from every hit; None: scattered ones alone.
         spp: camera rays per pixel; each counts for (SPLIT + 1) paths.
         seed: equal seeds give equal pictures.
         max_depth: path length, 2 (direct light) to DEEPEST.
@@ -50,7 +55,7 @@ def trace(
         shifts, random = _random(lane, seed, share is not None and share.rest)
         order = (dr.opaque(mi.UInt32, value) for value in _order(share))
         count = (dr.opaque(mi.UInt32, rays), dr.opaque(mi.UInt32, spp), *order)
-        total = _loop(scene, corner, pixel, shifts, random, count, max_depth - 1, not hide_emitters)
+        total = _loop(scene, aim, corner, pixel, shifts, random, count, max_depth - 1, not hide_emitters)
         dr.eval(total)
         picture[pixels] = np.array(total).T / np.float32(rays)
     return picture.reshape(camera.height, camera.width, 3)
@@ -65,12 +70,12 @@ def _order(share: Share | None) -> tuple[int, int, int]:
 
 
 def _random(lane, seed: int, rest: bool):
-    """The starts of a pixel's three lattices, which all its rays share, and its generator for what follows."""
+    """The starts of a pixel's four lattices, which all its rays share, and its generator for what follows."""
     number = mi.UInt64(lane)
     # As PCG32(size=...) does it for all pixels at once; a pixel's numbers do not depend on which others are traced.
     stream = mi.UInt64(0xDA3E39CB94B95BDB) + number  # type: ignore[operator]
     random: Any = mi.PCG32(initstate=mi.UInt64(seed) + number, initseq=stream)  # type: ignore[operator]
-    shifts = tuple(_uniform(random) for _ in range(3))
+    shifts = tuple(_uniform(random) for _ in range(4))
     if rest:
         random = mi.PCG32(initstate=mi.UInt64(seed + (1 << 40)) + number, initseq=stream)  # type: ignore[operator]
     dr.eval(shifts, random)
@@ -78,9 +83,9 @@ def _random(lane, seed: int, rest: bool):
 
 
 @dr.syntax
-def _loop(scene, corner, pixel, shifts, random, counts, bounces: int, sky: bool):
+def _loop(scene, aim, corner, pixel, shifts, random, counts, bounces: int, sky: bool):
     """Sum over camera rays of every pixel; `counts`: how many are traced, how many there are, and `_order`."""
-    jitter, diffuse, specular = shifts
+    jitter, diffuse, specular, lamp = shifts
     rays, count, first, step, group = counts
     total = mi.Color3f(0)
     j = dr.zeros(mi.UInt32, dr.width(corner))
@@ -91,37 +96,59 @@ def _loop(scene, corner, pixel, shifts, random, counts, bounces: int, sky: bool)
         hit = si.is_valid()
         if dr.hint(sky, mode="scalar"):
             total += dr.select(hit, 0, radiance(scene, ray.d, ~hit))
+        if dr.hint(aim is not None, mode="scalar"):
+            total += _aimed(scene, aim, si, ((0, SPLIT), (1, 1)), point(i, count, lamp), hit)
         k = mi.UInt32(0)
         while k < SPLIT:
             sample = point(k * count + i, count * SPLIT, diffuse)
-            total += _path(scene, si, 0, sample, hit, bounces, random) / SPLIT
+            total += _path(scene, aim, si, 0, sample, hit, bounces, random) / SPLIT
             k += 1
-        total += _path(scene, si, 1, point(i, count, specular), hit, bounces, random)
+        total += _path(scene, aim, si, 1, point(i, count, specular), hit, bounces, random)
         j += 1
     return total
 
 
-def _path(scene, si, component: int, sample, active, bounces: int, random):
+def _path(scene, aim, si, component: int, sample, active, bounces: int, random):
     """Light along one direction of the BSDF's `component`, and by way of what stands there, over `bounces` rays."""
     context = mi.BSDFContext()
     context.component = component
     bs, weight = si.bsdf().sample(context, si, mi.Float(0.5), sample, active)
+    found = (SPLIT if component == 0 else 1) * bs.pdf
     total = mi.Color3f(0)
     for bounce in range(bounces):
-        active = active & (bs.pdf > 0)
+        active = active & (found > 0)
         ray = si.spawn_ray(si.to_world(bs.wo))
         if bounce == bounces - 1:
             escaped = active & ~scene.ray_test(ray, active)
         else:
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=False, active=active)
             escaped = active & ~si.is_valid()
-        total = total + dr.select(escaped, weight * radiance(scene, ray.d, escaped), 0)
+        balance = mi.Float(1) if aim is None else found / (found + aim.pdf(ray.d, escaped))
+        total = total + dr.select(escaped, balance * weight * radiance(scene, ray.d, escaped), 0)
         if bounce < bounces - 1:
             active = active & si.is_valid()
+            if aim is not None:
+                total += weight * _aimed(scene, aim, si, ((ALL, 1),), _uniform(random), active)
             lobe, direction = random.next_float32(), _uniform(random)
             bs, value = si.bsdf().sample(mi.BSDFContext(), si, lobe, direction, active)
+            found = bs.pdf
             weight = weight * value
     return total
+
+
+def _aimed(scene, aim, si, components, sample, active):
+    """Light from one direction of `aim`, by those of the BSDF's (component, directions that it scatters itself)."""
+    context, bsdf = mi.BSDFContext(), si.bsdf()
+    direction, density = aim.sample(sample)
+    local = si.to_local(direction)
+    weight = mi.Color3f(0)
+    for component, count in components:
+        context.component = component
+        value, pdf = bsdf.eval_pdf(context, si, local, active)
+        weight += value / (density + count * pdf)
+    active = active & (dr.max(weight) > 0)
+    lit = active & ~scene.ray_test(si.spawn_ray(direction), active)
+    return dr.select(lit, weight * radiance(scene, direction, lit), 0)
 
 
 def radiance(scene, direction, active):
