@@ -18,7 +18,7 @@ ROWS = 32
 FINEST = 128
 """Most rows of cells that directions are chosen from."""
 POINTS, RAYS = 2048, 128
-"""Pixels whose surfaces look around, and how many rays each sends."""
+"""Places in the picture whose surfaces look around, and how many rays each sends."""
 ANYWHERE = 0.05
 """Least openness that is believed: what few rays found may still arrive."""
 WORTH = 0.15
@@ -29,14 +29,13 @@ def openness(scene: Any, camera: Camera, *, seed: int = 0) -> Array:
     """[ROWS, 2 ROWS] how much of each cell's light arrives at what the camera sees, cosines included; 1 in the mean."""
     rng = np.random.default_rng(seed)
     size = camera.width * camera.height
-    count = min(POINTS, size)
-    chosen = ((np.arange(count) + rng.random(count)) * size / count).astype(np.int64)
-    lane = dr.arange(mi.UInt32, count * RAYS)
+    chosen = ((np.arange(POINTS) + rng.random(POINTS)) * size / POINTS).astype(np.int64)
+    lane = dr.arange(mi.UInt32, POINTS * RAYS)
     pixel = dr.gather(mi.UInt32, integers(mi, chosen), lane // RAYS)
     row, col = mi.Float(pixel // camera.width) + 0.5, mi.Float(pixel % camera.width) + 0.5
     seen = mi.Vector3f((col - camera.width / 2) / camera.focal, (camera.height / 2 - row) / camera.focal, -1)
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(seen)))
-    u, v = (floats(mi, x) for x in rng.random((2, count * RAYS)))
+    u, v = (floats(mi, x) for x in rng.random((2, POINTS * RAYS)))
     side = dr.select(si.wi.z > 0, mi.Float(1), mi.Float(-1))
     local = mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v)) * mi.Vector3f(1, 1, side)
     direction = si.to_world(lifted(local, face_towards(si.to_local(si.n), mi.Vector3f(0, 0, side))))

@@ -1,0 +1,106 @@
+"""Directions towards the light that reaches a scene: a proper density, that sees what is open, and leaves no bias."""
+
+import numpy as np
+import pytest
+from render_scenes import uniform, wall, with_floor
+
+from materialist.envmap import row_solid_angle, texel_directions
+from materialist.render.aim import ROWS, Aim, openness
+from materialist.render.scene import RenderScene
+from materialist.types import Camera
+
+CAMERA = Camera(8, 6, 60.0)
+
+
+@pytest.fixture(scope="module")
+def corner() -> RenderScene:
+    """A wall on a floor."""
+    scene = RenderScene(with_floor(wall(CAMERA), np.zeros((6, 8), int), height=-0.8), CAMERA, device="cpu")
+    scene.set_materials(uniform(CAMERA, albedo=0.6, roughness=0.4, metallic=0.3))
+    return scene
+
+
+def lamp(rows: int = 64) -> np.ndarray:
+    """A dim map with one bright patch above and behind the camera."""
+    envmap = np.full((rows, 2 * rows, 3), 0.1, np.float32)
+    envmap[rows // 6 : rows // 3, : rows // 4] = 20.0
+    return envmap
+
+
+def directions(mi, rows: int):
+    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(c)) for c in texel_directions(rows, 2 * rows).reshape(-1, 3).T))
+
+
+@pytest.mark.parametrize("rows", [4, 30, 64, 512])
+def test_density_integrates_to_one(corner, rows):
+    aim = Aim(np.random.default_rng(1).uniform(0, 3, (rows, 2 * rows, 3)) ** 4, np.ones((ROWS, 2 * ROWS)))
+    density = np.array(aim.pdf(directions(corner.mi, aim.rows))).reshape(aim.rows, -1)
+    assert (density * row_solid_angle(aim.rows)[:, None]).sum() == pytest.approx(1, abs=1e-4)
+
+
+def test_samples_have_the_density_that_is_told(corner):
+    mi, rows = corner.mi, 16
+    aim = Aim(np.random.default_rng(2).uniform(0, 3, (rows, 2 * rows, 3)) ** 4, np.ones((ROWS, 2 * ROWS)))
+    u = np.random.default_rng(3).random((2, 400_000)).astype(np.float32)
+    direction, density = aim.sample(mi.Point2f(mi.Float(u[0]), mi.Float(u[1])))
+    d = np.array(direction).T
+    assert np.linalg.norm(d, axis=1) == pytest.approx(1, abs=1e-5)
+    assert np.mean(np.abs(np.array(aim.pdf(direction)) - np.array(density)) > 1e-4) < 1e-3  # but at borders of cells
+    row = np.minimum((np.arccos(d[:, 1]) / np.pi * rows).astype(int), rows - 1)
+    column = ((np.arctan2(d[:, 0], -d[:, 2]) / (2 * np.pi) + 0.5) * 2 * rows).astype(int) % (2 * rows)
+    counted = np.bincount(row * 2 * rows + column, minlength=2 * rows * rows).reshape(rows, -1) / len(d)
+    told = np.array(aim.pdf(directions(mi, rows))).reshape(rows, -1) * row_solid_angle(rows)[:, None]
+    assert counted == pytest.approx(told, abs=4 * np.sqrt(told.max() / len(d)))
+
+
+def test_aims_at_the_lamp_alone(corner):
+    envmap = lamp()
+    aim = Aim(envmap, np.ones((ROWS, 2 * ROWS)))
+    density = np.array(aim.pdf(directions(corner.mi, 64))).reshape(64, 128)
+    assert density[20, 100] == 0 and density[15, 5] > 1
+    assert aim.worth
+    assert not Aim(np.ones((8, 16, 3), np.float32), np.ones((ROWS, 2 * ROWS))).worth
+    assert not Aim(np.zeros((8, 16, 3), np.float32), np.ones((ROWS, 2 * ROWS))).worth
+
+
+def test_nothing_arrives_through_the_wall_or_the_floor(corner):
+    share = openness(corner.mi_scene, CAMERA)
+    forward, up, behind = (ROWS // 2, ROWS), (2, 0), (ROWS // 2 - 4, 0)
+    assert share[forward] == 0
+    assert share[ROWS - 1].max() < 0.05 < share[up]
+    assert share[behind] > 1
+    assert share.mean() == pytest.approx(1)
+
+
+@pytest.mark.parametrize("max_depth", [2, 4])
+def test_the_picture_is_the_path_tracers(corner, max_depth):
+    corner.set_envmap(lamp())
+    assert corner._aimed() is not None
+    expected = corner.render_path(spp=16384, seed=1, max_depth=max_depth)
+    found = corner.render(spp=8192, seed=2, max_depth=max_depth)
+    assert found == pytest.approx(expected, rel=0.02, abs=2e-3)
+    assert found.mean() == pytest.approx(float(expected.mean()), rel=2e-3)
+
+
+def test_aiming_removes_noise(corner, monkeypatch):
+    """At fewer rays: 13 for each camera ray that aims, 10 for each that does not."""
+    corner.set_envmap(lamp())
+
+    def noise(spp: int) -> float:
+        return np.stack([corner.render(spp=spp, seed=k) for k in range(40)]).var(0).mean()
+
+    aimed = noise(4)
+    monkeypatch.setattr(RenderScene, "_aimed", lambda self: None)
+    assert aimed < 0.5 * noise(6)
+
+
+def test_scenes_that_are_compared_aim_alike(corner):
+    """Another geometry has another openness, and with it other directions everywhere, unless told."""
+    other = RenderScene(wall(CAMERA), CAMERA, device="cpu")
+    other.set_materials(uniform(CAMERA, albedo=0.6, roughness=0.4, metallic=0.3))
+    for scene in (corner, other):
+        scene.set_envmap(lamp())
+    density = [np.array(scene._aimed()._density) for scene in (corner, other)]
+    assert not np.array_equal(*density)
+    other.aim_as(corner)
+    assert np.array_equal(density[0], np.array(other._aimed()._density))
