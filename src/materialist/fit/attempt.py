@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics
+from materialist.color import linear_to_srgb
 from materialist.fit.ends import find_ends
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
-from materialist.fit.inverse import WHITE, Fit
+from materialist.fit.inverse import WHITE, Fit, FitState
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
 from materialist.geometry.ends import Ends
 from materialist.io.photo import HDR_CLIP
+from materialist.render.envmap import is_sunny
 from materialist.render.scene import RenderScene
+from materialist.render.share import Share
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
 AUTO, FULL = "auto", "planes,backs"
@@ -26,6 +29,12 @@ POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
 """dB by which that must be better to be kept: what completion adds helps every other light."""
+DIM = 25.0
+"""dB to which the first light must come for it not to be asked, before anything else is fitted, whether it comes"""
+NEARER = 1.0
+"""so much nearer without."""
+GLANCE = 24
+"""Camera rays a pixel from which that is told, half of them for each of two pictures."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,9 @@ class Begun:
     fit: Fit
     judge: Callable[..., Array]
     stages: list[dict]
+    renderer: RenderScene | None = None
+    state: FitState | None = None
+    """Where the fit begins, once it has its first light."""
 
 
 @dataclass(frozen=True)
@@ -94,10 +106,12 @@ class Job:
         materials that are worse.
         """
         begun, notes = self.choose(completion)
+        if completion == AUTO:
+            begun, notes = self.glanced(begun, notes)
         full = self.finish(begun)
         del begun  # its cache: the next one is as large
-        if completion != AUTO:
-            return full, ()
+        if completion != AUTO or full.completion != FULL:
+            return full, notes
         before = self._psnr(full)
         if before >= POOR or not (full.doubted and (full.geometry.mesh.face_plane >= 0).any()):
             return full, notes
@@ -106,11 +120,53 @@ class Job:
         stages = (*full.stages, *bare.stages)
         if after < before + CLEARLY:
             return replace(full, stages=stages), notes
-        note = (
-            f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
-            f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
+        return replace(bare, stages=stages), (_left_out(before, after),)
+
+    def glanced(self, begun: Begun, notes: tuple[str, ...]) -> tuple[Begun, tuple[str, ...]]:
+        """The same fit, or where its first light is far from the photo and clearly nearer without completion, that.
+
+        A second whole fit then need not be made. What the report should say, too.
+        """
+        unasked = self.engine != "transport" or self.strategy != "default" or self.settings.trust is None
+        if unasked or not (begun.geometry.mesh.face_plane >= 0).any():
+            return begun, notes
+        begun, before = self.lit(begun)
+        if before >= DIM:
+            return begun, notes
+        bare, after = self.lit(self.begin("none"))
+        if after >= before + NEARER:
+            bare.stages[:0] = [*begun.stages, *(begun.state.stages if begun.state else ())]
+            return bare, (_left_out(before, after),)
+        begun.stages += [*bare.stages, *(bare.state.stages if bare.state else ())]
+        return begun, notes
+
+    def lit(self, begun: Begun) -> tuple[Begun, float]:
+        """The fit with its first light, and how near the photo the path tracer then comes: dB without its noise.
+
+        That is seen in the pixels that the light was fitted on, with the albedo that it took for theirs. Infinite where
+        the prior explains the photo, so that nothing is to be asked, and under a sun, where single pixels tell little.
+        """
+        begun = replace(begun, state=begun.fit.lit())
+        state, renderer = begun.state, begun.renderer
+        assert state is not None and renderer is not None
+        doubted = any(stage.get("prior_trust") == 1.0 for stage in state.stages)
+        if not doubted or state.rows is None or is_sunny(state.envmap):
+            return begun, np.inf
+        return begun, timed(begun.stages, "glance", lambda: self._near(state, renderer))
+
+    def _near(self, state: FitState, renderer: RenderScene) -> float:
+        pixels, values = state.rows or (np.zeros(0, np.int64), np.zeros((0, 3)))
+        albedo = self.prior.materials.albedo.reshape(-1, 3).copy()
+        albedo[pixels] = values
+        renderer.set_materials(replace(self.prior.materials, albedo=albedo.reshape(self.prior.materials.albedo.shape)))
+        renderer.set_envmap(state.envmap)
+        half = Share(2, pixels=pixels)
+        photo = linear_to_srgb(self.picture.linear).reshape(-1, 3)[pixels].astype(np.float64)
+        first, second = (
+            linear_to_srgb(renderer.render(spp=GLANCE, seed=self.seed + k, share=half)).reshape(-1, 3)[pixels] - photo
+            for k in (401, 402)
         )
-        return replace(bare, stages=stages), (note,)
+        return float(-10 * np.log10(max(float((first * second).mean()), 1e-9)))  # their noise has mean zero
 
     def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
         """The fit to run for `completion`: for `auto`, with walls that end where the light says."""
@@ -144,7 +200,7 @@ class Job:
             mask=self.mask, strategy=self.strategy, seed=self.seed, progress=self.progress,
             white=HDR_CLIP if self.picture.hdr else WHITE,
         )  # fmt: skip
-        return Begun(completion, tuple(ends), geometry, fit, judge, stages)
+        return Begun(completion, tuple(ends), geometry, fit, judge, stages, renderer)
 
     def _geometry(self, completion: str, ends: Sequence[Ends]) -> Geometry:
         prior, camera = self.prior, self.picture.camera
@@ -157,7 +213,7 @@ class Job:
         fit, stages = begun.fit, list(begun.stages)
         if isinstance(fit.engine, TransportEngine):
             timed(stages, "trace", fit.engine.cache.trace)
-        state = fit.run()
+        state = fit.run(begun.state)
         materials = fit.materials(state)
         envmap = state.envmap
         self.found("light", envmap)
@@ -183,6 +239,14 @@ class Job:
             geometry, camera, self.picture.linear, seed=self.seed, light_height=self.settings.light_grid,
             progress=self.progress,
         )  # fmt: skip
+
+
+def _left_out(before: float, after: float) -> str:
+    """What a report says where completion is left out, PSNR with and without it in dB."""
+    return (
+        f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
+        f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
+    )
 
 
 def _judge(renderer: RenderScene) -> Callable[..., Array]:

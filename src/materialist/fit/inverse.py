@@ -14,7 +14,7 @@ from materialist.color import linear_to_srgb
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.fields import EnvmapTexels
-from materialist.fit.light import envmap_field, fit_light, start_radiance
+from materialist.fit.light import envmap_field, fit_light, slack_albedo, start_radiance
 from materialist.fit.loop import Progress
 from materialist.fit.losses import residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
@@ -42,6 +42,8 @@ class FitState:
     envmap: Array
     """[h, 2h, 3]."""
     stages: list[dict] = field(default_factory=list)
+    rows: tuple[Array, Array] | None = None
+    """Pixels [Q] (row-major) that the last light was fitted on, and the albedo [Q, 3] that it took for theirs."""
 
 
 @dataclass(frozen=True)
@@ -65,30 +67,45 @@ class Fit:
     white: float = WHITE
     """Value from which a channel of the photo is taken for clipped."""
 
-    def run(self) -> FitState:
-        """Fit; returns maps and light."""
-        state = FitState(self._prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
+    def run(self, state: FitState | None = None) -> FitState:
+        """Fit; returns maps and light. `state`: what `lit` came to, if that is known."""
         if self.strategy == "white-light-first":
-            return self._white_light_first(state)
-        fit = self if self.settings.trust is None else replace(self, settings=self._trusting(state))
+            return self._white_light_first(self._unlit())
+        state = state or self.lit()
+        fit = self._trusting()
         for round_ in range(self.settings.rounds):
-            fit._light(state, round_)
+            if round_ > 0:
+                fit._light(state, round_)
             fit._materials(state, corrections=self.settings.corrections * (round_ == self.settings.rounds - 1))
         return state
 
-    def _trusting(self, state: FitState) -> FitSettings:
-        """The settings with the prices of leaving the prior scaled by how well the prior explains the photo.
+    def lit(self) -> FitState:
+        """The first light, and how far the prior is trusted: where `run` begins."""
+        state = self._unlit()
+        if self.settings.trust is not None:
+            state.stages.append({**self._explained, "prior_trust": self._trust()})
+        self._trusting()._light(state)
+        return state
 
-        The error e of the best light for it is what materials or geometry have wrong; prices grow by (trust / e)^3.
-        """
+    def _unlit(self) -> FitState:
+        return FitState(self._prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
+
+    def _trust(self) -> float:
+        """How much dearer it is to leave the prior: (trust / e)^3, e the error of the best light for it, which is what
+        materials or geometry have wrong."""
+        return min(max(((self.settings.trust or 0) / max(self.prior_error(), 1e-6)) ** 3, 1.0), MAX_TRUST)
+
+    def _trusting(self) -> Fit:
+        """The fit with the prices of leaving the prior scaled by how well the prior explains the photo."""
         settings = self.settings
-        stage = self._explained
-        error = stage["prior_error"]
-        scale = min(max(((settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
-        state.stages.append({**stage, "prior_trust": scale})
+        if settings.trust is None:
+            return self
+        scale = self._trust()
         slack = None if settings.light.slack is None else settings.light.slack * scale
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
-        return replace(settings, light=replace(settings.light, slack=slack), materials=materials)
+        return replace(
+            self, settings=replace(settings, light=replace(settings.light, slack=slack), materials=materials)
+        )
 
     def prior_error(self) -> float:
         """Mean absolute error (encoded) that the best light leaves with the prior's materials as they are."""
@@ -119,8 +136,13 @@ class Fit:
             with torch.no_grad():
                 light.log.copy_(state_log(state.envmap, settings.height))
         steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
-        result = fit_light(problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress)
+        slack = slack_albedo(problem, settings)
+        result = fit_light(
+            problem, self._photo(), light, settings, steps=steps, seed=self.seed, progress=self.progress, slack=slack
+        )
         state.stages.append(result.summary())
+        if slack is not None and problem.matrix is not None:
+            state.rows = problem.matrix.pixels.numpy(), slack.detach().numpy()
         state.envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
         state.envmap = paste_visible_sky(
             state.envmap, self.photo.linear, self._surface(), self.photo.camera, white=self.white

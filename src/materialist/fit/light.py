@@ -52,22 +52,23 @@ def fit_light(
     steps: int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
+    slack: nn.Parameter | None = None,
 ) -> StageResult:
     """Move `field` so that the rendering matches the photo: argmin_E L1 + L2.
 
     Args:
         photo: [H * W, 3] linear.
         steps: at most this many, instead of the schedule's.
+        slack: takes the albedo that every row of the problem's matrix came to; see `slack_albedo`.
     """
     target = photo[problem.pixels]
     jitter = torch.Generator().manual_seed(seed)
     schedule = settings.schedule if steps is None else replace(settings.schedule, max_steps=steps)
     parameters: list = [{"params": list(field.parameters())}]
-    slack: nn.Parameter | None = None
     price = settings.slack or 0.0
-    if settings.slack is not None and problem.matrix is not None:
-        given = problem.matrix.albedo
-        slack = nn.Parameter(given.clone())
+    slack = slack_albedo(problem, settings) if slack is None else slack
+    if slack is not None:
+        given = slack.detach().clone()
         parameters.append({"params": [slack], "lr": 0.02})
 
     weight = None if problem.matrix is None else stiffness(problem.matrix)
@@ -88,6 +89,13 @@ def fit_light(
             slack.clamp_(0, 1)
 
     return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)
+
+
+def slack_albedo(problem: LightProblem, settings: LightSettings) -> nn.Parameter | None:
+    """[Q, 3] the given albedo of the matrix's rows, as something that the light fit may change; None if it may not."""
+    if settings.slack is None or problem.matrix is None:
+        return None
+    return nn.Parameter(problem.matrix.albedo.clone())
 
 
 def _seen(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:
