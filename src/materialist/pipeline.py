@@ -22,8 +22,6 @@ from materialist.types import Array, FitReport, Photo, Prediction, Scene
 if TYPE_CHECKING:
     from materialist.fit.attempt import Attempt
 
-FINAL_SPP = 32
-"""Camera rays per pixel of the re-rendering that a scene is judged by; each splits into three paths."""
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
 SMALL = 0.05
@@ -115,10 +113,9 @@ def invert(
         raise InputError(
             "The path engine fits as the paper does; give it settings with corrections=0 and other_metallic=None."
         )
-    spp = overrides.get("spp", FINAL_SPP)
     job = Job(
         picture, prior, settings, engine, envmap_size[1], tau, mask,
-        strategy, seed, device, spp, progress, found,
+        strategy, seed, device, overrides.get("spp"), progress, found,
     )  # fmt: skip
     # The paper's schedule is followed once, however well it does.
     best, notes = job.best(FULL if completion == AUTO and preset == "paper" else completion)
@@ -131,7 +128,7 @@ def invert(
             "completion": best.completion, "completion_asked": completion, "ends": [asdict(e) for e in best.ends],
             "tau": tau, "strategy": strategy, "mask": _named(mask),
             "settings": asdict(settings) if overrides.get("settings") else None,
-            "seed": seed, "spp": spp, "size": size,
+            "seed": seed, "spp": best.spp, "size": size,
             "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
         },
     )  # fmt: skip
@@ -294,4 +291,4 @@ def _check_mask(mask: Array | None, picture: Photo) -> None:
         raise InputError("The mask is empty; mark at least one pixel.")
 
 
-__all__ = ["FINAL_SPP", "invert", "render_scene"]
+__all__ = ["invert", "render_scene"]

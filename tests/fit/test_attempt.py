@@ -1,5 +1,6 @@
 """`--completion auto`: what completion adds stays, unless the photo is matched clearly better without."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,25 +24,32 @@ def picture_at(decibel: float) -> np.ndarray:
 
 
 def job(
-    monkeypatch, results: dict[str, float], *, planes: bool = True, found: Found | None = None, trust: float = 1.0
-) -> tuple[Job, list[str]]:
+    monkeypatch, results: dict[str, float], *, planes: bool = True, found: Found | None = None, trust: float = 1.0,
+    first: dict[str, float] | None = None,
+) -> tuple[Job, list[str]]:  # fmt: skip
     """A job whose attempts come to the given PSNR by completion, and the list of those finished.
 
-    `found`: what the search for the ends of walls comes to.
+    `found`: what the search for the ends of walls comes to. `first`: how near the first light comes, by completion.
     """
     finished: list[str] = []
 
     def begin(self, completion: str, ends=()) -> Begun:
         mesh = SimpleNamespace(face_plane=np.array([0 if planes else -1]))
-        return Begun(completion, tuple(ends), SimpleNamespace(mesh=mesh), None, None, [])
+        return Begun(completion, tuple(ends), SimpleNamespace(mesh=mesh), None, None, [], None)
 
     def finish(self, begun: Begun) -> Attempt:
         finished.append(begun.completion)
         picture = picture_at(results[begun.completion])
         stage = {"name": begun.completion, "prior_trust": trust}
-        return Attempt(begun.completion, begun.ends, begun.geometry, None, None, picture, (stage,))
+        stages = (*begun.stages, stage) if first else (stage,)
+        return Attempt(begun.completion, begun.ends, begun.geometry, None, None, picture, stages)
+
+    def lit(self, begun: Begun) -> tuple[Begun, float]:
+        begun.stages.append({"name": f"glance {begun.completion}"})
+        return begun, (first or {FULL: 30.0})[begun.completion]
 
     monkeypatch.setattr(Job, "begin", begin)
+    monkeypatch.setattr(Job, "lit", lit)
     monkeypatch.setattr(Job, "finish", finish)
     monkeypatch.setattr(attempt, "find_ends", lambda *_, **__: found)
     settings = SimpleNamespace(trust=0.08)
@@ -71,6 +79,24 @@ def test_auto_leaves_completion_out_only_where_that_is_clearly_better(monkeypatc
     assert bool(notes) == (kept == "none")
     if notes:
         assert "dB" in notes[0] and f"--completion {FULL}" in notes[0]
+
+
+@pytest.mark.parametrize(("full", "none", "kept"), [(26, 40, FULL), (22, 24, "none"), (22, 22.5, FULL), (22, 12, FULL)])
+def test_the_first_light_tells_before_anything_else_is_fitted(monkeypatch, full, none, kept):
+    task, made = job(monkeypatch, {FULL: 30, "none": 30}, first={FULL: full, "none": none})
+    best, notes = task.best("auto")
+    assert (best.completion, made) == (kept, [kept])
+    looked = [f"glance {FULL}"] + ["glance none"] * (full < 25)
+    assert sorted(s["name"] for s in best.stages) == sorted(["walls", *looked, kept])
+    assert bool(notes) == (kept == "none")
+    if notes:
+        assert f"({full:.1f} dB)" in notes[0] and f"({none:.1f} dB)" in notes[0]
+
+
+@pytest.mark.parametrize("change", [{"engine": "path"}, {"strategy": "white-light-first"}])
+def test_other_fits_have_no_first_light_to_look_at(monkeypatch, change):
+    task, made = job(monkeypatch, {FULL: 30, "none": 30}, first={FULL: 10, "none": 24})
+    assert replace(task, **change).best("auto")[0].completion == FULL and made == [FULL]
 
 
 def test_without_planes_there_is_nothing_to_leave_out(monkeypatch):

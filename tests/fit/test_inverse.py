@@ -1,6 +1,7 @@
 """The whole inverse problem on a small synthetic room whose materials and light are known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from transport_scenes import furnished_room, windowed_sky
 
 from materialist import metrics
 from materialist.envmap import texel_directions
+from materialist.fit.attempt import Job
 from materialist.fit.engine import PathEngine, TransportEngine
-from materialist.fit.inverse import Fit, paste_visible_sky
+from materialist.fit.inverse import Fit, FitState, paste_visible_sky
 from materialist.fit.loop import Schedule
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage
 from materialist.render.scene import RenderScene
@@ -108,6 +110,32 @@ def test_a_dark_photo_gets_no_brighter_light_than_it_needs(room):
     fit.engine.set_radiance(dark)
     state = replace(fit, photo=replace(room.photo, linear=dark, original=dark)).run()
     assert 0.6 < state.envmap.mean() / (share * room.light.mean()) < 1.6  # from 0.6 it ended at more than three times
+
+
+def test_a_fit_goes_on_from_its_first_light(room):
+    whole, fit = room.fit(short(DEFAULT)).run(), room.fit(short(DEFAULT))
+    begun = fit.lit()
+    assert [s["name"] for s in begun.stages] == ["trust", "light"]
+    pixels, albedo = begun.rows
+    assert albedo.shape == (len(pixels), 3) and albedo.min() >= 0 and albedo.max() <= 1
+    resumed = fit.run(begun)
+    assert [s["name"] for s in resumed.stages] == [s["name"] for s in whole.stages]
+    assert np.array_equal(resumed.envmap, whole.envmap) and torch.equal(resumed.maps, whole.maps)
+
+
+@pytest.mark.parametrize("dimmed", [1.0, 0.5])
+def test_how_near_a_light_comes_is_told_without_noise(room, dimmed):
+    """From 12 rays a pixel, what 1024 would have."""
+    job = Job(
+        room.photo, SimpleNamespace(materials=room.truth), DEFAULT, "transport", ENVMAP_HEIGHT, 6.0, None, "default",
+        3, "cpu", 4, None, lambda *_: None,
+    )  # fmt: skip
+    pixels = np.flatnonzero(room.photo.linear.sum(-1) > 0)
+    albedo = room.truth.albedo.reshape(-1, 3)[pixels] * np.float32(0.8)
+    state = FitState(torch.zeros(0, 5), room.light * np.float32(dimmed), [], (pixels, albedo))
+    told = job._near(state, room.path)
+    known = room.judge(replace(room.truth, albedo=room.truth.albedo * np.float32(0.8)), state.envmap, 1024)
+    assert told == pytest.approx(metrics.psnr(known, room.photo.linear), abs=0.5)
 
 
 def test_each_correction_has_noise_of_its_own(room):

@@ -12,9 +12,6 @@ from materialist.errors import InputError
 from materialist.render.share import Share
 from materialist.types import Array, Lamp, Scene
 
-PATHS_PER_RAY = 3
-"""Paths that `RenderScene.render` follows from one camera ray (see render.split)."""
-
 
 class Studio:
     """Renderings of one fitted scene and of its edits, always with the same random numbers on both sides.
@@ -26,7 +23,7 @@ class Studio:
     def __init__(self, scene: Scene, *, device: str = "auto"):
         self.scene, self.device = scene, device
         self._built: list[tuple[Scene, Any]] = []
-        self._base: dict[tuple[int, int, int], Array] = {}
+        self._base: dict[tuple[int, int, int, int], Array] = {}
 
     def twins(self, edited: Scene) -> tuple[Render, Render]:
         """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
@@ -34,22 +31,22 @@ class Studio:
         The splitting tracer serves smooth light; with lamps, a sun or glass on either side both go to
         Mitsuba's path tracer, which aims at the lights and follows paths through glass.
         """
-        depth = max(_path_depth(s) for s in (self.scene, edited))
+        depth, paths = self._tracer(edited)
 
         def base(spp: int, seed: int) -> Array:
-            key = (depth, spp, seed)
+            key = (depth, paths, spp, seed)
             if key not in self._base:
-                self._base[key] = self._render(self.scene, depth, spp, seed)
+                self._base[key] = self._render(self.scene, depth, paths, spp, seed)
             return self._base[key]
 
         missing = self._missing_sky(edited)
         if missing is None:
-            return base, lambda spp, seed: self._render(edited, depth, spp, seed)
+            return base, lambda spp, seed: self._render(edited, depth, paths, spp, seed)
         where, more, less = missing
 
         def before_sky(spp: int, seed: int) -> Array:
-            sky = self._render(more, depth, spp, seed) - self._render(less, depth, spp, seed)
-            return self._render(edited, depth, spp, seed) + np.where(where, sky, 0)
+            sky = self._render(more, depth, paths, spp, seed) - self._render(less, depth, paths, spp, seed)
+            return self._render(edited, depth, paths, spp, seed) + np.where(where, sky, 0)
 
         return base, before_sky
 
@@ -74,12 +71,13 @@ class Studio:
 
         Both have the random numbers of `twins`, and no picture is kept.
         """
-        if max(_path_depth(s) for s in (self.scene, edited)):
+        depth, paths = self._tracer(edited)
+        if depth:
             return None
 
         def begin(scene: Scene) -> Begun:
             def render(spp: int, seed: int, share: Share) -> tuple[Array, int]:
-                rays = -(-spp // PATHS_PER_RAY)
+                rays = -(-spp // paths)
                 return self._dressed(scene).render(spp=rays, seed=seed, share=share), share.rays(rays)
 
             return render
@@ -88,15 +86,21 @@ class Studio:
 
     def beside(self, edited: Scene, other: Scene) -> Render:
         """render(spp, seed) of `other` by the tracer that `twins` takes for `edited`."""
-        depth = max(_path_depth(s) for s in (self.scene, edited))
-        return lambda spp, seed: self._render(other, depth, spp, seed)
+        depth, paths = self._tracer(edited)
+        return lambda spp, seed: self._render(other, depth, paths, spp, seed)
 
-    def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
+    def _tracer(self, edited: Scene) -> tuple[int, int]:
+        """Which tracer the base and `edited` take: path length of Mitsuba's, 0 for the splitting one, and how many
+        paths this follows from a camera ray on either side."""
+        depth = max(_path_depth(s) for s in (self.scene, edited))
+        return depth, 1 if depth else max(self._dressed(s).paths for s in (self.scene, edited))
+
+    def _render(self, scene: Scene, depth: int, paths: int, spp: int, seed: int) -> Array:
         """By Mitsuba's path tracer to that depth, by the splitting one for 0."""
         target = self._dressed(scene)
         if depth:
             return target.render_path(spp=spp, seed=seed, max_depth=depth)
-        return target.render(spp=-(-spp // PATHS_PER_RAY), seed=seed)
+        return target.render(spp=-(-spp // paths), seed=seed)
 
     def covered(self, edited: Scene) -> Array:
         """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""

@@ -25,14 +25,16 @@ from materialist.render.share import Share
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
 AUTO, FULL = "auto", "planes,backs"
+FINAL_PATHS = 112
+"""Paths a pixel of the re-rendering that a scene is judged by: 28 camera rays, or 38 where none aims at the light."""
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
 """dB by which that must be better to be kept: what completion adds helps every other light."""
 DIM = 25.0
-"""dB to which the first light must come for it not to be asked, before anything else is fitted, whether it comes"""
+"""dB of the picture under the first light from which on nothing more is asked before the rest is fitted."""
 NEARER = 1.0
-"""so much nearer without."""
+"""dB by which a darker one must be better without what completion adds for that to be left out there and then."""
 GLANCE = 24
 """Camera rays a pixel from which that is told, half of them for each of two pictures."""
 
@@ -51,6 +53,8 @@ class Attempt:
     rerender: Array
     """[H, W, 3] linear, path traced."""
     stages: tuple[dict, ...]
+    spp: int = 0
+    """Camera rays a pixel of that."""
 
     @property
     def doubted(self) -> bool:
@@ -69,7 +73,7 @@ class Begun:
     fit: Fit
     judge: Callable[..., Array]
     stages: list[dict]
-    renderer: RenderScene | None = None
+    renderer: RenderScene
     state: FitState | None = None
     """Where the fit begins, once it has its first light."""
 
@@ -88,7 +92,8 @@ class Job:
     strategy: str
     seed: int
     device: str
-    spp: int
+    spp: int | None
+    """Camera rays a pixel of the re-rendering; None: those of FINAL_PATHS."""
     progress: Any
     found: Callable[[str, Any], Any]
     """Told "light" and "materials" as soon as each is there."""
@@ -137,7 +142,7 @@ class Job:
         if after >= before + NEARER:
             bare.stages[:0] = [*begun.stages, *(begun.state.stages if begun.state else ())]
             return bare, (_left_out(before, after),)
-        begun.stages += [*bare.stages, *(bare.state.stages if bare.state else ())]
+        begun.stages.extend([*bare.stages, *(bare.state.stages if bare.state else ())])
         return begun, notes
 
     def lit(self, begun: Begun) -> tuple[Begun, float]:
@@ -148,7 +153,7 @@ class Job:
         """
         begun = replace(begun, state=begun.fit.lit())
         state, renderer = begun.state, begun.renderer
-        assert state is not None and renderer is not None
+        assert state is not None
         doubted = any(stage.get("prior_trust") == 1.0 for stage in state.stages)
         if not doubted or state.rows is None or is_sunny(state.envmap):
             return begun, np.inf
@@ -220,8 +225,10 @@ class Job:
         self.found("materials", materials)
         self._tick("rerender")
         stages += state.stages
-        rerender = timed(stages, "rerender", lambda: begun.judge(materials, envmap, self.spp, self.seed + 1))
-        return Attempt(begun.completion, begun.ends, begun.geometry, materials, envmap, rerender, tuple(stages))
+        begun.renderer.set_envmap(envmap)
+        spp = self.spp or -(-FINAL_PATHS // begun.renderer.paths)
+        rerender = timed(stages, "rerender", lambda: begun.judge(materials, envmap, spp, self.seed + 1))
+        return Attempt(begun.completion, begun.ends, begun.geometry, materials, envmap, rerender, tuple(stages), spp)
 
     def _psnr(self, attempt: Attempt) -> float:
         return metrics.psnr(attempt.rerender, self.picture.linear)

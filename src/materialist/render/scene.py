@@ -131,6 +131,13 @@ class RenderScene:
             self._openness = openness(self.mi_scene, self.camera)
         return self._openness
 
+    @property
+    def paths(self) -> int:
+        """Paths that `render` follows from one camera ray under this light."""
+        from materialist.render.split import SPLIT
+
+        return 1 if self._sunny else SPLIT + 1 + (self._aimed() is not None)
+
     def _aimed(self):
         """The `Aim` at this light, None where it is not worth its rays."""
         from materialist.render.aim import Aim
