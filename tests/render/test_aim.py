@@ -94,6 +94,15 @@ def test_aiming_removes_noise(corner, monkeypatch):
     assert aimed < 0.5 * noise(6)
 
 
+def test_a_peak_that_is_hidden_from_most_is_aimed_at(corner):
+    """Behind the wall: what stands out hardly arrives, but is all the light of the rest of the floor."""
+    envmap = np.full((64, 128, 3), 0.1, np.float32)
+    envmap[24:30, 60:68] = 20.0
+    corner.set_envmap(envmap)
+    assert not Aim(envmap, corner._from_where()).worth
+    assert corner._aimed() is not None
+
+
 def test_scenes_that_are_compared_aim_alike(corner):
     """Another geometry has another openness, and with it other directions everywhere, unless told."""
     other = RenderScene(wall(CAMERA), CAMERA, device="cpu")

@@ -7,7 +7,7 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf, body_emitter
 from materialist.render.buffers import floats, integers, tensor
-from materialist.render.envmap import check_envmap, half_turn, is_sunny, on_mitsuba_grid
+from materialist.render.envmap import check_envmap, half_turn, is_peaked, is_sunny, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Materials, Mesh
 
@@ -144,7 +144,8 @@ class RenderScene:
 
         if self._aim is None:
             self._aim = Aim(self._envmap, self._from_where())
-        return self._aim if self._aim.worth else None
+        # What is hidden from most of the scene may still be all the light of the rest.
+        return self._aim if self._aim.worth or is_peaked(self._envmap) else None
 
     def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
         """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""
