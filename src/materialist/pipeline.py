@@ -179,8 +179,7 @@ def _report(
         )
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
-    measured = next((s for s in stages if "prior_trust" in s), {"prior_trust": None})
-    if measured["prior_trust"] == 1.0:
+    if found.doubted:
         notes.append(
             "No light explains the photo with the predicted materials; they were changed to match it, and shadows or "
             "shading may be baked into the albedo."

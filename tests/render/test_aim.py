@@ -6,6 +6,7 @@ from render_scenes import uniform, wall, with_floor
 
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.render.aim import ROWS, Aim, openness
+from materialist.render.envmap import is_peaked, is_sunny
 from materialist.render.scene import RenderScene
 from materialist.types import Camera
 
@@ -23,7 +24,7 @@ def corner() -> RenderScene:
 def lamp(rows: int = 64) -> np.ndarray:
     """A dim map with one bright patch above and behind the camera."""
     envmap = np.full((rows, 2 * rows, 3), 0.1, np.float32)
-    envmap[rows // 6 : rows // 3, : rows // 4] = 20.0
+    envmap[rows // 6 : rows // 3, : rows // 4] = 10.0
     return envmap
 
 
@@ -53,6 +54,16 @@ def test_samples_have_the_density_that_is_told(corner):
     assert counted == pytest.approx(told, abs=4 * np.sqrt(told.max() / len(d)))
 
 
+def test_hard_light_is_aimed_at_and_a_sun_left_to_mitsuba(corner):
+    """A patch of k texels in 1 has an unevenness of about 1 / its share: one of a few degrees, or one texel."""
+    patch, sun = lamp(), np.full((64, 128, 3), 0.01, np.float32)
+    sun[20, 3] = 1e4
+    assert is_peaked(patch) and not is_sunny(patch) and is_sunny(sun)
+    for envmap, paths in ((patch, 4), (sun, 1), (np.ones((8, 16, 3), np.float32), 3)):
+        corner.set_envmap(envmap)
+        assert corner.paths == paths
+
+
 def test_aims_at_the_lamp_alone(corner):
     envmap = lamp()
     aim = Aim(envmap, np.ones((ROWS, 2 * ROWS)))
@@ -75,7 +86,7 @@ def test_nothing_arrives_through_the_wall_or_the_floor(corner):
 @pytest.mark.parametrize("max_depth", [2, 4])
 def test_the_picture_is_the_path_tracers(corner, max_depth):
     corner.set_envmap(lamp())
-    assert corner._aimed() is not None
+    assert corner.paths == 4, "three of its own, and one that aims"
     expected = corner.render_path(spp=16384, seed=1, max_depth=max_depth)
     found = corner.render(spp=8192, seed=2, max_depth=max_depth)
     assert found == pytest.approx(expected, rel=0.02, abs=2e-3)

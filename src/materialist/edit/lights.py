@@ -14,7 +14,9 @@ from materialist.types import Array, Lamp, Scene
 
 
 class Studio:
-    """Renderings of one fitted scene and of its edits, always with the same random numbers on both sides.
+    """Renderings of one fitted scene and of its edits, with the same random numbers on both sides.
+
+    Under another light the directions that aim at it are others, too, and noise cancels less.
 
     What is alike is built once: scenes of one geometry, bodies and lamps share a Mitsuba scene, and a base picture
     that was rendered before is not rendered again.
@@ -28,7 +30,7 @@ class Studio:
     def twins(self, edited: Scene) -> tuple[Render, Render]:
         """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
 
-        The splitting tracer serves smooth light; with lamps, a sun or glass on either side both go to
+        The splitting tracer serves most light; with lamps, a sun or glass on either side both go to
         Mitsuba's path tracer, which aims at the lights and follows paths through glass.
         """
         depth, paths = self._tracer(edited)

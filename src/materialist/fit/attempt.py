@@ -26,7 +26,8 @@ from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
 AUTO, FULL = "auto", "planes,backs"
 FINAL_PATHS = 112
-"""Paths a pixel of the re-rendering that a scene is judged by: 28 camera rays, or 38 where none aims at the light."""
+"""Paths a pixel of the re-rendering that a scene is judged by: 28 camera rays, or 38 where none aims at the light,
+or under a sun as many samples."""
 POOR = 28.0
 """dB of the re-rendering below which `--completion auto` tries to do without what it has added."""
 CLEARLY = 2.0
@@ -59,7 +60,7 @@ class Attempt:
     @property
     def doubted(self) -> bool:
         """Whether the prior's materials did not explain the photo, so that the fit was free to change them."""
-        return any(stage.get("prior_trust") == 1.0 for stage in self.stages)
+        return prior_trust(self.stages) == 1.0
 
 
 @dataclass(frozen=True)
@@ -122,10 +123,9 @@ class Job:
             return full, notes
         bare = self.run("none")
         after = self._psnr(bare)
-        stages = (*full.stages, *bare.stages)
         if after < before + CLEARLY:
-            return replace(full, stages=stages), notes
-        return replace(bare, stages=stages), (_left_out(before, after),)
+            return replace(full, stages=(*bare.stages, *full.stages)), notes
+        return replace(bare, stages=(*full.stages, *bare.stages)), (_left_out(before, after),)
 
     def glanced(self, begun: Begun, notes: tuple[str, ...]) -> tuple[Begun, tuple[str, ...]]:
         """The same fit, or where its first light is far from the photo and clearly nearer without completion, that.
@@ -136,27 +136,28 @@ class Job:
         if unasked or not (begun.geometry.mesh.face_plane >= 0).any():
             return begun, notes
         begun, before = self.lit(begun)
-        if before >= DIM:
+        if before is None or before >= DIM:
             return begun, notes
         bare, after = self.lit(self.begin("none"))
-        if after >= before + NEARER:
-            bare.stages[:0] = [*begun.stages, *(begun.state.stages if begun.state else ())]
-            return bare, (_left_out(before, after),)
-        begun.stages.extend([*bare.stages, *(bare.state.stages if bare.state else ())])
-        return begun, notes
+        if after is not None and after >= before + NEARER:
+            kept, other, notes = bare, begun, (_left_out(before, after),)
+        else:
+            kept, other = begun, bare
+        kept.stages[:0] = [*other.stages, *(other.state.stages if other.state else ())]
+        return kept, notes
 
-    def lit(self, begun: Begun) -> tuple[Begun, float]:
+    def lit(self, begun: Begun) -> tuple[Begun, float | None]:
         """The fit with its first light, and how near the photo the path tracer then comes: dB without its noise.
 
-        That is seen in the pixels that the light was fitted on, with the albedo that it took for theirs. Infinite where
-        the prior explains the photo, so that nothing is to be asked, and under a sun, where single pixels tell little.
+        That is seen in the pixels that the light was fitted on, with the albedo that it took for theirs. None where
+        the prior explains the photo, so that nothing is to be asked, and under a sun, whose tracer knows whole pictures
+        alone.
         """
         begun = replace(begun, state=begun.fit.lit())
         state, renderer = begun.state, begun.renderer
         assert state is not None
-        doubted = any(stage.get("prior_trust") == 1.0 for stage in state.stages)
-        if not doubted or state.rows is None or is_sunny(state.envmap):
-            return begun, np.inf
+        if prior_trust(state.stages) != 1.0 or state.rows is None or is_sunny(state.envmap):
+            return begun, None
         return begun, timed(begun.stages, "glance", lambda: self._near(state, renderer))
 
     def _near(self, state: FitState, renderer: RenderScene) -> float:
@@ -171,7 +172,8 @@ class Job:
             linear_to_srgb(renderer.render(spp=GLANCE, seed=self.seed + k, share=half)).reshape(-1, 3)[pixels] - photo
             for k in (401, 402)
         )
-        return float(-10 * np.log10(max(float((first * second).mean()), 1e-9)))  # their noise has mean zero
+        # Their noise is independent; what the sRGB curve makes of its mean stays.
+        return float(-10 * np.log10(max(float((first * second).mean()), 1e-9)))
 
     def choose(self, completion: str) -> tuple[Begun, tuple[str, ...]]:
         """The fit to run for `completion`: for `auto`, with walls that end where the light says."""
@@ -226,7 +228,7 @@ class Job:
         self._tick("rerender")
         stages += state.stages
         begun.renderer.set_envmap(envmap)
-        spp = self.spp or -(-FINAL_PATHS // begun.renderer.paths)
+        spp = -(-FINAL_PATHS // begun.renderer.paths) if self.spp is None else self.spp
         rerender = timed(stages, "rerender", lambda: begun.judge(materials, envmap, spp, self.seed + 1))
         return Attempt(begun.completion, begun.ends, begun.geometry, materials, envmap, rerender, tuple(stages), spp)
 
@@ -246,6 +248,11 @@ class Job:
             geometry, camera, self.picture.linear, seed=self.seed, light_height=self.settings.light_grid,
             progress=self.progress,
         )  # fmt: skip
+
+
+def prior_trust(stages: Sequence[dict]) -> float | None:
+    """How firmly the prior was held in the last fit of those stages; None if that was not asked."""
+    return next((stage["prior_trust"] for stage in reversed(stages) if "prior_trust" in stage), None)
 
 
 def _left_out(before: float, after: float) -> str:

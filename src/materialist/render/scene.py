@@ -86,7 +86,8 @@ class RenderScene:
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
-        self._envmap, self._sunny, self._aim = np.asarray(envmap, np.float32), is_sunny(envmap), None
+        if not np.array_equal(envmap, self._envmap):
+            self._envmap, self._sunny, self._aim = np.array(envmap, np.float32), is_sunny(envmap), None
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 

@@ -40,7 +40,7 @@ def trace(
 
     Args:
         aim: directions to aim at from every hit; None: scattered ones alone.
-        spp: camera rays per pixel; each counts for (SPLIT + 1) paths.
+        spp: camera rays per pixel; each counts for SPLIT + 1 paths, and one more with `aim`.
         seed: equal seeds give equal pictures.
         max_depth: path length, 2 (direct light) to DEEPEST.
         hide_emitters: leave pixels of the sky black.
