@@ -82,7 +82,10 @@ def test_auto_leaves_completion_out_only_where_that_is_clearly_better(monkeypatc
         assert "dB" in notes[0] and f"--completion {FULL}" in notes[0]
 
 
-@pytest.mark.parametrize(("full", "none", "kept"), [(26, 40, FULL), (22, 24, "none"), (22, 22.5, FULL), (22, 12, FULL)])
+@pytest.mark.parametrize(
+    ("full", "none", "kept"),
+    [(26, 40, FULL), (22, 24, "none"), (22, 22.5, FULL), (22, 12, FULL), (22, None, FULL), (None, 40, FULL)],
+)
 def test_the_first_light_tells_before_anything_else_is_fitted(monkeypatch, full, none, kept):
     task, made = job(monkeypatch, {FULL: 30, "none": 30}, first={FULL: full, "none": none})
     best, notes = task.best("auto")

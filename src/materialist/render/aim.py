@@ -8,8 +8,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.camera import pixel_rays
 from materialist.envmap import row_solid_angle
-from materialist.render.buffers import floats, integers
+from materialist.render.buffers import floats
 from materialist.transport.sampling import face_towards, lifted
 from materialist.types import Array, Camera
 
@@ -30,10 +31,7 @@ def openness(scene: Any, camera: Camera, *, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     size = camera.width * camera.height
     chosen = ((np.arange(POINTS) + rng.random(POINTS)) * size / POINTS).astype(np.int64)
-    lane = dr.arange(mi.UInt32, POINTS * RAYS)
-    pixel = dr.gather(mi.UInt32, integers(mi, chosen), lane // RAYS)
-    row, col = mi.Float(pixel // camera.width) + 0.5, mi.Float(pixel % camera.width) + 0.5
-    seen = mi.Vector3f((col - camera.width / 2) / camera.focal, (camera.height / 2 - row) / camera.focal, -1)
+    seen = mi.Vector3f(*(floats(mi, np.repeat(c, RAYS)) for c in pixel_rays(camera).reshape(-1, 3)[chosen].T))
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(seen)))
     u, v = (floats(mi, x) for x in rng.random((2, POINTS * RAYS)))
     side = dr.select(si.wi.z > 0, mi.Float(1), mi.Float(-1))
