@@ -225,9 +225,14 @@ def test_misspelt_options_are_refused(call, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
-def test_only_a_clipped_photo_is_said_to_be_clipped():
-    from types import SimpleNamespace
+def attempt(materials, envmap, rerender, trust=3.0):
+    """A finished fit, with what the report reads of it."""
+    from materialist.fit.attempt import Attempt
 
+    return Attempt("none", (), None, materials, envmap, rerender, ({"prior_trust": trust},))
+
+
+def test_only_a_clipped_photo_is_said_to_be_clipped():
     from materialist.pipeline import _report
     from materialist.types import Camera, Materials, Photo, Prediction
 
@@ -238,7 +243,7 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
         linear = np.full((8, 8, 3), 0.9, np.float32)
         linear[0, 0] = value
         prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
-        found = SimpleNamespace(materials=prior.materials, rerender=linear, envmap=even, stages=())
+        found = attempt(prior.materials, even, linear)
         photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
         return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
 
@@ -246,8 +251,6 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
 
 
 def test_what_may_be_baked_into_the_albedo_is_said():
-    from types import SimpleNamespace
-
     from materialist.pipeline import _report
     from materialist.types import Camera, Materials, Photo, Prediction
 
@@ -258,9 +261,9 @@ def test_what_may_be_baked_into_the_albedo_is_said():
     prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
 
     def notes(envmap, trust):
-        found = SimpleNamespace(materials=prior.materials, rerender=linear, envmap=envmap)
+        found = attempt(prior.materials, envmap, linear, trust)
         photo = Photo(linear, Camera(8, 8, 40.0), linear, False)
-        return " ".join(_report(photo, prior, found, ({"prior_trust": trust},), (), 0.0).warnings)
+        return " ".join(_report(photo, prior, found, found.stages, (), 0.0).warnings)
 
     assert notes(even, 3.0) == ""
     assert "hard light" in notes(sunny, 3.0) and "shadows may be baked" in notes(sunny, 3.0)
