@@ -54,6 +54,21 @@ def test_samples_have_the_density_that_is_told(corner):
     assert counted == pytest.approx(told, abs=4 * np.sqrt(told.max() / len(d)))
 
 
+def test_spread_points_are_spread_over_a_lamp(corner):
+    """Whatever its rows: 16 points of a lattice have 16 heights, and 16 azimuths, on a lamp of 4 by 8 texels."""
+    from materialist.transport.sampling import point
+
+    mi, rows = corner.mi, 32
+    envmap = np.zeros((rows, 2 * rows, 3), np.float32)
+    envmap[12:16, 20:28] = 1
+    aim = Aim(np.kron(envmap, np.ones((2, 2, 1), np.float32)), np.ones((ROWS, 2 * ROWS)))
+    index = mi.UInt32(np.arange(16, dtype=np.uint32))
+    d = np.array(aim.sample(point(index, mi.UInt32(16), mi.Point2f(0.1, 0.2)))[0]).T
+    for place in (d[:, 1], np.arctan2(d[:, 0], -d[:, 2])):
+        gaps = np.diff(np.sort(place))
+        assert gaps.min() > np.ptp(place) / 80 and gaps.max() < np.ptp(place) / 5
+
+
 def test_hard_light_is_aimed_at_and_a_sun_left_to_mitsuba(corner):
     """A patch of k texels in 1 has an unevenness of about 1 / its share: one of a few degrees, or one texel."""
     patch, sun = lamp(), np.full((64, 128, 3), 0.01, np.float32)

@@ -68,7 +68,7 @@ class Aim:
         self.share = float(more.sum()) / max(arriving, 1e-30)
         """Share of the light that stands out."""
         weight = more / more.sum() if more.sum() > 0 else reach / reach.sum()
-        self._cells = mi.DiscreteDistribution(floats(mi, weight.ravel()))
+        self._cells = mi.DiscreteDistribution2D(weight.astype(np.float32))
         self._density = floats(mi, (weight / angle).ravel())
 
     @property
@@ -77,14 +77,18 @@ class Aim:
         return self.share > WORTH
 
     def sample(self, point):
-        """Unit direction (Vector3f) for a point of the unit square, and its density per solid angle."""
-        index, x = self._cells.sample_reuse(point.x)
-        row, col = index // (2 * self.rows), index % (2 * self.rows)
-        top, bottom = dr.cos(dr.pi * mi.Float(row) / self.rows), dr.cos(dr.pi * mi.Float(row + 1) / self.rows)
-        y = top + (bottom - top) * point.y
-        s, c = dr.sincos(((mi.Float(col) + x) / (2 * self.rows) - 0.5) * dr.two_pi)
+        """Unit direction (Vector3f) for a point of the unit square, and its density per solid angle.
+
+        Heights are chosen by one coordinate and azimuths by the other: points that are spread over the square are
+        spread over a lamp. Taken row by row in one go, a lamp of four rows got every fourth of them at one azimuth.
+        """
+        at, _, within = self._cells.sample(mi.Point2f(point.y, point.x))
+        row, col = mi.Float(at.y), mi.Float(at.x)
+        top, bottom = dr.cos(dr.pi * row / self.rows), dr.cos(dr.pi * (row + 1) / self.rows)
+        y = top + (bottom - top) * within.y
+        s, c = dr.sincos(((col + within.x) / (2 * self.rows) - 0.5) * dr.two_pi)
         r = dr.safe_sqrt(1 - y * y)
-        return mi.Vector3f(r * s, y, -r * c), dr.gather(mi.Float, self._density, index)
+        return mi.Vector3f(r * s, y, -r * c), dr.gather(mi.Float, self._density, at.y * (2 * self.rows) + at.x)
 
     def pdf(self, direction, active: Any = True):
         """Density of unit directions, per solid angle."""
