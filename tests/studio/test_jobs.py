@@ -95,15 +95,21 @@ def test_closing_ends_the_worker(jobs, tmp_path):
 def test_the_bar_never_runs_back(jobs, tmp_path):
     job = Job("invert", "me", {}, tmp_path, state=RUNNING)
     shares = []
-    stages = [("read", 0), ("predict", 0), ("trace", 9), ("light", 60), ("light", 120), ("light", 1)]
+    stages = [("read", 0), ("predict", 0), ("light", 60), ("light", 120), ("light", 1), ("glance", 0), ("trace", 9)]
     for stage, done in (*stages, ("materials", 5), ("light", 3), ("rerender", 0)):
         job.stage, job.done, job.total = stage, done, 120
         shares.append(words.share(job))
-    assert shares == sorted(shares) and 0 < shares[2] < shares[4] < shares[-1] < 1
+    assert shares == sorted(shares) and 0 < shares[2] < shares[3] < shares[6] < shares[-1] < 1
 
 
 @pytest.mark.parametrize(
-    ("stage", "text"), [("light", "Finding the light"), ("light 2", "Finding the light"), ("odd", "Odd")]
+    ("stage", "text"),
+    [
+        ("light", "Finding the light"),
+        ("light 2", "Finding the light"),
+        ("glance", "Looking at the light"),
+        ("odd", "Odd"),
+    ],
 )
 def test_stages_in_words(stage, text):
     assert words.words(stage) == text

@@ -158,6 +158,7 @@ class Job:
         assert state is not None
         if prior_trust(state.stages) != 1.0 or state.rows is None or is_sunny(state.envmap):
             return begun, None
+        self._tick("glance")
         return begun, timed(begun.stages, "glance", lambda: self._near(state, renderer))
 
     def _near(self, state: FitState, renderer: RenderScene) -> float:
