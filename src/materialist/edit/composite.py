@@ -282,10 +282,13 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
 def _calmed(photo: Photo, layers: Layers) -> tuple[Array, Array]:
     """[H, W, 3] twice: both renderings where the fit is no rougher than the photo. Where it is, normals and shine are
     wrong, and another light makes it worse: there the photo stands for the fit, changed as its surroundings are.
+
+    What is beyond the photo's white is as flat in both.
     """
     from materialist.geometry.membrane import membrane
 
-    seen, fit = (_roughness(np.log(np.maximum(v, 0) + FLOOR).mean(-1)) for v in (photo.linear, layers.base))
+    as_seen = layers.base if photo.hdr else np.minimum(layers.base, 1)
+    seen, fit = (_roughness(np.log(np.maximum(v, 0) + FLOOR).mean(-1)) for v in (photo.linear, as_seen))
     wild = np.clip((fit - WILD[0] * np.maximum(seen, EVEN)) / ((WILD[1] - WILD[0]) * np.maximum(seen, EVEN)), 0, 1)
     if layers.replaced is not None:
         wild = np.where(layers.replaced, 0, wild)  # what is another surface now looks as it is rendered

@@ -44,7 +44,8 @@ class Layers:
     covered: Array | None = None
     """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
     replaced: Array | None = None
-    """[H, W] bool: pixels that show another surface, or other materials, whatever the light; None for not known."""
+    """[H, W] bool: pixels that show another surface, other materials, or the sky of another light; None for not
+    known."""
     held: Array | None = None
     """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
 
@@ -78,6 +79,8 @@ def render_layers(
         base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress,
         focused=focused(edited),
     )  # fmt: skip
+    if relit:
+        replaced = replaced | (edited.depth == 0)
     held = texture_held(scene.materials.albedo, edited.materials.albedo)
     return replace(layers, relit=relit, portrait=alone, covered=covered, replaced=replaced, held=held)
 

@@ -96,16 +96,19 @@ class Fit:
         return min(max(((self.settings.trust or 0) / max(self.prior_error(), 1e-6)) ** 3, 1.0), MAX_TRUST)
 
     def _trusting(self) -> Fit:
-        """The fit with the prices of leaving the prior scaled by how well the prior explains the photo."""
+        """The fit with the prices of leaving the prior scaled by how well the prior explains the photo.
+
+        What materials are surely not, the light is: its own prices, of colour and of change, fall as theirs rise.
+        """
         settings = self.settings
         if settings.trust is None:
             return self
         scale = self._trust()
-        slack = None if settings.light.slack is None else settings.light.slack * scale
+        light = settings.light
+        slack = None if light.slack is None else light.slack * scale
+        light = replace(light, slack=slack, chroma=light.chroma / scale, smooth=light.smooth / scale**0.5)
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
-        return replace(
-            self, settings=replace(settings, light=replace(settings.light, slack=slack), materials=materials)
-        )
+        return replace(self, settings=replace(settings, light=light, materials=materials))
 
     def prior_error(self) -> float:
         """Mean absolute error (encoded) that the best light leaves with the prior's materials as they are."""
