@@ -198,14 +198,19 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
 
     d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
     window and s its standard error, from (d0 - d1) / 2, the gain is max(0, 1 - (sigmas s / m)^2), the positive part
-    of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise.
+    of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise. It is the larger one of the sum of
+    the channels, where a change is seen first, and of the three together, among which another hue cancels in the sum.
     """
     import cv2
 
-    mean, half = ((d0 + d1) / 2).sum(-1), ((d0 - d1) / 2).sum(-1)  # summed over RGB, where a change is seen first
     box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (window, window), borderType=cv2.BORDER_REFLECT)  # noqa: E731
-    m, variance = box(mean), box(half**2) / window**2
-    gain = 1 - sigmas**2 * variance / np.maximum(m**2, 1e-30)
+    gain = np.zeros(d0.shape[:2])
+    for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
+        m2, variance = np.zeros((2, *gain.shape))
+        for k in range(first.shape[-1]):
+            m2 += box((first[..., k] + second[..., k]) / 2) ** 2
+            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / window**2
+        gain = np.maximum(gain, 1 - sigmas**2 * variance / np.maximum(m2, 1e-30))
     return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
 
 

@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.fit.losses import CLIPPED, Encoding, encode
+from materialist.fit.losses import CLIPPED, Encoding, encode, too_pure
 from materialist.fit.materials import prices
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
@@ -47,12 +47,15 @@ class FusedLoss:
         if settings.clipped:
             # Beyond this, a rendering is no error: a channel that is not clipped never gets there.
             roof = torch.where(photo >= CLIPPED, target, torch.full_like(target, torch.inf))
+            told = (~too_pure(photo)).float()
         else:
             roof = torch.full_like(target, torch.inf)
+            told = torch.ones_like(target)
         columns, per_value = [0, 0, 0, 1, 2], torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
         held = settings.delta * prices(prior, settings)[:, columns] * per_value / count
         self._constants = [
-            _flat(v) for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, prior, held)
+            _flat(v)
+            for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, told, prior, held)
         ]
         smooth = torch.tensor([settings.smooth[k] for k in columns]) * per_value / count
         self._smooth = _flat(smooth)
@@ -83,7 +86,7 @@ class _Apply(torch.autograd.Function):
 
 def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     """Per-pixel loss, and five arrays of gradients."""
-    diffuse, specular, factor, target, roof, prior, held = constants
+    diffuse, specular, factor, target, roof, told, prior, held = constants
     lane: Any = dr.arange(mi.UInt32, objective.count)
     value: list[Any] = [dr.gather(mi.Float, maps, lane * 5 + k) for k in range(5)]
     albedo: Any = mi.Color3f(*value[:3])
@@ -104,6 +107,7 @@ def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     up = dr.select(live, (_sign(error) + 2 * error) * share * slope * scale, 0)
 
     by_albedo = up * ((1 - metal) * body + metal * s0)
+    up *= dr.gather(mi.Color3f, told, lane)  # what is too pure tells of the albedo alone
     by_rough = dr.sum(up * (albedo * (1 - metal) * (d1 + 2 * rough * d2) + base * slope0 + slope1))
     by_metal = dr.sum(up * ((albedo - DIELECTRIC_R0) * s0 - albedo * body))
     gradient = [by_albedo.x, by_albedo.y, by_albedo.z, by_rough, by_metal]

@@ -41,14 +41,14 @@ def explained(
     light = start
     for _ in range(ROUNDS):
         radiance = (transport @ light[..., None])[..., 0] + rest
-        error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+        error = residual(radiance.T, photo.T, settings.encoding, clipped=settings.clipped).T
         away = radiance - photo
         away = torch.where(away.abs() < 1e-4, 1e-4, away)
         slope = ((encode(photo + away, settings.encoding) - encode(photo, settings.encoding)) / away).abs()
         weight = slope * torch.where((error == 0) & (away > 0), 0.0, error.abs().clamp_min(SMALL).rsqrt())  # [3, Q]
         light = nonnegative(transport * weight[..., None], (photo - rest) * weight, light)
     radiance = (transport @ light[..., None])[..., 0] + rest
-    error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+    error = residual(radiance.T, photo.T, settings.encoding, clipped=settings.clipped).T
     return float(error.abs().mean()), light
 
 

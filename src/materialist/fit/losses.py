@@ -9,6 +9,9 @@ import torch
 CLIPPED = 0.99
 """Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
 
+PURE = (1e-3, 0.1)
+"""Linear value up to which a channel is black, and that of the brightest channel from which that is no shadow."""
+
 Encoding = Literal["linear", "srgb", "log1p"]
 
 
@@ -22,10 +25,27 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def residual(radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool) -> torch.Tensor:
-    """Encoded rendering minus encoded photo; with `clipped`, no error where it outshines a clipped channel."""
+def too_pure(photo: torch.Tensor) -> torch.Tensor:
+    """[..., 3] bool: channels at black in pixels of [..., 3] linear that are not dark.
+
+    Such a colour is purer than the photo's file can hold, and than any surface whose reflection is white shows: the
+    channel says how little the albedo has of it, and nothing of light, roughness and metallic.
+    """
+    return (photo <= PURE[0]) & (photo.amax(-1, keepdim=True) >= PURE[1])
+
+
+def residual(
+    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool, pure: bool = False
+) -> torch.Tensor:
+    """Encoded rendering minus encoded photo, [..., 3].
+
+    With `clipped`, no error where it outshines a clipped channel, or, but for `pure`, one that is `too_pure`.
+    """
     error = encode(radiance, encoding) - encode(photo, encoding)
-    return torch.where(photo >= CLIPPED, error.clamp_max(0), error) if clipped else error
+    if not clipped:
+        return error
+    bound = photo >= CLIPPED if pure else (photo >= CLIPPED) | too_pure(photo)
+    return torch.where(bound, error.clamp_max(0), error)
 
 
 def l1_l2(error: torch.Tensor) -> torch.Tensor:

@@ -12,7 +12,7 @@ from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
 from materialist.fit.loop import Progress, StageResult, optimise
-from materialist.fit.losses import consistency, l1_l2, residual
+from materialist.fit.losses import consistency, l1_l2, residual, too_pure
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings, MaterialStage
 from materialist.types import Camera
@@ -162,10 +162,14 @@ def material_objective(
         return FusedLoss(problem.tables, factor, photo, prior, settings, neighbours)
 
     price = prices(prior, settings)
+    pure = too_pure(photo) if settings.clipped else torch.zeros(1, dtype=torch.bool)
 
     def objective(values: torch.Tensor) -> torch.Tensor:
         rendered = problem.render(values) * factor
-        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped))
+        if pure.any():  # there the albedo alone is to blame
+            by_albedo = problem.render(torch.cat([values[:, :3], values[:, 3:].detach()], 1)) * factor
+            rendered = torch.where(pure, by_albedo, rendered)
+        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped, pure=True))
         parts = [values[:, c] for c in _COLUMNS.values()]
         priors = [prior[:, c] for c in _COLUMNS.values()]
         value = value + settings.delta * consistency(parts, priors, price.unbind(1))
