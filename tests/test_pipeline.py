@@ -250,6 +250,22 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
     assert [notes(1.0, False), notes(9.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
 
 
+def test_colours_that_no_surface_has_are_told():
+    from materialist.pipeline import _report
+    from materialist.types import Camera, Materials, Photo, Prediction
+
+    flat, even = np.ones((8, 8), np.float32), np.ones((8, 16, 3), np.float32)
+
+    def told(blue, hdr=False):
+        linear = np.tile(np.float32([0.7, 0.06, blue]), (8, 8, 1))
+        prior = Prediction(Materials(linear, flat, flat), linear, flat)
+        photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
+        notes = _report(photo, prior, attempt(prior.materials, even, linear), (), (), 0.0).warnings
+        return any("channel at 0" in note for note in notes)
+
+    assert told(0.0) and not told(0.01) and not told(0.0, hdr=True)
+
+
 def test_what_may_be_baked_into_the_albedo_is_said():
     from materialist.pipeline import _report
     from materialist.types import Camera, Materials, Photo, Prediction

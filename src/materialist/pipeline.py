@@ -160,6 +160,15 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return rendered(scene, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
+def _too_pure(linear: Array) -> float:
+    """Share of the pixels that are `fit.losses.too_pure` in some channel."""
+    import torch
+
+    from materialist.fit.losses import too_pure
+
+    return float(too_pure(torch.from_numpy(np.ascontiguousarray(linear))).any(-1).float().mean())
+
+
 def _report(
     picture: Photo, prior: Prediction, found: Attempt, stages: tuple[dict, ...], told: tuple[str, ...], start: float
 ) -> FitReport:
@@ -179,6 +188,11 @@ def _report(
         )
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
+    if not picture.hdr and (pure := _too_pure(picture.linear)) > 0.01:
+        notes.append(
+            f"{pure:.0%} of the photo's pixels have a channel at 0 beside a bright one: no surface that reflects light "
+            "is that pure, and the re-rendering is paler there."
+        )
     if found.doubted:
         notes.append(
             "No light explains the photo with the predicted materials; they were changed to match it, and shadows or "

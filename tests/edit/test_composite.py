@@ -101,6 +101,13 @@ def test_noise_alone_is_no_edit():
     assert (significance(*signal) > 0.5).mean() > 0.99
 
 
+def test_a_change_of_hue_is_seen_though_its_channels_cancel():
+    """Light that an orange thing lent a table and a blue one lends it now."""
+    noise = np.random.default_rng(1).normal(0, 0.05, (2, 40, 50, 1))
+    hue = noise + np.array([-0.1, 0.0, 0.1])
+    assert (significance(*hue) > 0.5).mean() > 0.99
+
+
 def test_difference_is_zero_where_no_path_differs():
     shape = (20, 30, 3)
     changed = np.zeros(shape[:2], bool)
@@ -272,6 +279,24 @@ def test_where_the_fit_is_rougher_than_the_photo_another_light_does_what_it_does
     scene = replace(scene, linear=textured, original=textured)
     layers = layers_of(textured, 0.5 * textured, everywhere, relit=True)
     assert _calmed(scene, layers)[1] is layers.edited, "what the photo has itself is no fault of the fit"
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_another_light_replaces_a_white_sky(known):
+    """Clipped, it is flat where the fit's light is not: that is no fault of the fit."""
+    rows, columns = np.mgrid[:60, :80]
+    sky = (rows < 25)[..., None]
+    stripes = np.where(columns % 4 < 2, 1.2, 6.0)[..., None]
+    photo = np.where(sky, 1.0, 0.3 * np.ones((60, 80, 3))).astype(np.float32)
+    base = np.where(sky, stripes, photo).astype(np.float32)
+    new = np.where(sky, 0.05 + 0.2 * (columns > 40)[..., None], 0.2 * photo).astype(np.float32)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = layers_of(base, new, np.ones((60, 80), bool), relit=True)
+    if known:  # as `render_layers` says it: whatever the photo shows there
+        layers, photo[:25, ::2] = replace(layers, replaced=sky[..., 0]), 0.8
+    out = into_photo(replace(scene, linear=photo, original=photo), layers)
+    core = (rows < 18) & (np.abs(columns - 40) > 8)
+    np.testing.assert_allclose(out[core], new[core], atol=0.03)
 
 
 def test_a_rough_fit_does_not_undo_what_is_edited_there():

@@ -27,6 +27,7 @@ def problem(seed: int = 0, holes: bool = True):
     tables = Tables(draw(count, 9), draw(len(ROUGHNESS_LEVELS), count, 6))
     photo = draw(count, 3)
     photo[::4, 1] = 1.0
+    photo[1::5, 2] = 0.0  # some too pure
     pairs = neighbours(pixels, rng.random((HEIGHT, WIDTH, 3)).astype(np.float32))
     return tables, photo, draw(count, 5), pairs, 0.5 + draw(count, 3)
 
@@ -58,6 +59,19 @@ def test_equals_the_terms_in_torch(encoding, clipped, holes):
     expected, slope = value_and_gradient(twin, maps)
     assert value == pytest.approx(expected, rel=1e-5)
     assert gradient == pytest.approx(slope, rel=1e-3, abs=1e-5 * float(np.abs(slope).max()))
+
+
+def test_what_is_too_pure_tells_of_the_albedo_alone():
+    """A channel at black moves neither roughness nor metallic, and its albedo down."""
+    tables, photo, prior, pairs, _ = problem(4)
+    photo[:, 0], photo[:, 1:] = 0.5, 0.0
+    red = torch.tensor([[1.0, 0.0, 0.0]])
+    settings = replace(DEFAULT.materials, clipped=True, weights=(0, 0, 0), smooth=(0, 0, 0))
+    for objective in both(tables, photo, prior, pairs, torch.ones(1), settings):
+        _, all_channels = value_and_gradient(objective, prior)
+        assert (all_channels[:, 1:3] > 0).all()
+    for objective in both(tables, photo, prior, pairs, red, settings):  # nothing is rendered but red
+        np.testing.assert_allclose(value_and_gradient(objective, prior)[1][:, 3:], all_channels[:, 3:], atol=1e-7)
 
 
 @pytest.mark.parametrize("term", ["weights", "smooth"])

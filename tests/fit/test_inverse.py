@@ -99,6 +99,14 @@ def test_rerendering_comes_close_to_the_photo(room, fitted):
     assert metrics.psnr(after, room.photo.linear) > max(28, metrics.psnr(before, room.photo.linear) + 8)
 
 
+def test_the_light_may_be_coloured_where_the_prior_explains_the_photo(room):
+    """Else the colour would go into materials that are known."""
+    for prior, explains in ((room.truth, True), (replace(room.truth, albedo=1 - room.truth.albedo), False)):
+        fit = room.fit(DEFAULT, prior=prior)
+        scale = fit._trust()
+        assert (scale > 5) == explains and fit._trusting().settings.light.chroma * scale == DEFAULT.light.chroma
+
+
 def test_a_dark_photo_gets_no_brighter_light_than_it_needs(room):
     """What the photo hardly constrains stays where the light starts: behind the camera, mostly."""
     from materialist.fit.light import START_RADIANCE, start_radiance

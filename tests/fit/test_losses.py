@@ -13,6 +13,7 @@ from materialist.fit.losses import (
     log_chroma,
     log_total_variation,
     residual,
+    too_pure,
 )
 
 
@@ -49,6 +50,16 @@ def test_clipped_channels_are_wrong_on_one_side_only():
     torch.testing.assert_close(residual(brighter, photo, "linear", clipped=True), torch.tensor([[0.4, 0, 0]]))
     torch.testing.assert_close(residual(darker, photo, "linear", clipped=True), torch.full((1, 3), -0.4))
     torch.testing.assert_close(residual(brighter, photo, "linear", clipped=False), torch.full((1, 3), 0.4))
+
+
+def test_colours_that_are_too_pure_are_no_error_of_light():
+    """Orange without any blue; a shadow is dark in all channels, and known."""
+    photo = torch.tensor([[0.7, 0.06, 0.0], [0.01, 0.001, 0.0], [0.7, 0.06, 0.01]])
+    assert too_pure(photo).tolist() == [[False, False, True], [False] * 3, [False] * 3]
+    error = residual(photo + 0.04, photo, "linear", clipped=True)
+    torch.testing.assert_close(error, torch.tensor([[0.04, 0.04, 0], [0.04] * 3, [0.04] * 3]))
+    for options in ({"clipped": True, "pure": True}, {"clipped": False}):
+        torch.testing.assert_close(residual(photo + 0.04, photo, "linear", **options), torch.full((3, 3), 0.04))
 
 
 def test_l1_plus_l2():

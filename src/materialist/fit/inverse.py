@@ -98,7 +98,7 @@ class Fit:
     def _trusting(self) -> Fit:
         """The fit with the prices of leaving the prior scaled by how well the prior explains the photo.
 
-        What materials are surely not, the light is: its own prices, of colour and of change, fall as theirs rise.
+        A colour that is surely not the materials' is the light's: its price falls as theirs rise.
         """
         settings = self.settings
         if settings.trust is None:
@@ -106,7 +106,7 @@ class Fit:
         scale = self._trust()
         light = settings.light
         slack = None if light.slack is None else light.slack * scale
-        light = replace(light, slack=slack, chroma=light.chroma / scale, smooth=light.smooth / scale**0.5)
+        light = replace(light, slack=slack, chroma=light.chroma / scale)
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
         return replace(self, settings=replace(settings, light=light, materials=materials))
 
