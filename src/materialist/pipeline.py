@@ -190,8 +190,8 @@ def _report(
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
     if not picture.hdr and (pure := _too_pure(picture.linear)) > 0.01:
         notes.append(
-            f"{pure:.0%} of the photo's pixels have a channel at 0 beside a bright one: no surface that reflects light "
-            "is that pure, and the re-rendering is paler there."
+            f"{pure:.0%} of the photo's pixels have a channel at 0 beside a bright one, purer than any surface with a "
+            "white reflection: there the re-rendering is paler, or the surface became a metal."
         )
     if found.doubted:
         notes.append(

@@ -62,9 +62,9 @@ def test_equals_the_terms_in_torch(encoding, clipped, holes):
 
 
 def test_what_is_too_pure_tells_of_the_albedo_alone():
-    """A channel at black moves neither roughness nor metallic, and its albedo down."""
+    """A channel at black moves neither roughness nor metallic of a dielectric, and its albedo down."""
     tables, photo, prior, pairs, _ = problem(4)
-    photo[:, 0], photo[:, 1:] = 0.5, 0.0
+    photo[:, 0], photo[:, 1:], prior[:, 4] = 0.5, 0.0, 0.1
     red = torch.tensor([[1.0, 0.0, 0.0]])
     settings = replace(DEFAULT.materials, clipped=True, weights=(0, 0, 0), smooth=(0, 0, 0))
     for objective in both(tables, photo, prior, pairs, torch.ones(1), settings):

@@ -13,8 +13,8 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.fit.losses import CLIPPED, Encoding, encode, too_pure
-from materialist.fit.materials import prices
+from materialist.fit.losses import CLIPPED, Encoding, encode
+from materialist.fit.materials import prices, pure_dielectric
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
 from materialist.render.buffers import floats, integers
@@ -47,7 +47,7 @@ class FusedLoss:
         if settings.clipped:
             # Beyond this, a rendering is no error: a channel that is not clipped never gets there.
             roof = torch.where(photo >= CLIPPED, target, torch.full_like(target, torch.inf))
-            told = (~too_pure(photo)).float()
+            told = (~pure_dielectric(photo, prior)).float()
         else:
             roof = torch.full_like(target, torch.inf)
             told = torch.ones_like(target)

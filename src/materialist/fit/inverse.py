@@ -16,7 +16,7 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared
 from materialist.fit.fields import EnvmapTexels
 from materialist.fit.light import envmap_field, fit_light, slack_albedo, start_radiance
 from materialist.fit.loop import Progress
-from materialist.fit.losses import residual
+from materialist.fit.losses import residual, too_pure
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import FitSettings, MaterialStage
@@ -125,7 +125,8 @@ class Fit:
         )
         with torch.no_grad():
             radiance, photo = problem.render(light(problem.height)), self._photo()[problem.pixels]
-            error = float(residual(radiance, photo, strict.encoding, clipped=strict.clipped).abs().mean())
+            off = residual(radiance, photo, strict.encoding, clipped=strict.clipped, pure=too_pure(photo))
+            error = float(off.abs().mean())
         return {**result.summary(), "name": "trust", "prior_error": error}
 
     # -- stages --------------------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from materialist.fit.light import start_radiance
-from materialist.fit.losses import encode, residual
+from materialist.fit.losses import encode, residual, too_pure
 from materialist.fit.settings import LightSettings
 
 ROUNDS = 2
@@ -35,20 +35,21 @@ def explained(
     Returns:
         Mean absolute encoded error, and the light [3, texels].
     """
+    pure = too_pure(photo).T
     rest, photo = rest.T, photo.T  # [3, Q]
     if start is None:
         start = torch.full(transport.shape[::2], start_radiance(photo, START))
     light = start
     for _ in range(ROUNDS):
         radiance = (transport @ light[..., None])[..., 0] + rest
-        error = residual(radiance.T, photo.T, settings.encoding, clipped=settings.clipped).T
+        error = residual(radiance, photo, settings.encoding, clipped=settings.clipped, pure=pure)
         away = radiance - photo
         away = torch.where(away.abs() < 1e-4, 1e-4, away)
         slope = ((encode(photo + away, settings.encoding) - encode(photo, settings.encoding)) / away).abs()
         weight = slope * torch.where((error == 0) & (away > 0), 0.0, error.abs().clamp_min(SMALL).rsqrt())  # [3, Q]
         light = nonnegative(transport * weight[..., None], (photo - rest) * weight, light)
     radiance = (transport @ light[..., None])[..., 0] + rest
-    error = residual(radiance.T, photo.T, settings.encoding, clipped=settings.clipped).T
+    error = residual(radiance, photo, settings.encoding, clipped=settings.clipped, pure=pure)
     return float(error.abs().mean()), light
 
 

@@ -11,7 +11,7 @@ from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
 from materialist.fit.loop import Progress, StageResult, optimise
-from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual
+from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual, too_pure
 from materialist.fit.settings import LightSettings
 from materialist.transport.light import LightMatrix
 
@@ -62,6 +62,7 @@ def fit_light(
         slack: takes the albedo that every row of the problem's matrix came to; see `slack_albedo`.
     """
     target = photo[problem.pixels]
+    pure = too_pure(target)
     jitter = torch.Generator().manual_seed(seed)
     schedule = settings.schedule if steps is None else replace(settings.schedule, max_steps=steps)
     parameters: list = [{"params": list(field.parameters())}]
@@ -76,7 +77,7 @@ def fit_light(
     def loss(_: int) -> torch.Tensor:
         envmap = _seen(field, settings, problem.height, jitter)
         radiance = problem.render(envmap) if slack is None else problem.render(envmap, slack)
-        value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped))
+        value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped, pure=pure))
         if slack is not None:
             value = value + price * (slack - given).abs().mean()
         if settings.smooth or settings.chroma:

@@ -35,16 +35,16 @@ def too_pure(photo: torch.Tensor) -> torch.Tensor:
 
 
 def residual(
-    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool, pure: bool = False
+    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool, pure: torch.Tensor | None = None
 ) -> torch.Tensor:
     """Encoded rendering minus encoded photo, [..., 3].
 
-    With `clipped`, no error where it outshines a clipped channel, or, but for `pure`, one that is `too_pure`.
+    With `clipped`, no error where it outshines a clipped channel, or one of those that are `pure` [..., 3] bool.
     """
     error = encode(radiance, encoding) - encode(photo, encoding)
     if not clipped:
         return error
-    bound = photo >= CLIPPED if pure else (photo >= CLIPPED) | too_pure(photo)
+    bound = photo >= CLIPPED if pure is None else (photo >= CLIPPED) | pure
     return torch.where(bound, error.clamp_max(0), error)
 
 

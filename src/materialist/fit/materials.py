@@ -63,6 +63,14 @@ def _below(metallic: torch.Tensor, limit: float) -> torch.Tensor:
     return 1 - (metallic / limit).clamp(0, 1)
 
 
+def pure_dielectric(photo: torch.Tensor, prior: torch.Tensor) -> torch.Tensor:
+    """[P, 3] bool: channels of photo [P, 3] that are `too_pure`, where the prior [P, 5] says dielectric.
+
+    A metal's reflection is coloured, so that it can be what the photo shows.
+    """
+    return too_pure(photo) & (prior[:, 4:] < DIELECTRIC[0])
+
+
 def better_start(
     problem: MaterialProblem,
     photo: torch.Tensor,
@@ -91,7 +99,10 @@ def better_start(
         field = MaterialMaps(maps)
         fit_materials(problem, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
         with torch.no_grad():
-            error = residual(problem.render(field()), photo, settings.encoding, clipped=settings.clipped)
+            error = residual(
+                problem.render(field()), photo, settings.encoding, clipped=settings.clipped,
+                pure=pure_dielectric(photo, prior),
+            )  # fmt: skip
             cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
         candidates.append(field().detach())
         costs.append(smooth(cost[:, None]))
@@ -162,14 +173,14 @@ def material_objective(
         return FusedLoss(problem.tables, factor, photo, prior, settings, neighbours)
 
     price = prices(prior, settings)
-    pure = too_pure(photo) if settings.clipped else torch.zeros(1, dtype=torch.bool)
+    pure = pure_dielectric(photo, prior) if settings.clipped else torch.zeros(1, dtype=torch.bool)
 
     def objective(values: torch.Tensor) -> torch.Tensor:
         rendered = problem.render(values) * factor
         if pure.any():  # there the albedo alone is to blame
             by_albedo = problem.render(torch.cat([values[:, :3], values[:, 3:].detach()], 1)) * factor
             rendered = torch.where(pure, by_albedo, rendered)
-        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped, pure=True))
+        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped))
         parts = [values[:, c] for c in _COLUMNS.values()]
         priors = [prior[:, c] for c in _COLUMNS.values()]
         value = value + settings.delta * consistency(parts, priors, price.unbind(1))
