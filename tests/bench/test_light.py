@@ -25,7 +25,9 @@ def test_without_materials_the_paper_s_neutral_ones_are_given(sample, monkeypatc
     from materialist.fit.engine import PathEngine
 
     seen = []
-    monkeypatch.setattr(PathEngine, "light_problem", lambda self, materials: seen.append(materials) or 1 / 0)
+    monkeypatch.setattr(
+        PathEngine, "light_problem", lambda self, materials, height=None: seen.append(materials) or 1 / 0
+    )
     for name in ("paper path 128x64", "paper path w/o mat"):
         with pytest.raises(ZeroDivisionError):
             light.fit(sample, light.METHODS[name], "auto", device="cpu")

@@ -104,7 +104,34 @@ def test_the_light_may_be_coloured_where_the_prior_explains_the_photo(room):
     for prior, explains in ((room.truth, True), (replace(room.truth, albedo=1 - room.truth.albedo), False)):
         fit = room.fit(DEFAULT, prior=prior)
         scale = fit._trust()
-        assert (scale > 5) == explains and fit._trusting().settings.light.chroma * scale == DEFAULT.light.chroma
+        assert (scale > 5) == explains
+        assert fit._trusting().settings.light.chroma * scale == pytest.approx(DEFAULT.light.chroma, rel=1e-12)
+
+
+def test_the_light_is_finer_where_the_prior_explains_the_photo(room):
+    """What is left of highlights is the light's then; else it is whatever the maps have wrong."""
+    coarse, fine = DEFAULT.light.height, DEFAULT.light.fine
+    for prior, rows in ((room.truth, fine), (replace(room.truth, albedo=1 - room.truth.albedo), coarse)):
+        fit = room.fit(DEFAULT, prior=prior)
+        stage = fit._explained
+        assert stage["rows"] == rows == fit._trusting().settings.light.height
+        assert stage["prior_error"] <= fit._strict(DEFAULT.light)[0]["prior_error"]
+    assert (
+        room.fit(replace(DEFAULT, light=replace(DEFAULT.light, fine=None)), prior=room.truth)._explained["rows"]
+        == coarse
+    )
+
+
+def test_the_engine_resolves_as_many_rows_as_are_asked_for(room):
+    engine = room.fit(DEFAULT).engine
+    for height, rows in ((None, DEFAULT.light_grid), (32, 32), (None, DEFAULT.light_grid)):
+        problem = engine.light_problem(room.truth, height)
+        assert problem.height == rows and problem.matrix.shape == (rows, 2 * rows)
+        assert engine.light_problem(room.truth, height) is problem
+    light = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(0))
+    fine = light.repeat_interleave(2, 0).repeat_interleave(2, 1)
+    many = engine.light_problem(room.truth, 32).render(fine)
+    torch.testing.assert_close(many, engine.light_problem(room.truth).render(light), rtol=0.2, atol=0.02)
 
 
 def test_a_dark_photo_gets_no_brighter_light_than_it_needs(room):

@@ -206,7 +206,7 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
     box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (window, window), borderType=cv2.BORDER_REFLECT)  # noqa: E731
     gain = np.zeros(d0.shape[:2])
     for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
-        m2, variance = np.zeros((2, *gain.shape))
+        m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
         for k in range(first.shape[-1]):
             m2 += box((first[..., k] + second[..., k]) / 2) ** 2
             variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / window**2

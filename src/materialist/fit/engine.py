@@ -53,8 +53,8 @@ class Engine(Protocol):
     pixels: torch.Tensor
     """[P] int64 row-major pixels with a surface."""
 
-    def light_problem(self, materials: Materials) -> LightProblem:
-        """Rendering as a function of the light."""
+    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
+        """Rendering as a function of the light; `height`: rows of its map, where the engine lets one choose."""
         ...
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
@@ -93,7 +93,7 @@ class TransportEngine:
         self.camera, self.seed = camera, seed
         self.light_height, self.light_pixels = light_height, light_pixels
         self.radiance = radiance
-        self._last: tuple[tuple[Materials, Array], LightProblem] | None = None
+        self._last: tuple[tuple[Materials, Array, int], LightProblem] | None = None
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
@@ -102,21 +102,21 @@ class TransportEngine:
         """Take [H, W, 3] as what the surfaces send to each other from now on."""
         self.radiance = radiance
 
-    def light_problem(self, materials: Materials) -> LightProblem:
+    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
         # The same question is asked twice in a row: how far to trust the prior, and then what light it wants.
-        asked = (materials, self.radiance)
+        asked = (materials, self.radiance, height or self.light_height)
         if self._last is None or any(a is not b for a, b in zip(self._last[0], asked, strict=True)):
-            self._last = (asked, self._light_problem(materials))
+            self._last = (asked, self._light_problem(materials, asked[2]))
         return self._last[1]
 
-    def _light_problem(self, materials: Materials) -> LightProblem:
+    def _light_problem(self, materials: Materials, height: int) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)
         # Of a speck before the sky, all pixels: a share of them may be none.
         rows = _subset(rng, count, min(1.0, max(share, FEWEST / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
-        matrix = light_matrix(self.cache, materials, rows, self.light_height)
+        matrix = light_matrix(self.cache, materials, rows, height)
         indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
@@ -128,7 +128,7 @@ class TransportEngine:
             return torch.cat([matrix.combine(matrix.direct(flat) + indirect, albedo), seen])
 
         pixels = torch.cat([matrix.pixels, torch.from_numpy(sky.astype(np.int64))])
-        return LightProblem(pixels, self.light_height, render, matrix)
+        return LightProblem(pixels, height, render, matrix)
 
     def tables(self, envmap: Array) -> Tables:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""
@@ -169,7 +169,7 @@ class PathEngine:
             *maps_and_envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
         )
 
-    def light_problem(self, materials: Materials) -> LightProblem:
+    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
         maps = [
             torch.from_numpy(np.ascontiguousarray(m))
             for m in (materials.albedo, materials.roughness, materials.metallic)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
+from torch import nn
 
 from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
@@ -19,13 +20,15 @@ from materialist.fit.loop import Progress
 from materialist.fit.losses import residual, too_pure
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.neighbours import neighbours
-from materialist.fit.settings import FitSettings, MaterialStage
+from materialist.fit.settings import FitSettings, LightSettings, MaterialStage
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 
 STRICT_STEPS = 120
 """Steps of the light fit that measures how far the prior can be trusted."""
 MAX_TRUST = 100.0
+FINE_TRUST, FINE_STEPS = 4.0, 60
+"""Trust from which the light is fitted on its finer map, and the steps after which the prior is then judged anew."""
 WHITE = 0.99
 """Linear value from which a channel of a photo that is not HDR is taken for clipped."""
 
@@ -93,7 +96,10 @@ class Fit:
     def _trust(self) -> float:
         """How much dearer it is to leave the prior: (trust / e)^3, e the error of the best light for it, which is what
         materials or geometry have wrong."""
-        return min(max(((self.settings.trust or 0) / max(self.prior_error(), 1e-6)) ** 3, 1.0), MAX_TRUST)
+        return self._trust_at(self.prior_error())
+
+    def _trust_at(self, error: float) -> float:
+        return min(max(((self.settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
 
     def _trusting(self) -> Fit:
         """The fit with the prices of leaving the prior scaled by how well the prior explains the photo.
@@ -105,6 +111,8 @@ class Fit:
             return self
         scale = self._trust()
         light = settings.light
+        if (fine := self._finer()) is not None and self._explained["rows"] == fine.height:
+            light = fine
         slack = None if light.slack is None else light.slack * scale
         light = replace(light, slack=slack, chroma=light.chroma / scale)
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
@@ -116,29 +124,57 @@ class Fit:
 
     @cached_property
     def _explained(self) -> dict:
-        """The stage in which that light is fitted."""
-        strict = replace(self.settings.light, slack=None)
-        problem = self.engine.light_problem(self.prior)
-        light = envmap_field(strict, seed=self.seed, start=start_radiance(self._photo()))
-        result = fit_light(
-            problem, self._photo(), light, strict, steps=STRICT_STEPS, seed=self.seed, progress=self.progress
-        )
+        """The stage in which that light is fitted; `rows` of its map, more of them where the prior is trusted."""
+        found, light = self._strict(self.settings.light)
+        fine = self._finer()
+        if fine is None or self._trust_at(found["prior_error"]) < FINE_TRUST:
+            return found
+        finer, _ = self._strict(fine, light, steps=FINE_STEPS)
+        seconds = round(found["seconds"] + finer["seconds"], 3)
+        return {**min(found, finer, key=lambda stage: stage["prior_error"]), "seconds": seconds}
+
+    def _finer(self) -> LightSettings | None:
+        """The settings of the finer light. An edge in it costs what it costs on the coarser map."""
+        light = self.settings.light
+        if light.fine is None:
+            return None
+        return replace(light, height=light.fine, smooth=light.smooth * light.fine / light.height)
+
+    def _strict(
+        self, settings: LightSettings, start: Array | None = None, *, steps: int = STRICT_STEPS
+    ) -> tuple[dict, Array]:
+        """The stage of the light that explains the photo best with the prior as it is, and that light [h, 2h, 3];
+        `start`: one to begin with."""
+        strict = replace(settings, slack=None)
+        problem = self.engine.light_problem(self.prior, self._grid(strict.height))
+        light = self._field(strict, start)
+        result = fit_light(problem, self._photo(), light, strict, steps=steps, seed=self.seed, progress=self.progress)
         with torch.no_grad():
-            radiance, photo = problem.render(light(problem.height)), self._photo()[problem.pixels]
-            off = residual(radiance, photo, strict.encoding, clipped=strict.clipped, pure=too_pure(photo))
+            envmap, photo = light(problem.height), self._photo()[problem.pixels]
+            off = residual(problem.render(envmap), photo, strict.encoding, clipped=strict.clipped, pure=too_pure(photo))
             error = float(off.abs().mean())
-        return {**result.summary(), "name": "trust", "prior_error": error}
+        return {**result.summary(), "name": "trust", "prior_error": error, "rows": strict.height}, envmap.numpy()
+
+    def _field(self, settings: LightSettings, start: Array | None) -> nn.Module:
+        """A light to fit, of texels from `start` [h, 2h, 3] on if there is one."""
+        light = envmap_field(settings, seed=self.seed, start=start_radiance(self._photo()))
+        if start is not None and isinstance(light, EnvmapTexels):
+            with torch.no_grad():
+                light.log.copy_(state_log(start, settings.height))
+        return light
+
+    def _grid(self, rows: int) -> int | None:
+        """Rows of the light that the engine should resolve for a map of `rows`; None: as many as it does."""
+        return rows if rows == self.settings.light.fine else None
 
     # -- stages --------------------------------------------------------------------------------------------------------
 
     def _light(self, state: FitState, round_: int = 0) -> None:
         """Fit the light with the materials of the prior: the light must not explain what later stages have baked in."""
         settings = self.settings.light
-        problem = self.engine.light_problem(self.prior if round_ == 0 else self._slack_base(state))
-        light = envmap_field(settings, seed=self.seed, start=start_radiance(self._photo()))
-        if round_ > 0 and isinstance(light, EnvmapTexels):
-            with torch.no_grad():
-                light.log.copy_(state_log(state.envmap, settings.height))
+        given = self.prior if round_ == 0 else self._slack_base(state)
+        problem = self.engine.light_problem(given, self._grid(settings.height))
+        light = self._field(settings, state.envmap if round_ > 0 else None)
         steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
         slack = slack_albedo(problem, settings)
         result = fit_light(

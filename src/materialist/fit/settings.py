@@ -31,6 +31,9 @@ class LightSettings:
     """Weight of total variation of log radiance."""
     chroma: float = 0.0
     """Weight of the colourfulness of log radiance."""
+    fine: int | None = None
+    """Rows of the map of `texels` where the prior explains the photo so well (`FitSettings.trust`) that what is left of
+    its highlights and shadows tells of the light."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ DEFAULT = FitSettings(
         slack=0.03,
         smooth=0.01,
         chroma=0.05,
+        fine=32,
     ),
     materials=MaterialSettings(
         field="maps",

@@ -46,7 +46,8 @@ class RenderScene:
         self.mi = mi = setup(device)
         self._envmap = np.ones((4, 8, 3), np.float32)
         self._sunny = False
-        self._aim = self._openness = None
+        self._aim = None
+        self._openness: Array | None = None
         self._like: RenderScene | None = None
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
