@@ -65,6 +65,9 @@ def test_direct_light_is_linear_and_differentiable(both):
     (gradient,) = torch.autograd.grad(matrix.direct(envmap)[0, 5, 1], envmap)
     torch.testing.assert_close(gradient[:, 1], matrix.lobes[0][5])
     assert not gradient[:, [0, 2]].any()
+    weight = torch.rand(matrix.direct(a).shape, generator=rng)
+    (gradient,) = torch.autograd.grad((weight * matrix.direct(envmap)).sum(), envmap)
+    torch.testing.assert_close(gradient, torch.einsum("lqt,lqc->tc", matrix.lobes, weight))
 
 
 def test_another_albedo_changes_the_albedo_alone(both):
