@@ -12,7 +12,7 @@ from materialist.geometry.completion import walls_of
 from materialist.geometry.planes import find_planes
 from materialist.transport.cache import TransportCache
 from materialist.transport.light import light_matrix
-from materialist.transport.walls import DIFFUSE_SAMPLES, SPECULAR_SAMPLES, WallMatrix
+from materialist.transport.walls import SPECULAR_SAMPLES, SPHERE_SAMPLES, WallMatrix
 from materialist.types import Camera, Materials
 
 CAMERA = Camera(40, 30, 60.0)
@@ -49,7 +49,7 @@ def test_ends_are_as_if_traced(scene, move):
 
     near = cache_with(scene, ends)
     np.testing.assert_array_equal(near.pixels, far.pixels)
-    samples = {"diffuse_samples": DIFFUSE_SAMPLES, "specular_samples": SPECULAR_SAMPLES}
+    samples = {"sphere_samples": SPHERE_SAMPLES, "specular_samples": SPECULAR_SAMPLES}
     true = light_matrix(near, materials, rows, 8, **samples)
     light = true.indirect(torch.from_numpy(near.slot_radiance(radiance)))
     # A few rays pass within a rounding of the wall's sides, and the colours of its triangles are those of the mesh.

@@ -34,7 +34,7 @@ GAIN, LEAST = 0.04, 5e-4
 """Relative and absolute gain for which a side is moved: a little is had from any wall, by light that then comes from
 elsewhere, and what is explained to the noise of its few rays already tells nothing."""
 SIDES = ("left", "right", "up")
-PIXELS = 1024
+PIXELS = 2048
 """Surface pixels of the photo whose light is looked at."""
 
 

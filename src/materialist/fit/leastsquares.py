@@ -55,7 +55,7 @@ def explained(
 
 def nonnegative(matrix: torch.Tensor, target: torch.Tensor, start: torch.Tensor) -> torch.Tensor:
     """[3, texels] x >= 0 of least |matrix x - target|^2 + ridge, by accelerated projected gradients from `start`."""
-    gram = matrix.transpose(1, 2) @ matrix  # [3, texels, texels]
+    gram = torch.stack([each.t() @ each for each in matrix])  # [3, texels, texels]; symmetric: its rows are its columns
     mean = gram.diagonal(dim1=1, dim2=2).mean(1)  # [3]
     gram = gram + RIDGE * mean[:, None, None] * torch.eye(gram.shape[-1])
     right = (matrix.transpose(1, 2) @ target[..., None])[..., 0]
@@ -63,7 +63,7 @@ def nonnegative(matrix: torch.Tensor, target: torch.Tensor, start: torch.Tensor)
     scale = gram.sum(-1).clamp_min(1e-12).reciprocal()  # [3, texels]
     x, y, t = start, start, 1.0
     for _ in range(DESCENT):
-        new = (y - scale * ((gram @ y[..., None])[..., 0] - right)).clamp_min(0)
+        new = (y - scale * ((y[:, None] @ gram)[:, 0] - right)).clamp_min(0)
         if bool(((y - new) * (new - x)).sum() > 0):
             t = 1.0
         after = (1 + (1 + 4 * t * t) ** 0.5) / 2

@@ -11,6 +11,7 @@ from materialist.transport.sampling import (
     cosine_direction,
     diffuse_polynomial,
     face_towards,
+    ggx,
     lifted,
     schlick,
     smith_g1,
@@ -18,16 +19,6 @@ from materialist.transport.sampling import (
 )
 
 PLUGIN = "materialist_disney"
-
-
-def ggx(h, alpha):
-    """GGX normal distribution D(h) of a local unit vector h.
-
-    The squared sine comes from h.x and h.y: 1 - h.z^2 would lose all its digits where alpha is small.
-    """
-    a2 = alpha * alpha
-    d = h.x * h.x + h.y * h.y + a2 * h.z * h.z
-    return a2 / (dr.pi * d * d)
 
 
 def _define():

@@ -13,18 +13,8 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.render.buffers import floats, integers
-from materialist.transport.cache import MISS, TransportCache, spawn
-from materialist.transport.sampling import (
-    MIN_ALPHA,
-    cosine_direction,
-    diffuse_polynomial,
-    lifted,
-    point,
-    schlick,
-    smith_g1,
-    visible_normal,
-)
+from materialist.transport.cache import MISS, TransportCache
+from materialist.transport.rays import rays
 from materialist.types import Array, Materials
 
 DIELECTRIC_R0 = 0.04
@@ -102,76 +92,52 @@ def light_matrix(
     rows: Array,
     height: int,
     *,
-    diffuse_samples: int = 256,
+    sphere_samples: int = 1024,
     specular_samples: int = 64,
 ) -> LightMatrix:
-    """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows."""
+    """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows.
+
+    Args:
+        sphere_samples: rays of a pixel through the texels of the whole sphere, equally many through each and at least
+            one (half of them leave below the surface, and are not traced).
+        specular_samples: further rays of a pixel along its specular lobe.
+    """
     pixels = cache.pixels[rows]
     rough = materials.roughness.reshape(-1)[pixels]
     albedo, metallic = materials.albedo.reshape(-1, 3)[pixels], materials.metallic.reshape(-1, 1)[pixels]
     shape = (height, 2 * height)
-    matrices, hits = [], []
-    free, faced = torch.zeros(2, height * 2 * height)
-    for diffuse in (True, False):
-        count = diffuse_samples if diffuse else specular_samples
-        direction, slot, weights = _samples(cache, rows, rough, count, diffuse)
-        row = np.tile(np.arange(len(rows)), count)
-        matrices += [_scatter(direction, slot, w, row, len(rows), shape) for w in weights]
-        hits.append(_hits(slot, weights, row, diffuse))
-        if diffuse:
-            free += matrices[0].sum(0)
-            faced += _scatter(direction, np.full_like(slot, MISS), weights[0], np.zeros_like(row), 1, shape)[0]
+    lobes = torch.zeros(3, len(rows), height * 2 * height)
+    faced = torch.zeros(height * 2 * height)
+    hits = []
+    for some in rays(cache, rows, rough, shape, per_texel(sphere_samples, height), specular_samples):
+        direction, slot = np.array(some.ray.d).T, met(cache, some.ray)
+        index, share = bilinear(direction, shape)
+        weights = [np.array(w) for w in some.weights]
+        free = slot == MISS
+        for lobe, weight in zip(some.lobes, weights, strict=True):
+            add_footprints(lobes[lobe], index[free], share[free], weight[free], some.row[free])
+            if lobe == 0:
+                add_footprints(faced, index, share, weight, np.zeros_like(some.row))
+        hits.append(_hits(slot[~free], some.row[~free], [w[~free] for w in weights], some.lobes))
     index = np.concatenate([h[0] for h in hits], 1)
     weight = np.concatenate([h[1] for h in hits])
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, torch.stack(matrices),
-        torch.from_numpy(index), torch.from_numpy(weight),
+        torch.from_numpy(pixels.astype(np.int64)), shape, lobes, torch.from_numpy(index), torch.from_numpy(weight),
         torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
-        torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0),
+        torch.where(faced > 0, lobes[0].sum(0) / faced.clamp_min(1e-12), 1.0),
     )  # fmt: skip
 
 
-def _samples(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool):
-    """Directions [N, 3], slots [N] and lobe weights (each [N]) of `count` samples of each row, sample-major."""
-    ray, above, weights = rays(cache, rows, rough, count, diffuse)
+def per_texel(samples: int, height: int) -> int:
+    """Rays through each texel of a map of so many rows, for so many over the sphere."""
+    return max(1, round(samples / (2 * height * height)))
+
+
+def met(cache: TransportCache, ray: Any) -> Array:
+    """[N] uint32 radiance slot that each ray meets, or MISS."""
     scene: Any = cache.scene
-    pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
-    slot = dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), mi.UInt32(MISS))
-    dr.eval(ray, slot, *weights)
-    return np.array(ray.d).T, np.array(slot), [np.array(w) for w in weights]
-
-
-def rays(cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool):
-    """`count` rays of each row [Q], sample-major, which of them leave above the surface, and their lobes' weights."""
-    q = len(rows)
-    lane = dr.arange(mi.UInt32, q * count)
-    source = dr.gather(mi.UInt32, integers(mi, rows), lane % q)
-    take = lambda v: dr.gather(type(v), v, source)  # noqa: E731
-    wo, frame, shift = take(cache.wo), mi.Frame3f(take(cache.normal)), take(cache.shift)
-    sample = point(lane // q, dr.opaque(mi.UInt32, count), shift)
-    alpha = dr.gather(mi.Float, floats(mi, np.maximum(rough**2, MIN_ALPHA)), lane % q)
-    if diffuse:
-        wi = cosine_direction(sample)
-        c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(dr.normalize(wi + wo), wi))
-        r = dr.gather(mi.Float, floats(mi, rough), lane % q)
-        weights = [c0 + r * (c1 + r * c2)]
-    else:
-        h = visible_normal(wo, alpha, sample)
-        wi = mi.reflect(wo, h)
-        fresnel, g1 = schlick(dr.dot(h, wo)), smith_g1(wi.z, alpha)
-        weights = [(1 - fresnel) * g1, fresnel * g1]
-    above = wi.z > 0
-    world = lifted(frame.to_world(wi), take(cache.face))
-    ray = spawn(take(cache.position), take(cache.geometric_normal), world)
-    return ray, above, [dr.select(above, w / count, 0) for w in weights]
-
-
-def _scatter(direction, slot, weight, row, rows: int, shape: tuple[int, int]) -> torch.Tensor:
-    """Bilinear footprints of the rays that leave the scene, added up: [rows, h * w]."""
-    free = (slot == MISS) & (weight > 0)
-    out = torch.zeros(rows, shape[0] * shape[1])
-    add_footprints(out, *bilinear(direction[free], shape), weight[free], row[free])
-    return out
+    pi = scene.ray_intersect_preliminary(ray, coherent=False)
+    return np.array(dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), MISS))
 
 
 def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
@@ -181,14 +147,12 @@ def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array,
     out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
 
 
-def _hits(slot, weights, row, diffuse: bool):
-    hit = (slot != MISS) & (weights[0] > 0)
-    columns = np.zeros((hit.sum(), 3), np.float32)
-    if diffuse:
-        columns[:, 0] = weights[0][hit]
-    else:
-        columns[:, 1], columns[:, 2] = weights[0][hit], weights[1][hit]
-    return np.stack([row[hit], slot[hit].astype(np.int64)]), columns
+def _hits(slot: Array, row: Array, weights: list[Array], lobes: tuple[int, ...]) -> tuple[Array, Array]:
+    """`hit_index` and `hit_weight` of rays [N] that all meet a surface."""
+    columns = np.zeros((len(slot), 3), np.float32)
+    for lobe, weight in zip(lobes, weights, strict=True):
+        columns[:, lobe] = weight
+    return np.stack([row, slot.astype(np.int64)]), columns
 
 
 def bilinear(direction: Array, shape: tuple[int, int]) -> tuple[Array, Array]:

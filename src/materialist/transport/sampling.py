@@ -59,6 +59,16 @@ def visible_normal(wo, alpha, sample):
     return dr.normalize(mi.Vector3f(alpha * h.x, alpha * h.y, dr.maximum(h.z, 1e-6)))
 
 
+def ggx(h, alpha):
+    """GGX normal distribution D(h) of a local unit vector h.
+
+    The squared sine comes from h.x and h.y: 1 - h.z^2 would lose all its digits where alpha is small.
+    """
+    a2 = alpha * alpha
+    d = h.x * h.x + h.y * h.y + a2 * h.z * h.z
+    return a2 / (dr.pi * d * d)
+
+
 def smith_g1(cos_theta, alpha):
     """Smith masking of GGX for a direction with cosine `cos_theta` to the normal."""
     c2 = cos_theta * cos_theta

@@ -18,12 +18,13 @@ import torch
 from materialist.geometry.ends import Ends, axes
 from materialist.render.buffers import integers
 from materialist.transport.cache import MISS, TransportCache
-from materialist.transport.light import LightMatrix, add_footprints, bilinear, rays
+from materialist.transport.light import LightMatrix, add_footprints, bilinear, per_texel
+from materialist.transport.rays import Rays, rays
 from materialist.types import Array, Camera, Materials, Mesh
 
 LAYERS = 4
 """Continued walls that a ray is followed through."""
-DIFFUSE_SAMPLES = 192
+SPHERE_SAMPLES = 512
 SPECULAR_SAMPLES = 32
 
 
@@ -80,10 +81,9 @@ class WallMatrix:
         self._light = torch.from_numpy(np.ascontiguousarray(slot_radiance, np.float32))
         wall = _beyond(cache.mesh, cache.camera, [k for _, k in walls])
         basis = [axes(normal) for normal, _ in walls]
-        every = [
-            _followed(cache, rows, flat, count, diffuse, wall, basis, self.shape)
-            for count, diffuse in ((DIFFUSE_SAMPLES, True), (SPECULAR_SAMPLES, False))
-        ]
+        each_texel = per_texel(SPHERE_SAMPLES, height)
+        traced = rays(cache, rows, flat, self.shape, each_texel, SPECULAR_SAMPLES)
+        every = [_followed(cache, some, wall, basis, self.shape) for some in traced]
         size = height * 2 * height
         self._fixed = (
             torch.zeros(3, len(rows), size), torch.zeros(3, len(rows), 3), torch.zeros(size)
@@ -94,7 +94,7 @@ class WallMatrix:
             through = np.logical_or.reduce([w >= 0 for w, *_ in each.layers]) if each.layers else each.last < 0
             self._add(self._fixed, each.picked(~through), ())
             self._open.append(each.picked(through))
-            if each.lobes == (0,):
+            if 0 in each.lobes:
                 add_footprints(faced, each.index, each.share, each.weights[0], np.zeros_like(each.row))
         self._faced = faced
 
@@ -122,21 +122,20 @@ class WallMatrix:
         for lobe, weight in zip(each.lobes, each.weights, strict=True):
             add_footprints(lobes[lobe], each.index[missed], each.share[missed], weight[missed], each.row[missed])
             indirect[lobe].index_add_(0, row, light * torch.from_numpy(weight[~missed])[:, None])
-        if each.lobes == (0,):
+        if 0 in each.lobes:
             zero = np.zeros_like(each.row[missed])
             add_footprints(free, each.index[missed], each.share[missed], each.weights[0][missed], zero)
 
 
 def _followed(
-    cache: TransportCache, rows: Array, rough: Array, count: int, diffuse: bool, wall: Array, basis: list[Array],
-    shape: tuple[int, int],
+    cache: TransportCache, some: Rays, wall: Array, basis: list[Array], shape: tuple[int, int]
 ) -> _Rays:  # fmt: skip
-    """`count` rays of each row, through the walls that the faces [F] belong to (-1: none)."""
-    ray, above, weights = rays(cache, rows, rough, count, diffuse)
+    """Rays through the walls that the faces [F] belong to (-1: none)."""
     scene: Any = cache.scene
     of_face = integers(mi, (wall + 1).astype(np.uint32))
-    active, layers, last = above, [], np.full(len(rows) * count, MISS, np.uint32)
+    ray, active = some.ray, mi.Bool(True)
     direction = np.array(ray.d).T
+    layers, last = [], np.full(len(direction), MISS, np.uint32)
     for _ in range(LAYERS + 1):
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         hit = active & pi.is_valid()
@@ -156,12 +155,9 @@ def _followed(
         layers.append((number, place[:, 0], place[:, 1], where))
         active = hit & (here > 0)
         ray = mi.Ray3f(end + ray.d * (1e-4 * (1 + dr.max(dr.abs(end)))), ray.d)
-    used = np.array(weights[0]) > 0
     index, share = bilinear(direction, shape)
-    row = np.tile(np.arange(len(rows)), count)
-    lobes = (0,) if diffuse else (1, 2)
-    found = _Rays(row, tuple(np.array(w) for w in weights), lobes, index, share.astype(np.float32), tuple(layers), last)
-    return found.picked(used)
+    weights = tuple(np.array(w) for w in some.weights)
+    return _Rays(some.row, weights, some.lobes, index, share.astype(np.float32), tuple(layers), last)
 
 
 def _beyond(mesh: Mesh, camera: Camera, planes: list[int]) -> Array:

@@ -30,8 +30,7 @@ def value(wi, wo, look):
     import mitsuba as mi
 
     from materialist.render.brdf import DIELECTRIC_R0
-    from materialist.render.bsdf import ggx
-    from materialist.transport.sampling import MIN_ALPHA, diffuse_polynomial, schlick, smith_g1
+    from materialist.transport.sampling import MIN_ALPHA, diffuse_polynomial, ggx, schlick, smith_g1
 
     above = (wi.z > 0) & (wo.z > 0)
     alpha = dr.maximum(look.roughness * look.roughness, MIN_ALPHA)
