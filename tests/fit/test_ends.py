@@ -6,7 +6,7 @@ import torch
 from geometry_scenes import room
 
 from materialist.envmap import texel_directions
-from materialist.fit.ends import SIDES, Search, _at, farthest
+from materialist.fit.ends import SIDES, Search, _at, farthest, searched
 from materialist.fit.engine import TransportEngine
 from materialist.fit.settings import DEFAULT
 from materialist.geometry.build import build_geometry
@@ -34,8 +34,8 @@ def maps():
     return depth, normal, wall, Materials(albedo, matt, 0 * matt)
 
 
-def searched(maps, levels, direction) -> tuple[Search, object]:
-    """A search on the picture of the room whose wall truly ends at the levels, under a sun."""
+def pictured(maps, levels, direction) -> tuple:
+    """The engine, materials and picture of the room whose wall truly ends at the levels, under a sun."""
     depth, normal, wall, materials = maps
     geometry = build_geometry(depth, normal, CAMERA, ends=[_at(wall, levels)])
     renderer = RenderScene(geometry, CAMERA, device="cpu")
@@ -46,14 +46,14 @@ def searched(maps, levels, direction) -> tuple[Search, object]:
     engine = TransportEngine(
         build_geometry(depth, normal, CAMERA, ends=[farthest(wall)]), CAMERA, photo, light_height=16
     )
-    return Search(engine, materials, torch.from_numpy(photo.reshape(-1, 3)), DEFAULT.light, [wall]), wall
+    return engine, materials, torch.from_numpy(photo.reshape(-1, 3))
 
 
 @pytest.mark.parametrize(("up", "direction"), [(0.0, (0.1, 1.8, -1)), (1.0, (0.1, 2.2, -1))])
 def test_the_height_of_a_wall_is_read_off_its_shadow(maps, up, direction):
     """The sun is behind the wall, whose shadow ends on the floor."""
-    search, wall = searched(maps, {"left": 2.0, "right": 2.0, "up": up}, direction)
-    found = search.found()
+    wall = maps[2]
+    found = searched(*pictured(maps, {"left": 2.0, "right": 2.0, "up": up}, direction), DEFAULT, [wall])
     assert found is not None and found.error < 0.9 * found.usual
     (end,) = found.ends
     assert (end.up - wall.seen.up) / wall.size == pytest.approx(up, abs=0.01)
@@ -61,8 +61,9 @@ def test_the_height_of_a_wall_is_read_off_its_shadow(maps, up, direction):
 
 def test_without_a_sign_in_the_light_no_side_moves(maps):
     """The sun is behind the camera. The shadows above gain 0.004; a side that gains a tenth of that stays."""
-    search, wall = searched(maps, {"left": 0.5, "right": 0.5, "up": 0.5}, (0.2, 0.5, 0.9))
-    assert search.found() is None
+    wall, picture = maps[2], pictured(maps, {"left": 0.5, "right": 0.5, "up": 0.5}, (0.2, 0.5, 0.9))
+    assert searched(*picture, DEFAULT, [wall]) is None
+    search = Search(*picture, DEFAULT.light, [wall])
     usual = search.error((wall.usual,))
     even = [search.error((_at(wall, dict.fromkeys(SIDES, level)),)) for level in (0.25, 0.5, 1.0)]
     assert max(even) < 1.25 * usual
@@ -79,5 +80,4 @@ def test_the_order_of_searches_decides_nothing():
     geometry = build_geometry(depth, normal, camera, ends=[farthest(wall) for wall in walls])
     photo = albedo * np.float32(0.7)
     engine = TransportEngine(geometry, camera, photo, light_height=16)
-    search = Search(engine, materials, torch.from_numpy(photo.reshape(-1, 3)), DEFAULT.light, walls)
-    assert walls and search.found() is None
+    assert walls and searched(engine, materials, torch.from_numpy(photo.reshape(-1, 3)), DEFAULT, walls) is None

@@ -26,7 +26,7 @@ def matrix():
 
 
 def test_openness_is_the_share_of_light_that_arrives(matrix):
-    arrives = matrix.lobes[0].sum(0)
+    arrives = matrix.parts[0].sum(0)
     assert matrix.open.shape == (2 * HEIGHT * HEIGHT,)
     assert float(matrix.open.min()) >= 0 and float(matrix.open.max()) <= 1 + 1e-5
     # A texel of which nothing arrives is closed; one without pixels that face it counts as open.

@@ -1,5 +1,7 @@
 """The light matrix against gathering and shading, pixel by pixel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -63,23 +65,37 @@ def test_direct_light_is_linear_and_differentiable(both):
     torch.testing.assert_close(matrix.direct(2 * a + b), 2 * matrix.direct(a) + matrix.direct(b), rtol=1e-4, atol=1e-5)
     envmap = a.clone().requires_grad_()
     (gradient,) = torch.autograd.grad(matrix.direct(envmap)[0, 5, 1], envmap)
-    torch.testing.assert_close(gradient[:, 1], matrix.lobes[0][5])
+    torch.testing.assert_close(gradient[:, 1], matrix.parts[0][5])
     assert not gradient[:, [0, 2]].any()
     weight = torch.rand(matrix.direct(a).shape, generator=rng)
     (gradient,) = torch.autograd.grad((weight * matrix.direct(envmap)).sum(), envmap)
-    torch.testing.assert_close(gradient, torch.einsum("lqt,lqc->tc", matrix.lobes, weight))
+    torch.testing.assert_close(gradient, torch.einsum("lqt,lqc->tc", matrix.parts, weight))
 
 
 def test_another_albedo_changes_the_albedo_alone(both):
-    """Light of the lobes 1, 0, 0 then 0, 1, 0: A (1 - M) and C_0 = 0.04 (1 - M) + M A."""
+    """A L_0 + L_1."""
     matrix = both[3]
     albedo = torch.rand(matrix.albedo.shape, generator=torch.Generator().manual_seed(1))
-    light = torch.zeros(3, len(albedo), 3)
-    light[0] = 1
-    torch.testing.assert_close(matrix.combine(light, albedo), albedo * (1 - matrix.metallic))
-    light = light.roll(1, 0)
-    expected = 0.04 * (1 - matrix.metallic) + matrix.metallic * albedo
-    torch.testing.assert_close(matrix.combine(light, albedo), expected)
+    light = torch.rand(2, len(albedo), 3, generator=torch.Generator().manual_seed(2))
+    torch.testing.assert_close(matrix.combine(light, albedo), albedo * light[0] + light[1])
+
+
+@pytest.mark.parametrize("change", [{"albedo": 0.5}, {"metallic": 1.0}, {"metallic": 0.0}])
+def test_other_materials_give_their_own_light(both, change):
+    """What the albedo multiplies holds it right: A (1 - M) f_d + (0.04 (1 - M) + M A) f_0 + f_1."""
+    cache, rows, materials, matrix = both
+    other = {k: np.full_like(getattr(materials, k), v) for k, v in change.items()}
+    changed = replace(materials, **other)
+    envmap = windowed_sky(HEIGHT)
+    flat = torch.from_numpy(envmap).reshape(-1, 3)
+    if "albedo" in change:
+        found = matrix.combine(matrix.direct(flat), torch.from_numpy(changed.albedo.reshape(-1, 3)[matrix.pixels]))
+    else:
+        again = light_matrix(cache, changed, rows, HEIGHT)
+        found = again.combine(again.direct(flat))
+    reference = shaded((cache, rows, changed, None), envmap, None)
+    assert relative_error(found, reference) < 0.035  # of metals, gathering interpolates between roughness levels
+    assert relative_error(matrix.combine(matrix.direct(flat)), reference) > 0.05
 
 
 def test_every_ray_either_leaves_or_meets_a_surface(both):
@@ -92,8 +108,8 @@ def test_every_ray_either_leaves_or_meets_a_surface(both):
     torch.testing.assert_close(matrix.combine(direct + indirect), shaded(both, light, surfaces), rtol=0.03, atol=0.01)
 
 
-def test_transport_per_channel_is_that_of_the_lobes_together(both):
+def test_transport_per_channel_is_that_of_the_parts_together(both):
     matrix = both[3]
-    light = torch.rand(matrix.lobes.shape[-1], 3, generator=torch.Generator().manual_seed(3))
+    light = torch.rand(matrix.parts.shape[-1], 3, generator=torch.Generator().manual_seed(3))
     found = torch.einsum("cqt,tc->qc", matrix.per_channel(), light)
     torch.testing.assert_close(found, matrix.combine(matrix.direct(light)), rtol=1e-4, atol=1e-5)

@@ -53,8 +53,8 @@ def test_ends_are_as_if_traced(scene, move):
     true = light_matrix(near, materials, rows, 8, **samples)
     light = true.indirect(torch.from_numpy(near.slot_radiance(radiance)))
     # A few rays pass within a rounding of the wall's sides, and the colours of its triangles are those of the mesh.
-    assert float((found.lobes - true.lobes).abs().sum() / true.lobes.abs().sum()) < 0.01
+    assert float((found.parts - true.parts).abs().sum() / true.parts.abs().sum()) < 0.01
     assert float((found.open - true.open).abs().mean()) < 0.01
     assert float((indirect - light).abs().mean() / light.abs().mean()) < 0.05
     moved = light_matrix(far, materials, rows, 8, **samples)
-    assert float((moved.lobes - true.lobes).abs().sum() / true.lobes.abs().sum()) > 0.01
+    assert float((moved.parts - true.parts).abs().sum() / true.parts.abs().sum()) > 0.01

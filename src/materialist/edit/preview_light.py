@@ -35,8 +35,8 @@ class OtherLight:
 
     def shaded(self, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
         """[P, 3] radiance of all surface pixels; albedo [P, 3], roughness and metallic [P]."""
+        from materialist.render.brdf import DIELECTRIC_R0
         from materialist.transport.filter import filter_tables
-        from materialist.transport.light import DIELECTRIC_R0
         from materialist.transport.shading import shade
 
         known = roughness.numpy()

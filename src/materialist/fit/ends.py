@@ -34,8 +34,10 @@ GAIN, LEAST = 0.04, 5e-4
 """Relative and absolute gain for which a side is moved: a little is had from any wall, by light that then comes from
 elsewhere, and what is explained to the noise of its few rays already tells nothing."""
 SIDES = ("left", "right", "up")
-PIXELS = 2048
+PIXELS = 1024
 """Surface pixels of the photo whose light is looked at."""
+RUNOFF = 6
+"""Of all ends that were tried, the best so many are compared once more on the finer map."""
 
 
 def farthest(wall: Wall) -> Ends:
@@ -79,7 +81,22 @@ def find_ends(
     )  # fmt: skip
     engine = TransportEngine(geometry, camera, photo, seed=seed, light_height=settings.light_grid)
     flat = torch.from_numpy(np.ascontiguousarray(photo.reshape(-1, 3), np.float32))
-    return Search(engine, prior.materials, flat, settings.light, walls, seed).found()
+    return searched(engine, prior.materials, flat, settings, walls, seed)
+
+
+def searched(
+    engine: TransportEngine, materials: Materials, photo: torch.Tensor, settings: FitSettings, walls: Sequence[Wall],
+    seed: int = 0,
+) -> Found | None:  # fmt: skip
+    """The ends that explain a photo [H * W, 3] best; where the prior is trusted, the finer map decides between them."""
+    usual = tuple(wall.usual for wall in walls)
+    coarse = Search(engine, materials, photo, settings.light, walls, seed)
+    best = coarse.best(usual)
+    fine = settings.finer(coarse.error(best))
+    if fine is None:
+        return coarse.compared([best], usual)
+    tried = sorted(coarse.tried, key=coarse.error)[:RUNOFF]
+    return Search(engine, materials, photo, fine, walls, seed).compared([best, *tried], usual)
 
 
 @dataclass
@@ -103,7 +120,7 @@ class Search:
         rows = np.sort(rng.permutation(len(engine.cache.pixels))[:count])
         planes = [(np.array(wall.usual.normal), wall.index) for wall in self.walls]
         slots = engine.cache.slot_radiance(engine.radiance)
-        self._matrix = WallMatrix(engine.cache, self.materials, rows, engine.light_height, planes, slots)
+        self._matrix = WallMatrix(engine.cache, self.materials, rows, self.settings.height, planes, slots)
         self._light: torch.Tensor | None = None
 
     def error(self, ends: tuple[Ends, ...]) -> float:
@@ -115,15 +132,19 @@ class Search:
             )
         return self.tried[ends]
 
-    def found(self) -> Found | None:
-        """Where the walls end; None where no ends are clearly better than the usual ones."""
-        usual = tuple(wall.usual for wall in self.walls)
+    def compared(self, found: Sequence[tuple[Ends, ...]], usual: tuple[Ends, ...]) -> Found | None:
+        """The best of the ends found; None if none are clearly better than the usual ones.
+
+        A search goes on from the light of the one before, and what comes late has the better light: here all begin
+        with the same.
+        """
+        self.tried.clear()
+        self._light = None
         self.error(usual)
         first = self._light
-        self.tried.clear()  # the first light began from nothing; from now on all begin alike
-        best = self.best(usual)
-        # Each search goes on from the light of the one before: what came late has the better light. Both once more.
-        error, before = (self._afresh(ends, first) for ends in (best, usual))
+        errors = {ends: self._afresh(ends, first) for ends in (usual, *found)}
+        best = min(errors, key=errors.__getitem__)
+        error, before = errors[best], errors[usual]
         return Found(best, error, before) if _clearly(error, before) else None
 
     def _afresh(self, ends: tuple[Ends, ...], light: torch.Tensor | None) -> float:
@@ -134,6 +155,8 @@ class Search:
 
     def best(self, usual: tuple[Ends, ...]) -> tuple[Ends, ...]:
         """The ends of least error that a descent from the usual ones, or from even ones, comes to."""
+        self.error(usual)
+        self.tried.clear()  # that light began from nothing; from now on all begin with one
         even = [tuple(_at(wall, dict.fromkeys(SIDES, level)) for wall in self.walls) for level in STARTS]
         none = tuple(map(_nowhere, self.walls))
         begun = sorted([usual, none, *even], key=self.error)[:DESCENTS]

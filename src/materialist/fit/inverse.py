@@ -26,9 +26,8 @@ from materialist.types import Array, Camera, Materials, Photo
 
 STRICT_STEPS = 120
 """Steps of the light fit that measures how far the prior can be trusted."""
-MAX_TRUST = 100.0
-FINE_TRUST, FINE_STEPS = 4.0, 60
-"""Trust from which the light is fitted on its finer map, and the steps after which the prior is then judged anew."""
+FINE_STEPS = 60
+"""The same on the finer map, from the coarse light on."""
 WHITE = 0.99
 """Linear value from which a channel of a photo that is not HDR is taken for clipped."""
 
@@ -94,12 +93,7 @@ class Fit:
         return FitState(self._prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
 
     def _trust(self) -> float:
-        """How much dearer it is to leave the prior: (trust / e)^3, e the error of the best light for it, which is what
-        materials or geometry have wrong."""
-        return self._trust_at(self.prior_error())
-
-    def _trust_at(self, error: float) -> float:
-        return min(max(((self.settings.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
+        return self.settings.trust_at(self.prior_error())
 
     def _trusting(self) -> Fit:
         """The fit with the prices of leaving the prior scaled by how well the prior explains the photo.
@@ -111,7 +105,7 @@ class Fit:
             return self
         scale = self._trust()
         light = settings.light
-        if (fine := self._finer()) is not None and self._explained["rows"] == fine.height:
+        if (fine := settings.fine_light) is not None and self._explained["rows"] == fine.height:
             light = fine
         slack = None if light.slack is None else light.slack * scale
         light = replace(light, slack=slack, chroma=light.chroma / scale)
@@ -126,19 +120,12 @@ class Fit:
     def _explained(self) -> dict:
         """The stage in which that light is fitted; `rows` of its map, more of them where the prior is trusted."""
         found, light = self._strict(self.settings.light)
-        fine = self._finer()
-        if fine is None or self._trust_at(found["prior_error"]) < FINE_TRUST:
+        fine = self.settings.finer(found["prior_error"])
+        if fine is None:
             return found
         finer, _ = self._strict(fine, light, steps=FINE_STEPS)
         seconds = round(found["seconds"] + finer["seconds"], 3)
         return {**min(found, finer, key=lambda stage: stage["prior_error"]), "seconds": seconds}
-
-    def _finer(self) -> LightSettings | None:
-        """The settings of the finer light. An edge in it costs what it costs on the coarser map."""
-        light = self.settings.light
-        if light.fine is None:
-            return None
-        return replace(light, height=light.fine, smooth=light.smooth * light.fine / light.height)
 
     def _strict(
         self, settings: LightSettings, start: Array | None = None, *, steps: int = STRICT_STEPS

@@ -71,6 +71,11 @@ class MaterialSettings:
     calls a dielectric goes on from `other_metallic`."""
 
 
+MAX_TRUST = 100.0
+FINE_TRUST = 4.0
+"""Trust from which the light is looked for on the finer map."""
+
+
 @dataclass(frozen=True)
 class FitSettings:
     """Everything that a preset fixes."""
@@ -87,6 +92,23 @@ class FitSettings:
     below it, leaving the prior grows dearer with the third power. None: no such scaling."""
     light_grid: int = 32
     """Rows of the envmap that the transport engine's light matrix resolves."""
+
+    def trust_at(self, error: float) -> float:
+        """How much dearer it is to leave the prior: (trust / e)^3, e the error of the best light for it, which is what
+        materials or geometry have wrong."""
+        return min(max(((self.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
+
+    @property
+    def fine_light(self) -> LightSettings | None:
+        """The light on its finer map, if there is one; an edge in it costs what it costs on the coarse map."""
+        light = self.light
+        if light.fine is None or self.trust is None:
+            return None
+        return replace(light, height=light.fine, smooth=light.smooth * light.fine / light.height)
+
+    def finer(self, error: float) -> LightSettings | None:
+        """The same where the coarse light leaves so small an error that it is asked for."""
+        return self.fine_light if self.trust_at(error) >= FINE_TRUST else None
 
 
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)

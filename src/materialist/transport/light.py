@@ -17,56 +17,49 @@ from materialist.transport.cache import MISS, TransportCache
 from materialist.transport.rays import rays
 from materialist.types import Array, Materials
 
-DIELECTRIC_R0 = 0.04
-"""Fresnel reflectance R_0 of a dielectric with IOR 1.5 at normal incidence."""
-
 
 @dataclass(frozen=True)
 class LightMatrix:
     """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; torch float32.
 
-    Everything comes in three lobes: diffuse (without A (1 - M)), the part of the specular lobe that C_0 multiplies,
-    and the rest of the specular lobe.
+    Everything comes in two parts: what the albedo multiplies, and the rest.
     """
 
     pixels: torch.Tensor
     """[Q] int64 row-major pixel indices."""
     shape: tuple[int, int]
     """(h, 2h) of the envmap."""
-    lobes: torch.Tensor
-    """[3, Q, h * 2h]: direct transport of the lobes."""
+    parts: torch.Tensor
+    """[2, Q, h * 2h]: direct transport of both."""
     hit_index: torch.Tensor
     """[2, K] int64: (row, radiance slot) of every ray that meets a surface."""
     hit_weight: torch.Tensor
-    """[K, 3] weight of each such ray in the three lobes."""
+    """[K, 2] weight of each such ray in both."""
     albedo: torch.Tensor
     """[Q, 3]."""
-    metallic: torch.Tensor
-    """[Q, 1]."""
     open: torch.Tensor
     """[h * 2h] in [0, 1]: share of the light that each texel would send to the pixels that nothing holds back; 1 for
     texels that no pixel faces."""
 
     def direct(self, envmap: torch.Tensor) -> torch.Tensor:
-        """[3, Q, 3] light of each lobe straight from `envmap` [h * 2h, 3]; differentiable in it."""
-        return _Product.apply(self.lobes.flatten(0, 1), envmap).unflatten(0, (3, -1))
+        """[2, Q, 3] light of each part straight from `envmap` [h * 2h, 3]; differentiable in it."""
+        return _Product.apply(self.parts.flatten(0, 1), envmap).unflatten(0, (2, -1))
 
     def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
-        """[3, Q, 3] light of each lobe by way of other surfaces, given what leaves each slot [S, 3]."""
+        """[2, Q, 3] light of each part by way of other surfaces, given what leaves each slot [S, 3]."""
         light = slot_radiance[self.hit_index[1]]
-        sums = torch.zeros(3, len(self.pixels), 3)
-        for lobe in range(3):
-            sums[lobe].index_add_(0, self.hit_index[0], light * self.hit_weight[:, lobe : lobe + 1])
+        sums = torch.zeros(2, len(self.pixels), 3)
+        for part in range(2):
+            sums[part].index_add_(0, self.hit_index[0], light * self.hit_weight[:, part : part + 1])
         return sums
 
     def combine(self, light: torch.Tensor, albedo: torch.Tensor | None = None) -> torch.Tensor:
-        """Radiance [Q, 3] from the light of the lobes [3, Q, 3], with another albedo [Q, 3] if one is given."""
-        a, m = self.albedo if albedo is None else albedo, self.metallic
-        return a * (1 - m) * light[0] + (DIELECTRIC_R0 * (1 - m) + m * a) * light[1] + light[2]
+        """Radiance [Q, 3] from the light of the parts [2, Q, 3], with another albedo [Q, 3] if one is given."""
+        return (self.albedo if albedo is None else albedo) * light[0] + light[1]
 
     def per_channel(self) -> torch.Tensor:
-        """[3, Q, h * 2h] direct transport of red, green and blue, the lobes combined."""
-        return torch.stack([self.combine(self.lobes, self.albedo[:, c : c + 1]) for c in range(3)])
+        """[3, Q, h * 2h] direct transport of red, green and blue, the parts combined."""
+        return torch.stack([self.combine(self.parts, self.albedo[:, c : c + 1]) for c in range(3)])
 
 
 class _Product(torch.autograd.Function):
@@ -103,29 +96,36 @@ def light_matrix(
         specular_samples: further rays of a pixel along its specular lobe.
     """
     pixels = cache.pixels[rows]
-    rough = materials.roughness.reshape(-1)[pixels]
-    albedo, metallic = materials.albedo.reshape(-1, 3)[pixels], materials.metallic.reshape(-1, 1)[pixels]
+    rough, metallic, albedo = (m[pixels] for m in flat(materials))
     shape = (height, 2 * height)
-    lobes = torch.zeros(3, len(rows), height * 2 * height)
-    faced = torch.zeros(height * 2 * height)
+    parts = torch.zeros(2, len(rows), height * 2 * height)
+    free, faced = torch.zeros(2, height * 2 * height)
     hits = []
-    for some in rays(cache, rows, rough, shape, per_texel(sphere_samples, height), specular_samples):
-        direction, slot = np.array(some.ray.d).T, met(cache, some.ray)
-        index, share = bilinear(direction, shape)
-        weights = [np.array(w) for w in some.weights]
-        free = slot == MISS
-        for lobe, weight in zip(some.lobes, weights, strict=True):
-            add_footprints(lobes[lobe], index[free], share[free], weight[free], some.row[free])
-            if lobe == 0:
-                add_footprints(faced, index, share, weight, np.zeros_like(some.row))
-        hits.append(_hits(slot[~free], some.row[~free], [w[~free] for w in weights], some.lobes))
-    index = np.concatenate([h[0] for h in hits], 1)
-    weight = np.concatenate([h[1] for h in hits])
+    for some in rays(cache, rows, rough, metallic, shape, per_texel(sphere_samples, height), specular_samples):
+        slot = met(cache, some.ray)
+        index, share = bilinear(np.array(some.ray.d).T, shape)
+        leaves = slot == MISS
+        for part, weight in zip(parts, some.weights, strict=True):
+            add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
+        if some.diffuse is not None:
+            add_to_map(faced, index, share, some.diffuse)
+            add_to_map(free, index[leaves], share[leaves], some.diffuse[leaves])
+        hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
+    row, slots, hit_weight = (torch.from_numpy(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, lobes, torch.from_numpy(index), torch.from_numpy(weight),
-        torch.from_numpy(albedo.astype(np.float32)), torch.from_numpy(metallic.astype(np.float32)),
-        torch.where(faced > 0, lobes[0].sum(0) / faced.clamp_min(1e-12), 1.0),
+        torch.from_numpy(pixels.astype(np.int64)), shape, parts, torch.stack([row, slots.long()]), hit_weight,
+        torch.from_numpy(albedo.astype(np.float32)), openness(free, faced),
     )  # fmt: skip
+
+
+def flat(materials: Materials) -> tuple[Array, Array, Array]:
+    """Roughness [H * W], metallic [H * W] and albedo [H * W, 3]."""
+    return materials.roughness.reshape(-1), materials.metallic.reshape(-1), materials.albedo.reshape(-1, 3)
+
+
+def openness(free: torch.Tensor, faced: torch.Tensor) -> torch.Tensor:
+    """`LightMatrix.open` from the diffuse light that leaves the scene and all that there is, by texel."""
+    return torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0)
 
 
 def per_texel(samples: int, height: int) -> int:
@@ -140,19 +140,16 @@ def met(cache: TransportCache, ray: Any) -> Array:
     return np.array(dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), MISS))
 
 
+def add_to_map(out: torch.Tensor, index: Array, share: Array, weight: Array) -> None:
+    """Add rays [N] to out [texels]: their weight [N] to the texels index [N, 4] by share [N, 4]."""
+    add_footprints(out, index, share, weight, np.zeros(len(index), np.int64))
+
+
 def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
-    """Add rays [N] to out [rows, texels], or [texels]: their weight [N] to the texels index [N, 4] by share [N, 4]."""
+    """The same to the rows [N] of out [rows, texels]."""
     flat = row[:, None] * out.shape[-1] + index
     values = (share * weight[:, None]).astype(np.float32)
     out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
-
-
-def _hits(slot: Array, row: Array, weights: list[Array], lobes: tuple[int, ...]) -> tuple[Array, Array]:
-    """`hit_index` and `hit_weight` of rays [N] that all meet a surface."""
-    columns = np.zeros((len(slot), 3), np.float32)
-    for lobe, weight in zip(lobes, weights, strict=True):
-        columns[:, lobe] = weight
-    return np.stack([row, slot.astype(np.int64)]), columns
 
 
 def bilinear(direction: Array, shape: tuple[int, int]) -> tuple[Array, Array]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import torch
 
+from materialist.render.brdf import DIELECTRIC_R0
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
-from materialist.transport.light import DIELECTRIC_R0
 
 
 def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:

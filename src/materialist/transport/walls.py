@@ -18,13 +18,21 @@ import torch
 from materialist.geometry.ends import Ends, axes
 from materialist.render.buffers import integers
 from materialist.transport.cache import MISS, TransportCache
-from materialist.transport.light import LightMatrix, add_footprints, bilinear, per_texel
+from materialist.transport.light import (
+    LightMatrix,
+    add_footprints,
+    add_to_map,
+    bilinear,
+    flat,
+    openness,
+    per_texel,
+)
 from materialist.transport.rays import Rays, rays
 from materialist.types import Array, Camera, Materials, Mesh
 
 LAYERS = 4
 """Continued walls that a ray is followed through."""
-SPHERE_SAMPLES = 512
+SPHERE_SAMPLES = 1024
 SPECULAR_SAMPLES = 32
 
 
@@ -34,9 +42,10 @@ class _Rays:
 
     row: Array
     """[N]."""
-    weights: tuple[Array, ...]
-    """Per lobe, [N]."""
-    lobes: tuple[int, ...]
+    weights: tuple[Array, Array]
+    """Each [N]: what the albedo multiplies, and the rest."""
+    diffuse: Array | None
+    """[N] weight in the diffuse lobe, where the rays are part of it."""
     index: Array
     """[N, 4] texels of the direction, and their shares."""
     share: Array
@@ -46,10 +55,10 @@ class _Rays:
     """[N] uint32 slot of what is behind all of them, or MISS."""
 
     def picked(self, these: Array) -> _Rays:
-        take = lambda parts: tuple(p[these] for p in parts)  # noqa: E731
         layers = tuple((w[these], x[these], y[these], s[these]) for w, x, y, s in self.layers)
-        return _Rays(self.row[these], take(self.weights), self.lobes, self.index[these], self.share[these], layers,
-                     self.last[these])  # fmt: skip
+        diffuse = None if self.diffuse is None else self.diffuse[these]
+        return _Rays(self.row[these], (self.weights[0][these], self.weights[1][these]), diffuse, self.index[these],
+                     self.share[these], layers, self.last[these])  # fmt: skip
 
     def met(self, ends: Sequence[Ends]) -> Array:
         """[N] uint32 slot that each ray meets, or MISS, where wall k ends as ends[k] says."""
@@ -75,18 +84,17 @@ class WallMatrix:
     ):  # fmt: skip
         self.pixels = cache.pixels[rows]
         self.shape = (height, 2 * height)
-        flat = materials.roughness.reshape(-1)[self.pixels]
-        self._albedo = materials.albedo.reshape(-1, 3)[self.pixels].astype(np.float32)
-        self._metallic = materials.metallic.reshape(-1, 1)[self.pixels].astype(np.float32)
+        rough, metallic, albedo = (m[self.pixels] for m in flat(materials))
+        self._albedo = torch.from_numpy(albedo.astype(np.float32))
         self._light = torch.from_numpy(np.ascontiguousarray(slot_radiance, np.float32))
         wall = _beyond(cache.mesh, cache.camera, [k for _, k in walls])
         basis = [axes(normal) for normal, _ in walls]
         each_texel = per_texel(SPHERE_SAMPLES, height)
-        traced = rays(cache, rows, flat, self.shape, each_texel, SPECULAR_SAMPLES)
+        traced = rays(cache, rows, rough, metallic, self.shape, each_texel, SPECULAR_SAMPLES)
         every = [_followed(cache, some, wall, basis, self.shape) for some in traced]
         size = height * 2 * height
         self._fixed = (
-            torch.zeros(3, len(rows), size), torch.zeros(3, len(rows), 3), torch.zeros(size)
+            torch.zeros(2, len(rows), size), torch.zeros(2, len(rows), 3), torch.zeros(size)
         )  # fmt: skip
         self._open = []
         faced = torch.zeros(size)
@@ -94,37 +102,36 @@ class WallMatrix:
             through = np.logical_or.reduce([w >= 0 for w, *_ in each.layers]) if each.layers else each.last < 0
             self._add(self._fixed, each.picked(~through), ())
             self._open.append(each.picked(through))
-            if 0 in each.lobes:
-                add_footprints(faced, each.index, each.share, each.weights[0], np.zeros_like(each.row))
+            if each.diffuse is not None:
+                add_to_map(faced, each.index, each.share, each.diffuse)
         self._faced = faced
 
     def ended(self, ends: Sequence[Ends]) -> tuple[LightMatrix, torch.Tensor]:
-        """The matrix, and [3, Q, 3] what arrives by way of other surfaces, where wall k ends as ends[k] says."""
+        """The matrix, and [2, Q, 3] what arrives by way of other surfaces, where wall k ends as ends[k] says."""
         totals = tuple(t.clone() for t in self._fixed)
         for each in self._open:
             self._add(totals, each, ends)
-        lobes, indirect, free = totals
-        nothing = torch.zeros((2, 0), dtype=torch.int64), torch.zeros((0, 3))
+        parts, indirect, free = totals
+        nothing = torch.zeros((2, 0), dtype=torch.int64), torch.zeros((0, 2))
         matrix = LightMatrix(
-            torch.from_numpy(self.pixels.astype(np.int64)), self.shape, lobes, *nothing,
-            torch.from_numpy(self._albedo), torch.from_numpy(self._metallic),
-            torch.where(self._faced > 0, free / self._faced.clamp_min(1e-12), 1.0),
+            torch.from_numpy(self.pixels.astype(np.int64)), self.shape, parts, *nothing, self._albedo,
+            openness(free, self._faced),
         )  # fmt: skip
         return matrix, indirect
 
     def _add(self, totals: tuple[torch.Tensor, ...], each: _Rays, ends: Sequence[Ends]) -> None:
-        """What rays bring, added to the lobes, the light by way of surfaces, and what is open."""
-        lobes, indirect, free = totals
+        """What rays bring, added to both parts, the light by way of surfaces, and what is open."""
+        parts, indirect, free = totals
         slot = each.met(ends)
         missed = slot == MISS
         light = self._light[torch.from_numpy(slot[~missed].astype(np.int64))]
         row = torch.from_numpy(each.row[~missed])
-        for lobe, weight in zip(each.lobes, each.weights, strict=True):
-            add_footprints(lobes[lobe], each.index[missed], each.share[missed], weight[missed], each.row[missed])
-            indirect[lobe].index_add_(0, row, light * torch.from_numpy(weight[~missed])[:, None])
-        if 0 in each.lobes:
-            zero = np.zeros_like(each.row[missed])
-            add_footprints(free, each.index[missed], each.share[missed], each.weights[0][missed], zero)
+        index, share = each.index[missed], each.share[missed]
+        for part, by_surfaces, weight in zip(parts, indirect, each.weights, strict=True):
+            add_footprints(part, index, share, weight[missed], each.row[missed])
+            by_surfaces.index_add_(0, row, light * torch.from_numpy(weight[~missed])[:, None])
+        if each.diffuse is not None:
+            add_to_map(free, index, share, each.diffuse[missed])
 
 
 def _followed(
@@ -156,8 +163,9 @@ def _followed(
         active = hit & (here > 0)
         ray = mi.Ray3f(end + ray.d * (1e-4 * (1 + dr.max(dr.abs(end)))), ray.d)
     index, share = bilinear(direction, shape)
-    weights = tuple(np.array(w) for w in some.weights)
-    return _Rays(some.row, weights, some.lobes, index, share.astype(np.float32), tuple(layers), last)
+    return _Rays(
+        some.row, some.weights, some.diffuse, index, share.astype(np.float32), tuple(layers), last
+    )  # fmt: skip
 
 
 def _beyond(mesh: Mesh, camera: Camera, planes: list[int]) -> Array:

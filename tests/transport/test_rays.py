@@ -1,0 +1,98 @@
+"""Rays of the light matrix: their two kinds together estimate each lobe, with little noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from transport_scenes import furnished_room, windowed_sky
+
+from materialist.transport.cache import TransportCache
+from materialist.transport.light import light_matrix
+from materialist.transport.rays import rays
+
+HEIGHT = 16
+
+
+@pytest.fixture(scope="module")
+def scene():
+    camera, geometry, materials = furnished_room(48)
+    cache = TransportCache(geometry, camera, diffuse_samples=4, specular_samples=4)
+    return cache, materials, np.arange(3, len(cache.pixels), 7)
+
+
+def lit(scene, metallic=None, roughness=None, **samples):
+    cache, materials, rows = scene
+    given = {"metallic": metallic, "roughness": roughness}
+    other = {k: np.full_like(materials.metallic, v) for k, v in given.items() if v is not None}
+    matrix = light_matrix(cache, replace(materials, **other), rows, HEIGHT, **samples)
+    return matrix.combine(matrix.direct(torch.from_numpy(windowed_sky(HEIGHT)).reshape(-1, 3)))
+
+
+def error(found, true):
+    return float((found - true).norm() / true.norm())
+
+
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+def test_few_rays_are_near_many(scene, metallic):
+    many = lit(scene, metallic, sphere_samples=16384, specular_samples=4096)
+    assert error(lit(scene, metallic), many) < 0.015
+
+
+@pytest.mark.parametrize("roughness", [0.25, 0.4, 0.9])
+def test_either_kind_alone_estimates_metals(scene, roughness):
+    """Balanced, the shares of the kinds do not matter to the mean."""
+    texels = lit(scene, 1.0, roughness, sphere_samples=32768, specular_samples=1)
+    normals = lit(scene, 1.0, roughness, sphere_samples=512, specular_samples=4096)
+    assert error(texels, normals) < 0.02
+    assert float(texels.mean() / normals.mean()) == pytest.approx(1, abs=0.005)
+
+
+def test_a_diffuse_surface_sends_out_what_a_white_sky_sends(scene):
+    """Weights of the diffuse lobe against f_d cos / pi over the hemisphere, by brute force."""
+    cache, _, rows = scene
+    rough = np.full(len(rows), 0.5, np.float32)
+    total = np.zeros(len(rows))
+    for some in rays(cache, rows, rough, 0 * rough, (32, 64), 1, 8):
+        if some.diffuse is not None:
+            np.add.at(total, some.row, some.diffuse)
+    wo = np.array(cache.wo).T[rows].astype(np.float64)
+    z = (np.arange(200) + 0.5) / 200
+    phi = (np.arange(200) + 0.5) / 200 * 2 * np.pi
+    wi = np.stack(
+        np.broadcast_arrays(
+            np.sqrt(1 - z[:, None] ** 2) * np.cos(phi), np.sqrt(1 - z[:, None] ** 2) * np.sin(phi), z[:, None]
+        ),
+        -1,
+    ).reshape(-1, 3)  # uniform in solid angle
+    for k in range(0, len(rows), 40):
+        h = wi + wo[k]
+        cos_d = (wi * h).sum(-1) / np.linalg.norm(h, axis=-1)
+        grazing = 0.5 + 2 * 0.5 * cos_d**2 - 1
+        fd = (1 + grazing * (1 - wi[:, 2]) ** 5) * (1 + grazing * (1 - wo[k, 2]) ** 5)
+        assert total[k] == pytest.approx(2 * (fd * wi[:, 2]).mean(), rel=0.01)
+
+
+def test_every_row_has_its_rays_whatever_part_it_falls_into(scene, monkeypatch):
+    whole = lit(scene)
+    monkeypatch.setattr("materialist.transport.rays.LANES", 5000)
+    parts = lit(scene)
+    assert error(parts, whole) < 0.01  # `TILE` pixels share points; a part has its own numbering of none
+    torch.testing.assert_close(parts, whole, rtol=1e-3, atol=1e-4)
+
+
+def test_a_low_light_of_one_texel_reaches_all_pixels_that_see_it(scene):
+    """What cosine-weighted rays do not: of 256, one in four pixels sends one to a light 8 degrees high."""
+    cache, materials, rows = scene
+    envmap = np.zeros((HEIGHT, 2 * HEIGHT, 3), np.float32)
+    envmap[HEIGHT // 2 - 1] = 1
+    matrix = light_matrix(cache, replace(materials, metallic=0 * materials.metallic), rows, HEIGHT)
+    many = light_matrix(
+        cache, replace(materials, metallic=0 * materials.metallic), rows, HEIGHT, sphere_samples=32768
+    )  # fmt: skip
+    for column in range(0, 2 * HEIGHT, 5):
+        light = torch.zeros(HEIGHT, 2 * HEIGHT, 3)
+        light[HEIGHT // 2 - 1, column] = 100
+        found, true = (m.combine(m.direct(light.reshape(-1, 3))) for m in (matrix, many))
+        if float(true.mean()) > 1e-3:
+            assert error(found, true) < 0.25
