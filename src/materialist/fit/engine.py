@@ -93,7 +93,7 @@ class TransportEngine:
         self.camera, self.seed = camera, seed
         self.light_height, self.light_pixels = light_height, light_pixels
         self.radiance = radiance
-        self._last: tuple[tuple[Materials, Array, int], LightProblem] | None = None
+        self._last: tuple[Materials, Array, LightProblem] | None = None
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
@@ -104,10 +104,13 @@ class TransportEngine:
 
     def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
         # The same question is asked twice in a row: how far to trust the prior, and then what light it wants.
-        asked = (materials, self.radiance, height or self.light_height)
-        if self._last is None or any(a is not b for a, b in zip(self._last[0], asked, strict=True)):
-            self._last = (asked, self._light_problem(materials, asked[2]))
-        return self._last[1]
+        height = height or self.light_height
+        last = self._last
+        if last and last[0] is materials and last[1] is self.radiance and last[2].height == height:
+            return last[2]
+        problem = self._light_problem(materials, height)
+        self._last = (materials, self.radiance, problem)
+        return problem
 
     def _light_problem(self, materials: Materials, height: int) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)

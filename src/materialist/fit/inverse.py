@@ -84,9 +84,12 @@ class Fit:
     def lit(self) -> FitState:
         """The first light, and how far the prior is trusted: where `run` begins."""
         state = self._unlit()
+        start = None
         if self.settings.trust is not None:
-            state.stages.append({**self._explained, "prior_trust": self._trust()})
-        self._trusting()._light(state)
+            stage, light = self._explained
+            state.stages.append({**stage, "prior_trust": self._trust()})
+            start = light if self._fine() else None  # a sun is far from where a light begins
+        self._trusting()._light(state, start=start)
         return state
 
     def _unlit(self) -> FitState:
@@ -104,9 +107,7 @@ class Fit:
         if settings.trust is None:
             return self
         scale = self._trust()
-        light = settings.light
-        if (fine := settings.fine_light) is not None and self._explained["rows"] == fine.height:
-            light = fine
+        light = self._fine() or settings.light
         slack = None if light.slack is None else light.slack * scale
         light = replace(light, slack=slack, chroma=light.chroma / scale)
         materials = replace(settings.materials, delta=settings.materials.delta * scale)
@@ -114,18 +115,24 @@ class Fit:
 
     def prior_error(self) -> float:
         """Mean absolute error (encoded) that the best light leaves with the prior's materials as they are."""
-        return self._explained["prior_error"]
+        return self._explained[0]["prior_error"]
 
     @cached_property
-    def _explained(self) -> dict:
-        """The stage in which that light is fitted; `rows` of its map, more of them where the prior is trusted."""
+    def _explained(self) -> tuple[dict, Array]:
+        """The stage in which that light is fitted, and the light [h, 2h, 3]; more rows where the prior is trusted."""
         found, light = self._strict(self.settings.light)
         fine = self.settings.finer(found["prior_error"])
         if fine is None:
-            return found
-        finer, _ = self._strict(fine, light, steps=FINE_STEPS)
-        seconds = round(found["seconds"] + finer["seconds"], 3)
-        return {**min(found, finer, key=lambda stage: stage["prior_error"]), "seconds": seconds}
+            return found, light
+        finer, sharper = self._strict(fine, light, steps=FINE_STEPS)
+        better = finer["prior_error"] < found["prior_error"]
+        stage = {**(finer if better else found), "seconds": round(found["seconds"] + finer["seconds"], 3)}
+        return stage, sharper if better else light
+
+    def _fine(self) -> LightSettings | None:
+        """The settings of the finer light, where that explained the photo better."""
+        fine = self.settings.fine_light
+        return fine if fine and self._explained[0]["rows"] == fine.height else None
 
     def _strict(
         self, settings: LightSettings, start: Array | None = None, *, steps: int = STRICT_STEPS
@@ -156,12 +163,15 @@ class Fit:
 
     # -- stages --------------------------------------------------------------------------------------------------------
 
-    def _light(self, state: FitState, round_: int = 0) -> None:
-        """Fit the light with the materials of the prior: the light must not explain what later stages have baked in."""
+    def _light(self, state: FitState, round_: int = 0, start: Array | None = None) -> None:
+        """Fit the light with the materials of the prior: the light must not explain what later stages have baked in.
+
+        `start`: [h, 2h, 3] where the first round begins.
+        """
         settings = self.settings.light
         given = self.prior if round_ == 0 else self._slack_base(state)
         problem = self.engine.light_problem(given, self._grid(settings.height))
-        light = self._field(settings, state.envmap if round_ > 0 else None)
+        light = self._field(settings, state.envmap if round_ > 0 else start)
         steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
         slack = slack_albedo(problem, settings)
         result = fit_light(
