@@ -80,7 +80,8 @@ def test_stages_lower_their_losses(fitted):
         # Later rounds start where the earlier ones ended: there, a restarted Adam may be off by a trifle.
         assert stage["loss_last"] <= 1.03 * stage["loss_first"]
     first = {s["name"]: s for s in reversed(state.stages)}
-    assert first["light"]["loss_last"] < 0.7 * first["light"]["loss_first"]
+    # On the finer map the first light goes on from the one that the prior was judged by.
+    assert first["light"]["loss_last"] < 0.7 * first.get("trust", first["light"])["loss_first"]
 
 
 def test_light_is_recovered(room, fitted):
@@ -113,13 +114,20 @@ def test_the_light_is_finer_where_the_prior_explains_the_photo(room):
     coarse, fine = DEFAULT.light.height, DEFAULT.light.fine
     for prior, rows in ((room.truth, fine), (replace(room.truth, albedo=1 - room.truth.albedo), coarse)):
         fit = room.fit(DEFAULT, prior=prior)
-        stage = fit._explained
-        assert stage["rows"] == rows == fit._trusting().settings.light.height
+        stage, light = fit._explained
+        assert stage["rows"] == rows == len(light) == fit._trusting().settings.light.height
         assert stage["prior_error"] <= fit._strict(DEFAULT.light)[0]["prior_error"]
-    assert (
-        room.fit(replace(DEFAULT, light=replace(DEFAULT.light, fine=None)), prior=room.truth)._explained["rows"]
-        == coarse
-    )
+    never = room.fit(replace(DEFAULT, light=replace(DEFAULT.light, fine=None)), prior=room.truth)
+    assert never._explained[0]["rows"] == coarse
+
+
+def test_the_finer_light_goes_on_from_the_one_that_judged_the_prior(room):
+    fit = room.fit(DEFAULT, prior=room.truth)
+    state = fit.lit()
+    judged, first = (stage for stage in state.stages if stage["name"] in ("trust", "light"))
+    assert judged["rows"] == DEFAULT.light.fine
+    begun = room.fit(replace(DEFAULT, light=replace(DEFAULT.light, fine=None)), prior=room.truth).lit().stages[-1]
+    assert first["loss_first"] < 0.5 * begun["loss_first"]
 
 
 def test_the_engine_resolves_as_many_rows_as_are_asked_for(room):

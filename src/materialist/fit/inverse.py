@@ -28,6 +28,8 @@ STRICT_STEPS = 120
 """Steps of the light fit that measures how far the prior can be trusted."""
 FINE_STEPS = 60
 """The same on the finer map, from the coarse light on."""
+NEARER = 0.4
+"""Learning rate of a light fit that begins with a light, relative to that of one that begins with none."""
 WHITE = 0.99
 """Linear value from which a channel of a photo that is not HDR is taken for clipped."""
 
@@ -126,7 +128,8 @@ class Fit:
             return found, light
         finer, sharper = self._strict(fine, light, steps=FINE_STEPS)
         better = finer["prior_error"] < found["prior_error"]
-        stage = {**(finer if better else found), "seconds": round(found["seconds"] + finer["seconds"], 3)}
+        both = {name: found[name] + finer[name] for name in ("steps", "seconds", "loss_curve")}
+        stage = {**(finer if better else found), **both, "loss_first": found["loss_first"]}
         return stage, sharper if better else light
 
     def _fine(self) -> LightSettings | None:
@@ -172,6 +175,9 @@ class Fit:
         given = self.prior if round_ == 0 else self._slack_base(state)
         problem = self.engine.light_problem(given, self._grid(settings.height))
         light = self._field(settings, state.envmap if round_ > 0 else start)
+        if start is not None:  # Adam's first steps have the full length, however near the light is
+            schedule = settings.schedule
+            settings = replace(settings, schedule=replace(schedule, learning_rate=NEARER * schedule.learning_rate))
         steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
         slack = slack_albedo(problem, settings)
         result = fit_light(
