@@ -63,7 +63,7 @@ def test_without_a_sign_in_the_light_no_side_moves(maps):
     """The sun is behind the camera. The shadows above gain 0.004; a side that gains a tenth of that stays."""
     wall, picture = maps[2], pictured(maps, {"left": 0.5, "right": 0.5, "up": 0.5}, (0.2, 0.5, 0.9))
     assert searched(*picture, DEFAULT, [wall]) is None
-    search = Search(*picture, DEFAULT.light, [wall])
+    search = Search(*picture, DEFAULT.light, [wall], 16)
     usual = search.error((wall.usual,))
     even = [search.error((_at(wall, dict.fromkeys(SIDES, level)),)) for level in (0.25, 0.5, 1.0)]
     assert max(even) < 1.25 * usual

@@ -90,13 +90,13 @@ def searched(
 ) -> Found | None:  # fmt: skip
     """The ends that explain a photo [H * W, 3] best; where the prior is trusted, the finer map decides between them."""
     usual = tuple(wall.usual for wall in walls)
-    coarse = Search(engine, materials, photo, settings.light, walls, seed)
+    coarse = Search(engine, materials, photo, settings.light, walls, engine.light_height, seed)
     best = coarse.best(usual)
     fine = settings.finer(coarse.error(best))
     if fine is None:
         return coarse.compared([best], usual)
     tried = sorted(coarse.tried, key=coarse.error)[:RUNOFF]
-    return Search(engine, materials, photo, fine, walls, seed).compared([best, *tried], usual)
+    return Search(engine, materials, photo, fine, walls, fine.height, seed).compared([best, *tried], usual)
 
 
 @dataclass
@@ -110,6 +110,8 @@ class Search:
     """[H * W, 3] linear."""
     settings: LightSettings
     walls: Sequence[Wall]
+    height: int
+    """Rows of the light's map."""
     seed: int = 0
     tried: dict[tuple[Ends, ...], float] = field(default_factory=dict)
 
@@ -120,7 +122,7 @@ class Search:
         rows = np.sort(rng.permutation(len(engine.cache.pixels))[:count])
         planes = [(np.array(wall.usual.normal), wall.index) for wall in self.walls]
         slots = engine.cache.slot_radiance(engine.radiance)
-        self._matrix = WallMatrix(engine.cache, self.materials, rows, self.settings.height, planes, slots)
+        self._matrix = WallMatrix(engine.cache, self.materials, rows, self.height, planes, slots)
         self._light: torch.Tensor | None = None
 
     def error(self, ends: tuple[Ends, ...]) -> float:
