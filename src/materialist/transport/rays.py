@@ -32,7 +32,7 @@ from materialist.types import Array
 
 R2 = (3242174889, 2447445414)
 """Generators of the R2 sequence (Roberts 2018), which spreads the places of rays in their texels, times 2^32."""
-LANES = 1 << 22
+LANES = 1 << 20
 """Rays that are followed at once."""
 
 
