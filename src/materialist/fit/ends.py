@@ -144,7 +144,7 @@ class Search:
         self._light = None
         self.error(usual)
         first = self._light
-        errors = {ends: self._afresh(ends, first) for ends in (usual, *found)}
+        errors = {ends: self._afresh(ends, first) for ends in dict.fromkeys((usual, *found))}
         best = min(errors, key=errors.__getitem__)
         error, before = errors[best], errors[usual]
         return Found(best, error, before) if _clearly(error, before) else None

@@ -20,6 +20,7 @@ from materialist.render.buffers import floats, integers
 from materialist.transport.cache import TransportCache, spawn
 from materialist.transport.sampling import (
     MIN_ALPHA,
+    R2,
     diffuse_polynomial,
     ggx,
     lifted,
@@ -30,8 +31,8 @@ from materialist.transport.sampling import (
 )
 from materialist.types import Array
 
-R2 = (3242174889, 2447445414)
-"""Generators of the R2 sequence (Roberts 2018), which spreads the places of rays in their texels, times 2^32."""
+STEPS = tuple(round(g * 2**32) for g in R2)
+"""The R2 sequence spreads the places of rays in their texels; its generators as fractions of 2^32."""
 LANES = 1 << 20
 """Rays that are followed at once."""
 
@@ -115,7 +116,7 @@ class _Lobes:
         texel, part = number // self.per_texel, number % self.per_texel
         height, width = self.shape
         shift = self._take(self.cache.shift, row)
-        u, v = (_fraction(number * step) + s for step, s in zip(R2, (shift.x, shift.y), strict=True))
+        u, v = (_fraction(number * step) + s for step, s in zip(STEPS, (shift.x, shift.y), strict=True))
         u, v = u - dr.floor(u), (mi.Float(part) + v - dr.floor(v)) / self.per_texel
         above, below = (dr.cos(mi.Float(texel // width + k) * (dr.pi / height)) for k in (0, 1))
         y = dr.lerp(above, below, u)

@@ -18,7 +18,7 @@ MIN_ALPHA = 1e-3
 """Lower clamp of alpha = roughness**2, shared with the path tracer's BSDF."""
 
 # Generators of the R2 sequence (Roberts 2018): 1/g, 1/g^2 with g the plastic number.
-_R2 = (0.7548776662466927, 0.5698402909980532)
+R2 = (0.7548776662466927, 0.5698402909980532)
 
 
 AGREEING = 0.7
@@ -32,7 +32,7 @@ def pixel_shift(height: int, width: int, seed: int) -> Array:
     rows, cols = np.indices((height, width))
     order = rank[rows % TILE, cols % TILE].astype(np.float64)
     base = np.random.default_rng(seed + 1).random(2)
-    return np.stack([(base[k] + order * _R2[k]) % 1.0 for k in (0, 1)], -1).astype(np.float32)
+    return np.stack([(base[k] + order * R2[k]) % 1.0 for k in (0, 1)], -1).astype(np.float32)
 
 
 def point(index, count, shift):
