@@ -18,7 +18,7 @@ import numpy as np
 from materialist.render.aim import Aim
 from materialist.render.buffers import integers
 from materialist.render.share import Share
-from materialist.transport.sampling import point
+from materialist.transport.sampling import R2, point
 from materialist.types import Array, Camera
 
 SPLIT = 2
@@ -27,9 +27,6 @@ ALL = 0xFFFFFFFF
 """Component of a BSDF context: every lobe."""
 DEEPEST = 6
 """The largest path length that is traced this way: bounces are unrolled."""
-
-# Generators of a Kronecker sequence in the plane (Roberts 2018).
-_R2 = (0.7548776662466927, 0.5698402909980532)
 
 
 def trace(
@@ -172,7 +169,7 @@ def _camera_ray(seen):
 
 
 def _kronecker(index, start):
-    u, v = start.x + mi.Float(index) * _R2[0], start.y + mi.Float(index) * _R2[1]
+    u, v = start.x + mi.Float(index) * R2[0], start.y + mi.Float(index) * R2[1]
     return mi.Point2f(u - dr.floor(u), v - dr.floor(v))
 
 
