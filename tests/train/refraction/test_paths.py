@@ -41,6 +41,16 @@ def test_chords_of_a_ball():
     np.testing.assert_allclose(leaving, normal * [1, 1, -1], atol=1e-2)
 
 
+def test_rays_that_miss_have_no_place():
+    tracer = Tracer(ball())
+    x = np.linspace(-2, 2, 4001)  # most miss
+    for _ in range(3):
+        distance, face, uv = tracer._nearest(*straight(x))
+        missed = np.isinf(distance)
+        assert 2990 < missed.sum() < 3010
+        assert not face[missed].any() and not uv[missed].any() and face[~missed].any()
+
+
 def test_lengths_are_in_units_of_the_direction():
     origin, direction = straight([0.2])
     tracer = Tracer(ball())

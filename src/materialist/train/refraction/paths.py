@@ -95,10 +95,13 @@ class Tracer:
         return a * (1 - uv[:, :1] - uv[:, 1:]) + b * uv[:, :1] + c * uv[:, 1:]
 
     def _nearest(self, origin: Array, direction: Array) -> tuple[Array, Array, Array]:
-        """Distance [n] (inf for none), face [n] and place in it [n, 2] of the nearest surface of every ray."""
+        """Distance [n] (inf for none), face [n] and place in it [n, 2] (0 for none) of every ray's nearest surface."""
+        import drjit as dr
+
         mi = self._mi
         start, way = (mi.Vector3f(*(floats(mi, c) for c in x.T)) for x in (origin, direction))
         ray = mi.Ray3f(mi.Point3f(start), way)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False)
-        t = np.array(found.t, np.float64)
-        return t, np.array(found.prim_index), np.array(found.prim_uv, np.float64).T
+        hit = found.is_valid()  # where nothing is hit, Mitsuba leaves face and place unwritten
+        face, uv = dr.select(hit, found.prim_index, 0), dr.select(hit, found.prim_uv, 0)
+        return np.array(found.t, np.float64), np.array(face), np.array(uv, np.float64).T
