@@ -1,68 +1,52 @@
 """Regular patterns on planes: chequers, tiles, boards and stripes repeat, and go on behind what hides them.
 
-A plane is looked at straight on, and compared with itself after every shift at once (masked correlation by Fourier
-transforms, Padfield 2012). Shifts under which it looks like itself say what a hidden place shows (the statistics of
-offsets of He and Sun 2012, with the perspective taken out).
+Shifts under which a plane looks like itself (`edit.periods`) say what a hidden place shows (the statistics of offsets
+of He and Sun 2012, with the perspective taken out), where they foretell what is known of it.
 """
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 
 from materialist.camera import pixel_rays, project
+from materialist.edit.periods import FEATURED, KNOWN, Surface, periods
 from materialist.types import Array, Camera
 
-KNOWN, HIDDEN = 200, 16
-"""Fewest pixels that must be known, and hidden, of a plane; smaller holes need no pattern."""
-CELLS = 160
-"""Cells along the longer side of a plane looked at straight on."""
-AROUND = 2.5
-"""Surroundings of the hole that are looked at, in units of its extent on the plane."""
-LEAST_OVERLAP = 0.12
-"""Part of the plane's known cells, by their weight, that must have a partner after a shift."""
-ALIKE = 0.22
-"""Largest difference of a plane from its shifted self, relative to that of unlike pictures (1), that counts."""
-WORSE = 0.06
-"""Shifts this much worse than the best one are left out."""
-FEATURED = 0.012
-"""Least standard deviation (sRGB) of a plane's detail: a plain one has nothing that could be said to repeat."""
-ENOUGH = 0.6
+HIDDEN = 16
+"""Fewest pixels that must be hidden of a plane; smaller holes need no pattern."""
+ENOUGH = 0.4
 """Part of what is hidden of a plane that its pattern must tell: a few alike places are no pattern."""
-SKILL, TESTED = 0.65, 600
-"""Largest error with which a pattern may tell what is known, relative to that of the plane's median colour, and how
-many pixels are asked."""
-HALF = 0.5
-"""Least share of those that it must tell."""
+SKILL, TOGETHER = 0.5, 0.65
+"""Largest error with which one shift, and many together, may tell what is known, relative to that of one colour."""
+TESTED, FEWEST = 2000, 30
+"""How many pixels are asked at most, and how many of them must be told."""
+MANY, LISTED = 8, 200
+"""Shifts from which on they are many, and that are looked at."""
+APART = 3
+"""Cells between shifts that are not the same."""
+NEAR = 0.25
+"""How far from what is hidden the pattern is asked once more, in units of its size: there it must go on."""
 REPEATS = 16
 """Repeats of a hidden place that are looked at, the best ones."""
 BORDER = 2
 """Pixels next to the end of a plane that are not copied: they show what is beside it, too."""
 USUAL = 0.06
 """Differences (sRGB) of what several shifts say up to which they say the same."""
-SHADING = 0.35
-"""Waves longer than this part of the window are light, not pattern."""
+
+Places = tuple[Array, Array]
+"""Rows [P] and columns [P] of pixels."""
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A plane, continued behind a hole."""
-
-    point: Array
-    """[H, W, 3] camera frame."""
-    known: Array
-    """[H, W] bool: what the picture shows of it."""
-    hidden: Array
-    """[H, W] bool: where the hole hides it."""
-
-
-def regular_sources(features: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera) -> Array:
+def regular_sources(
+    paint: Array, shown: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera
+) -> Array:
     """Where the patterns of planes say that each pixel of a hole takes its value from.
 
     Args:
-        features: [H, W, F] what is compared, such as sRGB; not read in the hole.
+        paint: [H, W, 3] sRGB albedo: what repeats, whatever light falls on it. shown: [H, W, F], such as sRGB: of the
+            repeats of a place the one that shows about what most do is taken. Neither is read in the hole.
         hole: [H, W] bool. source: [H, W] bool: what may be copied.
         label: [H, W] int: the plane of a pixel, < 0 for none. depth: [H, W] planar. Both known in the hole too.
 
@@ -77,7 +61,7 @@ def regular_sources(features: Array, hole: Array, source: Array, label: Array, d
         own = (label == k) & (depth > 0)
         plane = Surface(points, _within(own) & source & ~hole, own & hole)
         if plane.known.sum() >= KNOWN and plane.hidden.sum() >= HIDDEN:
-            found = np.where(found < 0, _on_plane(features, plane, camera), found)
+            found = np.where(found < 0, _on_plane(paint, shown, plane, camera), found)
     return found
 
 
@@ -88,57 +72,116 @@ def _within(mask: Array) -> Array:
     return cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), iterations=BORDER, borderValue=1) > 0
 
 
-def _on_plane(features: Array, plane: Surface, camera: Camera) -> Array:
+def _on_plane(paint: Array, shown: Array, plane: Surface, camera: Camera) -> Array:
     """[H, W] sources of the hidden pixels of one plane, -1 for none."""
-    frame = _Frame(plane)
-    window, seen, sharp = frame.straight(features, plane.known, camera)
-    detail, found = _detail(window, seen), np.full(plane.known.shape, -1)
-    if seen.sum() < KNOWN or np.sqrt((detail**2)[seen].mean()) < FEATURED:
-        return found
-    shifts = _shifts(detail, sharp) * frame.cell @ frame.axes
-    if not len(shifts) or _foretold(features, plane, shifts, camera) > SKILL:
+    found = np.full(plane.known.shape, -1)
+    shifts = _proven(paint, plane, *periods(paint, plane, camera), camera)
+    if not len(shifts):
         return found
     rows, columns = np.nonzero(plane.hidden)
-    told = _repeated(features, plane, (rows, columns), shifts, camera)
-    if (told >= 0).mean() <= ENOUGH:
-        return found
-    found[rows, columns] = told
+    told = _repeated(shown, plane, (rows, columns), shifts, camera)
+    beside = _some(_around(plane.hidden) & plane.known)
+    asked = len(beside[0]) >= FEWEST
+    if (told >= 0).mean() > ENOUGH and (not asked or _missed(paint, plane, beside, shifts, camera) <= TOGETHER):
+        found[rows, columns] = told
     return found
 
 
-def _foretold(features: Array, plane: Surface, shifts: Array, camera: Camera) -> float:
-    """What the pattern says wrongly of places that are known, relative to the plane's median colour."""
-    rows, columns = np.nonzero(plane.known)
+def _some(mask: Array) -> Places:
+    """At most TESTED pixels of a mask [H, W] bool."""
+    rows, columns = np.nonzero(mask)
     part = np.random.default_rng(0).permutation(len(rows))[:TESTED]
-    at = rows[part], columns[part]
-    source = _repeated(features, plane, at, shifts, camera)
-    told = source >= 0
-    if told.mean() < HALF:
+    return rows[part], columns[part]
+
+
+def _around(hidden: Array) -> Array:
+    """What is near to a mask [H, W] bool, itself included."""
+    import cv2
+
+    wide = 2 * int(np.ceil(NEAR * np.sqrt(hidden.sum()))) + 1
+    return cv2.dilate(hidden.astype(np.uint8), np.ones((wide, wide), np.uint8)) > 0
+
+
+def _proven(paint: Array, plane: Surface, shifts: Array, cell: Array, camera: Camera) -> Array:
+    """[K, 3] those of shifts, or sums of them, that foretell what is known of the plane; cell: [2, 3] steps on it.
+
+    Many shifts prove each other together. Of few, each one has to do so alone, and backwards: some spots may look alike
+    by accident. What repeats after two shifts repeats after both, also where too little is seen to compare.
+    """
+    at = _some(plane.known)
+    if len(shifts) >= MANY:
+        shifts = shifts[:LISTED]
+        return shifts if _missed(paint, plane, at, shifts, camera) <= TOGETHER else np.zeros((0, 3))
+    found = [_refined(paint, plane, at, shift, cell, camera) for shift in shifts]
+
+    def true(shift: Array, unknown: bool = False) -> bool:
+        off = [_missed(paint, plane, at, way[None], camera) for way in (shift, -shift)]
+        return max((e for e in off if np.isfinite(e)), default=0.0 if unknown else np.inf) <= SKILL
+
+    found = [shift for shift in found if true(shift)]
+    steps, apart = np.array(found).reshape(-1, 3), APART * np.linalg.norm(cell[0])
+    for both in (steps[:, None] + steps[None]).reshape(-1, 3):
+        if np.linalg.norm([both, *(both - found)], axis=1).min() > apart and true(both, unknown=True):
+            found.append(both)
+    return np.array(found).reshape(-1, 3)
+
+
+def _refined(paint: Array, plane: Surface, at: Places, shift: Array, cell: Array, camera: Camera) -> Array:
+    """[3] the shift moved by at most a cell along both axes to where it foretells pixels `at` best."""
+    from scipy.optimize import minimize
+
+    how = {"initial_simplex": np.array([[0, 0], [1, 0], [0, 1.0]]), "xatol": 0.05, "fatol": 1e-3, "maxiter": 40}
+    moved = minimize(
+        lambda x: _missed(paint, plane, at, (shift + x @ cell)[None], camera), np.zeros(2), method="Nelder-Mead",
+        options=how,
+    )  # fmt: skip
+    return shift + np.clip(moved.x, -1, 1) @ cell
+
+
+def _missed(paint: Array, plane: Surface, at: Places, shifts: Array, camera: Camera) -> float:
+    """How far what shifts [K, 3] foretell of pixels `at` is from what these show, relative to their median colour.
+
+    They foretell the median of what they lead to. Where one of them leads, all may be brighter by a step: a fitted
+    albedo keeps some of the light. Infinite where too few pixels are told; less than can be seen does not count.
+    """
+    import cv2
+
+    own, values = paint[at], np.ascontiguousarray(paint, np.float32)
+    off = np.full((len(shifts), *own.shape), np.nan)
+    for k, shift in enumerate(shifts):
+        told = _landing(plane, at, shift, camera) >= 0
+        if told.any():
+            x, y = project(plane.point[at][told] + shift, camera)[0].astype(np.float32).T[..., None] - np.float32(0.5)
+            read = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0] - own[told]
+            off[k, told] = read - np.median(read, 0)
+    known = np.isfinite(off[..., 0]).any(0)
+    if known.sum() < FEWEST:
         return np.inf
-    values = features.reshape(-1, features.shape[-1])
-    off = np.abs(values[source[told]] - features[at][told]).mean()
-    plain = np.abs(features[at][told] - np.median(features[plane.known], 0)).mean()
-    return float(off / max(plain, 1e-6))
+    plain = np.abs(own[known] - np.median(own[known], 0)).mean()
+    return float(np.abs(np.nanmedian(off[:, known], 0)).mean() / max(plain, FEATURED))
 
 
-def _repeated(
-    features: Array, plane: Surface, at: tuple[Array, Array], shifts: Array, camera: Camera
-) -> Array:  # fmt: skip
-    """[P] row-major sources of pixels `at` (rows [P], columns [P]) after shifts [K, 3] (best first), -1 for none."""
+def _landing(plane: Surface, at: Places, shift: Array, camera: Camera) -> Array:
+    """[P] row-major pixels where pixels `at` are after a shift [3], -1 where nothing is known."""
     height, width = plane.known.shape
+    place, ahead = project(plane.point[at] + shift, camera)
+    column, row = np.floor(place).astype(int).T
+    good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    row, column = np.where(good, row, 0), np.where(good, column, 0)
+    return np.where(good & plane.known[row, column], row * width + column, -1)
+
+
+def _repeated(shown: Array, plane: Surface, at: Places, shifts: Array, camera: Camera) -> Array:
+    """[P] row-major sources of pixels `at` after shifts [K, 3] (best first), -1 for none."""
     rows, columns = at
     sources, count = np.full((REPEATS, len(rows)), -1), np.zeros(len(rows), int)
     for shift in shifts:
         unsure = np.flatnonzero(count < REPEATS)
-        place, ahead = project(plane.point[rows[unsure], columns[unsure]] + shift, camera)
-        column, row = np.floor(place).astype(int).T
-        good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
-        row, column = np.where(good, row, 0), np.where(good, column, 0)
-        good &= plane.known[row, column]
-        told = unsure[good]
-        sources[count[told], told] = (row * width + column)[good]
+        landing = _landing(plane, (rows[unsure], columns[unsure]), shift, camera)
+        told = unsure[landing >= 0]
+        sources[count[told], told] = landing[landing >= 0]
         count[told] += 1
-    return _usual(features.reshape(-1, features.shape[-1]), sources)
+    return _usual(shown.reshape(-1, shown.shape[-1]), sources)
 
 
 def _usual(values: Array, sources: Array) -> Array:
@@ -153,95 +196,3 @@ def _usual(values: Array, sources: Array) -> Array:
     off = np.where(np.isnan(off), np.inf, np.maximum(off, USUAL))  # alike ones are equally good: the first is taken
     best = off.argmin(0)
     return sources[best, np.arange(sources.shape[1])]
-
-
-class _Frame:
-    """Coordinates on a plane, around what is hidden of it."""
-
-    def __init__(self, plane: Surface):
-        known, hidden = plane.point[plane.known], plane.point[plane.hidden]
-        middle = hidden.mean(0)
-        _, _, axes = np.linalg.svd((known - known.mean(0))[:: max(1, len(known) // 4000)], full_matrices=False)
-        # Level and upright where the plane allows it: patterns mostly run so.
-        normal = axes[2]
-        level = np.cross(normal, [0.0, 1, 0])
-        first = level if np.linalg.norm(level) > 0.2 else axes[0]
-        first = first / np.linalg.norm(first)
-        self.axes = np.stack([first, np.cross(normal, first)])  # [2, 3]
-        own, others = (hidden - middle) @ self.axes.T, (known - middle) @ self.axes.T
-        half = (0.5 + AROUND) * np.quantile(np.abs(own), 0.98, axis=0).max()
-        self.low = np.maximum(others.min(0), -half)
-        self.high = np.minimum(others.max(0), half)
-        self.cell = float((self.high - self.low).max() / CELLS)
-        self.middle = middle
-
-    def straight(self, features: Array, known: Array, camera: Camera) -> tuple[Array, Array, Array]:
-        """The plane [h, w, F] looked at straight on, where it is known [h, w], and there how sharp it is, in [0, 1]."""
-        import cv2
-
-        size = np.maximum(((self.high - self.low) / self.cell).astype(int), 8)
-        u, v = (self.low[k] + (np.arange(size[k]) + 0.5) * self.cell for k in range(2))
-        at = self.middle + u[None, :, None] * self.axes[0] + v[:, None, None] * self.axes[1]
-        place, ahead = project(at, camera)
-        x, y = (np.where(ahead > 0, place[..., k] - 0.5, -9).astype(np.float32) for k in range(2))
-        read = lambda m: cv2.remap(  # noqa: E731
-            np.ascontiguousarray(m, np.float32), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
-        )
-        seen = read(known.astype(np.float32)) > 0.99
-        channels = [read(np.where(known, features[..., k], 0)) for k in range(features.shape[-1])]
-        (y_v, y_u), (x_v, x_u) = np.gradient(y), np.gradient(x)
-        pixels = np.abs(y_v * x_u - y_u * x_v)  # [h, w] of a cell
-        sharp = np.where(seen, np.clip(pixels, 0, 1), 0)
-        return np.where(seen[..., None], np.stack(channels, -1), 0), seen, sharp
-
-
-def _detail(window: Array, seen: Array) -> Array:
-    """[h, w, F] without what changes slowly, 0 where nothing is seen."""
-    from scipy.ndimage import gaussian_filter
-
-    sigma = SHADING * max(seen.shape) / 2
-    weight = gaussian_filter(seen.astype(float), sigma)[..., None]
-    slow = gaussian_filter(window, (sigma, sigma, 0)) / np.maximum(weight, 1e-6)
-    return np.where(seen[..., None], window - slow, 0)
-
-
-def _shifts(detail: Array, weight: Array) -> Array:
-    """[K, 2] shifts (u, v) in cells under which the picture looks like itself, best first; none if it never does.
-
-    weight: [h, w] in [0, 1], 0 where nothing is seen; what is far away is blurred, and unlike itself nearby.
-    """
-    from scipy.ndimage import minimum_filter
-
-    height, width = weight.shape
-    shape = (2 * height, 2 * width)
-    spectrum = lambda a: np.fft.rfft2(a, shape)  # noqa: E731
-    correlate = lambda a, b: np.fft.irfft2(np.conj(a) * b, shape)  # noqa: E731  [s] = sum over p of a[p] b[p + s]
-    there, energy = spectrum(weight), spectrum(weight * (detail**2).sum(-1))
-    both = sum(correlate(s, s) for s in (spectrum(weight * detail[..., k]) for k in range(detail.shape[-1])))
-    total = correlate(energy, there) + correlate(there, energy)
-    overlap = correlate(there, there)
-    enough = overlap > LEAST_OVERLAP * (weight**2).sum()
-    # 0 where the shifted picture is the same, 1 where they have nothing to do with each other.
-    apart = np.where(enough, (total - 2 * both) / np.maximum(total, 1e-9), 2.0)
-    apart = np.fft.fftshift(apart)
-    best = (apart == minimum_filter(apart, 5, mode="wrap")) & (apart < ALIKE)
-    centre = np.array([height, width])
-    found = np.argwhere(best)
-    found = found[np.abs(found - centre).max(1) > 3]  # every picture looks like itself nearly where it is
-    if not len(found):
-        return np.zeros((0, 2))
-    price = apart[found[:, 0], found[:, 1]]
-    found = found[price < price.min() + WORSE]
-    fine = np.stack([_vertex(apart, *place) for place in found]) - centre
-    away = np.linalg.norm(fine, axis=-1) / max(weight.shape)
-    order = np.argsort(apart[found[:, 0], found[:, 1]] + 0.5 * WORSE * away)
-    return fine[order][:, ::-1]
-
-
-def _vertex(values: Array, row: int, column: int) -> Array:
-    """[2] the minimum (row, column) of parabolas through a pixel and its neighbours."""
-    out = np.array([row, column], float)
-    for k, line in enumerate((values[row - 1 : row + 2, column], values[row, column - 1 : column + 2])):
-        if len(line) == 3 and (bend := line[0] - 2 * line[1] + line[2]) > 1e-12 and line.max() < 2:
-            out[k] += np.clip((line[0] - line[2]) / (2 * bend), -0.5, 0.5)
-    return out
