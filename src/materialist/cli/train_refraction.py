@@ -39,6 +39,9 @@ def refraction(
     shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640,
     views: Annotated[int, typer.Option(help="Views of each.")] = 24,
     heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64,
+    init: Annotated[
+        Path | None, typer.Option(help="Weights to begin with, such as those in the package.", show_default=False)
+    ] = None,
     steps: Steps = None,
     minutes: Minutes = None,
     batch: Batch = 32,
@@ -58,13 +61,19 @@ def refraction(
     train, aside = folder / "train", folder / "heldout"
     plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
     if not data_only:
+        from materialist.predict.refraction.weights import load
         from materialist.train import checkpoint
         from materialist.train.budget import Budget
         from materialist.train.refraction.trainer import Recipe, Trainer
 
         budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
         recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
-        checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
+        # Views take long: refuse before they are made.
+        begun = checkpoint.begun(output, Trainer.kind, resume=resume) is not None
+        if init is not None:
+            load(init)
+            if begun:
+                typer.echo(f"--init is where a run begins; that in {output} goes on from its checkpoint.", err=True)
     with StageProgress(quiet=as_json) as progress:
         seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
         if data_only:
@@ -74,6 +83,7 @@ def refraction(
         trainer = Trainer(
             output, train, aside, budget=budget, recipe=recipe, seed=seed, every=every, resume=resume,
             note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
+            init=init,
         )  # fmt: skip
         figures = trainer.run(progress)
     if trainer.interrupted:

@@ -61,6 +61,29 @@ def test_it_learns_resumes_and_leaves_weights(views, tmp_path):
     assert len((run / "scores.jsonl").read_text().splitlines()) == 2
 
 
+def test_a_run_begins_with_given_weights(views, tmp_path):
+    torch.manual_seed(0)
+    first = Trainer(tmp_path / "first", views, None, budget=Budget(steps=3), recipe=RECIPE)
+    first.run()
+    init = tmp_path / "first" / "weights.safetensors"
+    second = Trainer(tmp_path / "second", views, None, budget=Budget(steps=1), recipe=RECIPE, init=init)
+    assert second.clock.step == 0
+    for found, wanted in ((second.network, first.averaged), (second.averaged, first.averaged)):
+        for a, b in zip(found.parameters(), wanted.parameters(), strict=True):
+            torch.testing.assert_close(a.detach(), b.detach(), atol=1e-6, rtol=1e-3)  # stored as float16
+    before = [p.detach().clone() for p in second.network.parameters()]
+    second.run()
+    assert any(not a.equal(b) for a, b in zip(before, second.network.parameters(), strict=True))
+
+
+def test_bad_weights_to_begin_with_are_said_before_views_are_made(tmp_path):
+    (tmp_path / "bad.safetensors").write_bytes(b"nothing")
+    command = ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "1", "--init"]
+    for name in ("bad.safetensors", "missing.safetensors"):
+        assert run_to_exit_code(app, [*command, str(tmp_path / name)]) == 2
+    assert not (tmp_path / "run").exists()
+
+
 def test_the_loss_falls(views):
     torch.manual_seed(1)
     batch = trainer.prepared(trainer.smaller(lessons.load(views), 32), np.arange(6), np.random.default_rng(0))

@@ -56,13 +56,20 @@ class Trainer(small.Run):
     def __init__(
         self, folder: Path, data: Path, heldout: Path | None, *, budget: Budget, recipe: Recipe | None = None,
         seed: int = 0, every: float = 180, resume: bool = False, note: Callable[[str], None] = lambda _: None,
-        device: str = "auto",
+        device: str = "auto", init: Path | None = None,
     ):  # fmt: skip
-        """Start or resume a run. Raises OutputError when FOLDER holds a run and `resume` is off."""
+        """Start or resume a run. `init`: weights that a new one begins with, as the package reads them.
+
+        Raises OutputError when FOLDER holds a run and `resume` is off, WeightsError for weights of another network.
+        """
         self.data = data
         self.kept_aside = None if heldout is None else lessons.load(heldout)
+
+        def network() -> RefractionNet:
+            return RefractionNet() if init is None else weights.load(init)[0].train().requires_grad_(True)
+
         super().__init__(
-            folder, RefractionNet, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note,
+            folder, network, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note,
             device=device,
         )  # fmt: skip
 
