@@ -39,9 +39,7 @@ def refraction(
     shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640,
     views: Annotated[int, typer.Option(help="Views of each.")] = 24,
     heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64,
-    init: Annotated[
-        Path | None, typer.Option(help="Weights to begin with, such as those in the package.", show_default=False)
-    ] = None,
+    init: Annotated[Path | None, typer.Option(help="Weights of an earlier run to begin from.")] = None,
     steps: Steps = None,
     minutes: Minutes = None,
     batch: Batch = 32,
@@ -57,6 +55,10 @@ def refraction(
     from materialist.cli.progress import StageProgress
     from materialist.train.refraction.lessons import Plan, produce
 
+    def note(text: str) -> None:
+        if not as_json:
+            typer.echo(text, err=True)
+
     folder = data or output / "views"
     train, aside = folder / "train", folder / "heldout"
     plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
@@ -68,12 +70,12 @@ def refraction(
 
         budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
         recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
-        # Views take long: refuse before they are made.
-        begun = checkpoint.begun(output, Trainer.kind, resume=resume) is not None
-        if init is not None:
+        checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
+        if init is not None and resume and checkpoint.there(output):
+            note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
+            init = None
+        elif init is not None:
             load(init)
-            if begun:
-                typer.echo(f"--init is where a run begins; that in {output} goes on from its checkpoint.", err=True)
     with StageProgress(quiet=as_json) as progress:
         seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
         if data_only:
@@ -82,8 +84,7 @@ def refraction(
             return
         trainer = Trainer(
             output, train, aside, budget=budget, recipe=recipe, seed=seed, every=every, resume=resume,
-            note=(lambda _: None) if as_json else lambda text: typer.echo(text, err=True), device=device.value,
-            init=init,
+            note=note, device=device.value, init=init,
         )  # fmt: skip
         figures = trainer.run(progress)
     if trainer.interrupted:
