@@ -18,7 +18,7 @@ HIDDEN = 16
 """Fewest pixels that must be hidden of a plane; smaller holes need no pattern."""
 ENOUGH = 0.4
 """Part of what is hidden of a plane that its pattern must tell: a few alike places are no pattern."""
-SKILL, TOGETHER = 0.5, 0.65
+SKILL, TOGETHER = 0.56, 0.65
 """Largest error with which one shift, and many together, may tell what is known, relative to that of one colour."""
 TESTED, FEWEST = 2000, 30
 """How many pixels are asked at most, and how many of them must be told."""
@@ -141,21 +141,22 @@ def _refined(paint: Array, plane: Surface, at: Places, shift: Array, cell: Array
 def _missed(paint: Array, plane: Surface, at: Places, shifts: Array, camera: Camera) -> float:
     """How far what shifts [K, 3] foretell of pixels `at` is from what these show, relative to their median colour.
 
-    They foretell the median of what they lead to. Where one of them leads, all may be brighter by a step: a fitted
-    albedo keeps some of the light. Infinite where too few pixels are told; less than can be seen does not count.
+    They foretell the median of what they lead to. Where one of them leads, all may be brighter by a step and a slope: a
+    fitted albedo keeps some of the light. Infinite where too few pixels are told; less than can be seen does not count.
     """
     import cv2
 
     own, values = paint[at], np.ascontiguousarray(paint, np.float32)
+    line = np.stack([np.ones(len(own)), *(x / max(paint.shape) for x in at)], -1)
     off = np.full((len(shifts), *own.shape), np.nan)
     for k, shift in enumerate(shifts):
         told = _landing(plane, at, shift, camera) >= 0
-        if told.any():
+        if told.sum() >= FEWEST:
             x, y = project(plane.point[at][told] + shift, camera)[0].astype(np.float32).T[..., None] - np.float32(0.5)
             read = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0] - own[told]
-            off[k, told] = read - np.median(read, 0)
+            off[k, told] = read - line[told] @ np.linalg.lstsq(line[told], read, rcond=None)[0]
     known = np.isfinite(off[..., 0]).any(0)
-    if known.sum() < FEWEST:
+    if not known.any():
         return np.inf
     plain = np.abs(own[known] - np.median(own[known], 0)).mean()
     return float(np.abs(np.nanmedian(off[:, known], 0)).mean() / max(plain, FEATURED))
