@@ -7,12 +7,13 @@ import pytest
 from edit_scenes import block_mask, flat_scene
 from made_meshes import box_file
 
+from materialist.edit import glass_preview
 from materialist.edit.composite import composite
 from materialist.edit.glass import glass
 from materialist.edit.glass_preview import GlassPreview
 from materialist.edit.insert import insert
 from materialist.edit.relight import relight
-from materialist.edit.sky import LEAST, sky_maps
+from materialist.edit.sky import LEAST, sky_maps, traced
 from materialist.geometry.build import build_geometry
 
 MASK = block_mask(36, 48)
@@ -74,3 +75,42 @@ def test_the_preview_and_inserted_glass_show_it_too(tmp_path):
     high = np.s_[14:20, 33:39]
     assert (SCENE.depth[high] == 0).all()
     np.testing.assert_allclose(shown[high], SCENE.photo.linear[high], atol=0.1)
+
+
+class Target:
+    """A scene that shows the mean of its map, and its albedo's."""
+
+    def set_materials(self, materials):
+        self.albedo = float(materials.albedo.mean())
+
+    def set_envmap(self, envmap):
+        self.light = float(envmap.mean())
+
+
+def test_both_maps_have_their_share_of_the_paths_and_the_scene_is_as_it_was():
+    scene, target, asked = before_sky(), Target(), []
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    before = target.albedo, target.light
+
+    def trace(share):
+        asked.append((share, target.albedo == 0))
+        return np.full((2, 2, 3), target.light)
+
+    maps = np.full((4, 8, 3), 0.7), np.full((4, 8, 3), 0.2)
+    found = traced(trace, target, scene, maps, share=0.25)
+    np.testing.assert_allclose(found, before[1] + 0.7 - 0.2)
+    assert asked == [(1.0, False), (0.25, True), (0.25, True)]
+    assert (target.albedo, target.light) == before
+    assert traced(trace, target, scene, None, share=0.25).shape == (2, 2, 3) and asked[3:] == [(1.0, False)]
+
+
+def test_a_quarter_of_the_paths_shows_the_preview_the_same_sky(monkeypatch):
+    preview = GlassPreview(before_sky(), MASK, thickness="symmetry")
+    few = preview.picture(ior=1.3, spp=64, seed=3)
+    monkeypatch.setattr(glass_preview, "SKY", 1.0)
+    many = preview.picture(ior=1.3, spp=64, seed=3)
+    monkeypatch.setattr(preview, "_sky", None)
+    none = preview.picture(ior=1.3, spp=64, seed=3)
+    inside = preview.share > 0.9
+    assert np.abs(few - many)[inside].mean() < 0.1 * np.abs(none - many)[inside].mean()

@@ -18,6 +18,8 @@ PATHS = 600_000
 """Paths of one picture: with more pixels than they allow, fewer pixels are traced and the picture is enlarged."""
 FEWEST = 4
 """Paths a traced pixel."""
+SKY = 0.25
+"""Share of them that each of the two pictures has by which the photo's sky comes into the glass."""
 MARGIN = 2
 """Working pixels around the object that are traced as well."""
 
@@ -74,8 +76,12 @@ class GlassPreview:
         size, box = self._size(spp)
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
-        options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": GLASS_DEPTH, "names": [self._name]}
-        seen = traced(lambda: radiance(target, size, box, **options), target, self._edited, self._sky)
+        options: dict[str, Any] = {"seed": seed, "max_depth": GLASS_DEPTH, "names": [self._name]}
+
+        def trace(share: float) -> Array:
+            return radiance(target, size, box, spp=max(1, round(share * paths)), **options)
+
+        seen = traced(trace, target, self._edited, self._sky, share=SKY)
         return self._in_photo(
             denoised(without_fireflies(spread(seen), spread=focused(self._edited)), self._guides[size]), surface
         )

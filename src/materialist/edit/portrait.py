@@ -80,7 +80,7 @@ def portrait(
     options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": max_depth, "names": names, "gap": gap}
     clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
     maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
-    picture = traced(lambda: trace.radiance(target, size, part, **options), target, edited, maps)
+    picture = traced(lambda _: trace.radiance(target, size, part, **options), target, edited, maps)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
     picture = spread(picture)
     if clean:

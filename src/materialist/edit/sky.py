@@ -56,15 +56,21 @@ def only_lit_by(scene: Scene, envmap: Array) -> Scene:
     return replace(scene, materials=black, envmap=envmap)
 
 
-def traced(trace: Callable[[], Array], target: Any, scene: Scene, maps: tuple[Array, Array] | None) -> Array:
-    """[h, w, 3] what `trace` gives of a `RenderScene` dressed as the scene, with the sky of `sky_maps` in its glass."""
-    picture = trace()
+def traced(
+    trace: Callable[[float], Array], target: Any, scene: Scene, maps: tuple[Array, Array] | None, *, share: float = 1.0
+) -> Array:
+    """[h, w, 3] what `trace` gives of a `RenderScene` dressed as the scene, with the sky of `sky_maps` in its glass.
+
+    trace: picture by a share of its paths. share: that of each of both maps; they follow the same paths, so that fewer
+    do: their difference has little noise.
+    """
+    picture = trace(1.0)
     if maps is None:
         return picture
     target.set_materials(only_lit_by(scene, maps[0]).materials)
     for envmap, sign in zip(maps, (1, -1)):
         target.set_envmap(envmap)
-        picture = picture + sign * trace()
+        picture = picture + sign * trace(share)
     target.set_materials(scene.materials)
     target.set_envmap(scene.envmap)
     return np.maximum(picture, 0)
