@@ -55,10 +55,7 @@ def refraction(
     from materialist.cli.progress import StageProgress
     from materialist.train.refraction.lessons import Plan, produce
 
-    def note(text: str) -> None:
-        if not as_json:
-            typer.echo(text, err=True)
-
+    note = (lambda _: None) if as_json else lambda text: typer.echo(text, err=True)
     folder = data or output / "views"
     train, aside = folder / "train", folder / "heldout"
     plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)

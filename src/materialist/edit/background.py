@@ -124,7 +124,8 @@ def sources(
     copied, None for anything. None where nothing can be.
     """
     anywhere = np.ones(hole.shape, bool) if usable is None else usable
-    told = regular_sources(features[..., :3], features, hole, anywhere, label, depth, camera)
+    paint = features[..., :3]  # the albedo of `looks`
+    told = regular_sources(paint, features, hole, anywhere, label, depth, camera)
     return exemplar_plan(features, hole, anywhere, joined(label, hole), told=told, seed=seed)
 
 

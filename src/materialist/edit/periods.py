@@ -13,7 +13,7 @@ from materialist.camera import project
 from materialist.types import Array, Camera
 
 KNOWN = 200
-"""Fewest cells of a plane that must be seen."""
+"""Fewest pixels of a plane, and cells of it straight on, that must be seen."""
 CELLS = 160
 """Cells along the longer side of a plane looked at straight on."""
 AROUND = 2.5

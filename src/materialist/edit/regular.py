@@ -54,6 +54,7 @@ def regular_sources(
         [H, W] int row-major pixel, -1 where no pattern tells it.
     """
     found = np.full(hole.shape, -1)
+    paint = np.ascontiguousarray(paint, np.float32)
     points = pixel_rays(camera) * depth[..., None]
     for k in np.unique(label[hole]):
         if k < 0:
@@ -120,7 +121,7 @@ def _proven(paint: Array, plane: Surface, shifts: Array, cell: Array, camera: Ca
 
     found = [shift for shift in found if true(shift)]
     steps, apart = np.array(found).reshape(-1, 3), APART * np.linalg.norm(cell[0])
-    for both in (steps[:, None] + steps[None]).reshape(-1, 3):
+    for both in (steps[i] + steps[j] for i, j in zip(*np.triu_indices(len(steps)), strict=True)):
         if np.linalg.norm([both, *(both - found)], axis=1).min() > apart and true(both, unknown=True):
             found.append(both)
     return np.array(found).reshape(-1, 3)
@@ -146,14 +147,15 @@ def _missed(paint: Array, plane: Surface, at: Places, shifts: Array, camera: Cam
     """
     import cv2
 
-    own, values = paint[at], np.ascontiguousarray(paint, np.float32)
+    own = paint[at]
     line = np.stack([np.ones(len(own)), *(x / max(paint.shape) for x in at)], -1)
     off = np.full((len(shifts), *own.shape), np.nan)
     for k, shift in enumerate(shifts):
-        told = _landing(plane, at, shift, camera) >= 0
+        source, place = _landing(plane, at, shift, camera)
+        told = source >= 0
         if told.sum() >= FEWEST:
-            x, y = project(plane.point[at][told] + shift, camera)[0].astype(np.float32).T[..., None] - np.float32(0.5)
-            read = cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0] - own[told]
+            x, y = place[told].astype(np.float32).T[..., None] - np.float32(0.5)
+            read = cv2.remap(paint, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0] - own[told]
             off[k, told] = read - line[told] @ np.linalg.lstsq(line[told], read, rcond=None)[0]
     known = np.isfinite(off[..., 0]).any(0)
     if not known.any():
@@ -162,14 +164,14 @@ def _missed(paint: Array, plane: Surface, at: Places, shifts: Array, camera: Cam
     return float(np.abs(np.nanmedian(off[:, known], 0)).mean() / max(plain, FEATURED))
 
 
-def _landing(plane: Surface, at: Places, shift: Array, camera: Camera) -> Array:
-    """[P] row-major pixels where pixels `at` are after a shift [3], -1 where nothing is known."""
+def _landing(plane: Surface, at: Places, shift: Array, camera: Camera) -> tuple[Array, Array]:
+    """[P] row-major pixels on which pixels `at` come by a shift [3], -1: nothing is known there; and places [P, 2]."""
     height, width = plane.known.shape
     place, ahead = project(plane.point[at] + shift, camera)
     column, row = np.floor(place).astype(int).T
     good = (ahead > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
     row, column = np.where(good, row, 0), np.where(good, column, 0)
-    return np.where(good & plane.known[row, column], row * width + column, -1)
+    return np.where(good & plane.known[row, column], row * width + column, -1), place
 
 
 def _repeated(shown: Array, plane: Surface, at: Places, shifts: Array, camera: Camera) -> Array:
@@ -178,7 +180,7 @@ def _repeated(shown: Array, plane: Surface, at: Places, shifts: Array, camera: C
     sources, count = np.full((REPEATS, len(rows)), -1), np.zeros(len(rows), int)
     for shift in shifts:
         unsure = np.flatnonzero(count < REPEATS)
-        landing = _landing(plane, (rows[unsure], columns[unsure]), shift, camera)
+        landing, _ = _landing(plane, (rows[unsure], columns[unsure]), shift, camera)
         told = unsure[landing >= 0]
         sources[count[told], told] = landing[landing >= 0]
         count[told] += 1
