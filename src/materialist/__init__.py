@@ -21,18 +21,18 @@ _HOME = {
     "read_photo": "io.photo",
     "save_scene": "io.package",
     "load_scene": "io.package",
-    "export": "export.run",
-    "select": "edit.select",
-    "edit": "edit",
-    "relight": "edit.relight",
-    "lamp": "edit.relight",
-    "insert": "edit.insert",
-    "glass": "edit.glass",
-    "remove": "edit.remove",
-    "drop": "edit.drop",
-    "settle": "edit.drop_rest",
-    "composite": "edit.composite",
-    "batch": "batch",
+    "export": "exporters.run",
+    "select": "edits.select.select",
+    "edit": "edits.material.material",
+    "relight": "edits.light.relight",
+    "lamp": "edits.light.relight",
+    "insert": "edits.insert.insert",
+    "glass": "edits.glass.glass",
+    "remove": "edits.remove.remove",
+    "drop": "edits.drop.drop",
+    "settle": "edits.drop.drop_rest",
+    "composite": "edits.composite.composite",
+    "batch": "batches.run",
     **dict.fromkeys(
         (
             "Body",
@@ -58,24 +58,24 @@ _HOME = {
 __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
-    from materialist.batch.run import batch as batch
-    from materialist.edit.composite import composite as composite
-    from materialist.edit.drop import drop as drop
-    from materialist.edit.drop_rest import settle as settle
-    from materialist.edit.glass import glass as glass
-    from materialist.edit.insert import insert as insert
-    from materialist.edit.material import edit as edit
-    from materialist.edit.relight import lamp as lamp
-    from materialist.edit.relight import relight as relight
-    from materialist.edit.remove import remove as remove
-    from materialist.edit.select import select as select
+    from materialist.batches.run import batch as batch
+    from materialist.edits.composite.composite import composite as composite
+    from materialist.edits.drop.drop import drop as drop
+    from materialist.edits.drop.drop_rest import settle as settle
+    from materialist.edits.glass.glass import glass as glass
+    from materialist.edits.insert.insert import insert as insert
+    from materialist.edits.light.relight import lamp as lamp
+    from materialist.edits.light.relight import relight as relight
+    from materialist.edits.material.material import edit as edit
+    from materialist.edits.remove.remove import remove as remove
+    from materialist.edits.select.select import select as select
     from materialist.errors import InputError as InputError
     from materialist.errors import MaterialistError as MaterialistError
     from materialist.errors import OutputError as OutputError
     from materialist.errors import SceneError as SceneError
     from materialist.errors import SetupError as SetupError
     from materialist.errors import WeightsError as WeightsError
-    from materialist.export.run import export as export
+    from materialist.exporters.run import export as export
     from materialist.io.package import load_scene as load_scene
     from materialist.io.package import save_scene as save_scene
     from materialist.io.photo import read_photo as read_photo

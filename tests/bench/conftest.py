@@ -14,6 +14,6 @@ def mitsuba():
 @pytest.fixture(scope="session")
 def sample(mitsuba):
     """A small sample: scene 0 (a table top under the sky), not square."""
-    from materialist.bench.synthetic import make_sample
+    from materialist.procedural.synthetic import make_sample
 
     return make_sample(0, 0, 0, size=(40, 56), seed=0, spp=64)

@@ -9,8 +9,8 @@ import pytest
 from materialist import bench, metrics
 from materialist.bench.edit import _scores
 from materialist.bench.edits import edits, true_scene
-from materialist.bench.synthetic import make_sample
 from materialist.errors import InputError
+from materialist.procedural.synthetic import make_sample
 
 
 @pytest.fixture(scope="module")

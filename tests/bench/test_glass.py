@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from materialist import bench
-from materialist.bench import glass, glass_backdrop, shapes
+from materialist.bench import glass, glass_backdrop
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.errors import InputError
 from materialist.predict.refraction.thickness import Thickness
+from materialist.procedural.objects import shapes
 
 
 @pytest.fixture(scope="module")

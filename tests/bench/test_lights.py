@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from materialist.bench import lights
 from materialist.errors import InputError
 from materialist.metrics import sh_coefficients
+from materialist.procedural import lights
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 IDENTITY = np.eye(3)

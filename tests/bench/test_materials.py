@@ -15,9 +15,9 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict.bundled.network import Architecture, BundledNetwork
 from materialist.predict.normals import normals_from_depth
-from materialist.train.data.produce import CONTENT, options_for, read_description
-from materialist.train.data.sample import make_sample
+from materialist.procedural.sample import make_sample
 from materialist.train.lpips import lpips
+from materialist.train.produce import CONTENT, options_for, read_description
 from materialist.types import Camera
 
 

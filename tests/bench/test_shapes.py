@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.bench import shapes
+from materialist.procedural.objects import shapes
 
 SOLIDS = {
     "box": (shapes.box(np.array([1.0, 2.0, 3.0])), 6.0),

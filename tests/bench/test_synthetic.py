@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from materialist import metrics
-from materialist.bench import scenes
-from materialist.bench.synthetic import make_sample
 from materialist.camera import pixel_rays, unproject
 from materialist.errors import InputError
+from materialist.procedural import arrangements as scenes
+from materialist.procedural.synthetic import make_sample
 
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 

@@ -136,7 +136,7 @@ def test_a_film_holds_one_relit_scene_at_a_time(run, folder, monkeypatch):
     """Each has an environment map of its own, and a film thousands of frames."""
     import weakref
 
-    from materialist.edit import frames
+    from materialist.edits.light import frames
 
     alive, most, make = [], [], frames.relight
 
@@ -257,7 +257,7 @@ def test_the_device_is_chosen_before_anything_renders(run, folder, monkeypatch):
     """A GPU machine must not begin on its GPU and then be told of the CPU."""
     from made_meshes import box_file
 
-    from materialist.edit.insert import insert
+    from materialist.edits.insert.insert import insert
     from materialist.render import variant
 
     box = box_file(folder / "box.ply")

@@ -9,7 +9,7 @@ from PIL import Image
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
-from materialist.edit.glass_preview import GlassPreview
+from materialist.edits.glass.preview import GlassPreview
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
 

@@ -5,8 +5,8 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.closed import closed_proxy
 from materialist.geometry.contour import open_edges, region, silhouette_field
+from materialist.solids.closed import closed_proxy
 from materialist.types import Camera
 
 CAMERA = Camera(96, 80, 40.0)

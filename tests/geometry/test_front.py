@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.bench import shapes
 from materialist.bench.glass_scenes import seen
 from materialist.camera import pixel_rays
-from materialist.geometry.front import of_one_surface, smooth_front
+from materialist.procedural.objects import shapes
+from materialist.solids.front import of_one_surface, smooth_front
 from materialist.types import Camera
 
 ANGLE = np.linspace(-np.pi, np.pi, 120)

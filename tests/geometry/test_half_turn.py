@@ -5,8 +5,8 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.half_turn import half_turn, upright
-from materialist.geometry.symmetry import symmetric_thickness
+from materialist.solids.half_turn import half_turn, upright
+from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 
 CAMERA = Camera(80, 64, 40.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays
-from materialist.geometry.lathe import lathed
+from materialist.solids.lathe import lathed
 from materialist.types import Camera
 
 CAMERA = Camera(80, 64, 40.0)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from materialist.bench import shapes
 from materialist.bench.glass_scenes import is_closed, seen
 from materialist.camera import pixel_rays
-from materialist.geometry import outline
-from materialist.geometry.outline import outlined
+from materialist.procedural.objects import shapes
+from materialist.solids import outline
+from materialist.solids.outline import outlined
 from materialist.types import Camera
 
 CAMERA = Camera(120, 110, 40.0)

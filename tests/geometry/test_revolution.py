@@ -5,13 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
-from materialist.bench import shapes
 from materialist.bench.glass_scenes import is_closed, seen
 from materialist.camera import pixel_rays
-from materialist.geometry.lathe import lathed
-from materialist.geometry.profile import fitted
-from materialist.geometry.revolution import Meridian, fits, profile_of, swept, thickness_of
-from materialist.geometry.turning import Axis
+from materialist.procedural.objects import shapes
+from materialist.solids.lathe import lathed
+from materialist.solids.profile import fitted
+from materialist.solids.revolution import Meridian, fits, profile_of, swept, thickness_of
+from materialist.solids.turning import Axis
 from materialist.types import Camera
 
 CAMERA = Camera(96, 80, 40.0)

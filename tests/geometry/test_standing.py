@@ -7,8 +7,8 @@ import pytest
 from test_lathe import CAMERA, FOOT, UP, prism, solid
 
 from materialist.camera import pixel_rays, project
-from materialist.geometry.lathe import lathed
-from materialist.geometry.standing import BEYOND, NEAREST, nearer, standing_body
+from materialist.solids.lathe import lathed
+from materialist.solids.standing import BEYOND, NEAREST, nearer, standing_body
 
 RAYS = pixel_rays(CAMERA)
 CAMERA_SHAPE = (CAMERA.height, CAMERA.width)

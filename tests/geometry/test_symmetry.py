@@ -5,7 +5,7 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.symmetry import border_distance, object_size, symmetric_thickness
+from materialist.solids.symmetry import border_distance, object_size, symmetric_thickness
 from materialist.types import Camera
 
 

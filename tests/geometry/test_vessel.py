@@ -7,8 +7,8 @@ import pytest
 from test_revolution import AXIS, CAMERA, FOOT, UP, ground, profile_from, standing, volume  # noqa: F401 (a fixture)
 
 from materialist.bench.glass_scenes import is_closed
-from materialist.geometry.revolution import Meridian, swept
-from materialist.geometry.vessel import vessel
+from materialist.solids.revolution import Meridian, swept
+from materialist.solids.vessel import vessel
 
 POT = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.7], [0.0, 0.7]]
 

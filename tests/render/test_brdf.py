@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.render import brdf
+from materialist.bsdf import disney as brdf
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from disney import ALBEDO, NORMAL, directions, evaluate, interaction, make, mi, pairs, tilted, vector
 
-from materialist.render import brdf, bsdf
+from materialist.bsdf import disney as brdf
+from materialist.bsdf import disney_plugin as bsdf
 from materialist.transport import sampling
 
 GRID = [(r, m) for r in (0.04, 0.1, 0.2, 0.5, 1.0) for m in (0.0, 0.4, 1.0)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.render.frosted import COSINES, PLUGIN, directional_albedo
+from materialist.bsdf.rough_dielectric import COSINES, PLUGIN, directional_albedo
 from materialist.render.variant import setup
 
 

@@ -5,8 +5,8 @@ import pytest
 import torch
 from render_scenes import uniform, wall, with_floor
 
+from materialist.bsdf import disney as brdf
 from materialist.camera import pixel_rays
-from materialist.render import brdf
 from materialist.render.scene import RenderScene
 from materialist.types import Camera, Materials
 

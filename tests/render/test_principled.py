@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from disney import ALBEDO, NORMAL, evaluate, interaction, make, mi, pairs, tilted, vector
 
-from materialist.render import brdf
+from materialist.bsdf import disney as brdf
 
 ROUGHNESS, METALLIC = (0.1, 0.2, 0.4, 0.7, 1.0), (0.0, 0.5, 1.0)
 

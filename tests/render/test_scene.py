@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from render_scenes import empty, uniform, wall, with_floor
 
+from materialist.bsdf import disney as brdf
 from materialist.camera import pixel_rays, unproject
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
-from materialist.render import brdf
 from materialist.render.scene import RenderScene
 from materialist.types import Camera, Materials
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.edit.recipe import Step
+from materialist.edits.recipe import Step
 from materialist.errors import InputError, OutputError
 from materialist.studio.desk import confined, write_mask
 

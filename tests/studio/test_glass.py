@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, package, room
 
-from materialist.edit.recipe import Step
+from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import child, glass_worker
 from materialist.studio import glass as studio_glass
@@ -189,7 +189,7 @@ def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
 
 
 def test_the_process_answers_with_the_preview_of_the_edit_package(tmp_path):
-    from materialist.edit.glass_preview import GlassPreview
+    from materialist.edits.glass.preview import GlassPreview
     from materialist.studio.desk import write_mask
 
     scene, told, bench = package(tmp_path), [], glass_worker.Bench()

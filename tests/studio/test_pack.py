@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, click
 
-from materialist.edit.recipe import Step, apply
+from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, click, named, room
 
-from materialist.edit.recipe import apply, read_recipe
+from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.session import Session
 

@@ -19,9 +19,9 @@ def test_what_is_missing_is_said(monkeypatch, tmp_path):
     def nowhere(where):
         raise WeightsError("not here")
 
-    monkeypatch.setattr("materialist.edit.sam.folder_of", nowhere)
+    monkeypatch.setattr("materialist.edits.select.sam.folder_of", nowhere)
     assert "materialist models download sam2" in sam_missing()
-    monkeypatch.setattr("materialist.edit.sam.folder_of", lambda where: tmp_path)
+    monkeypatch.setattr("materialist.edits.select.sam.folder_of", lambda where: tmp_path)
     assert sam_missing() is None
 
 

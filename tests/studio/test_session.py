@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, click, room
 
-from materialist.edit.recipe import Step, apply, read_recipe
+from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.context import light_values, material_values
 from materialist.studio.selection import Selection

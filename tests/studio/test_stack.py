@@ -1,6 +1,6 @@
 """The stack of edits."""
 
-from materialist.edit.recipe import Step, read_recipe, write_recipe
+from materialist.edits.recipe import Step, read_recipe, write_recipe
 from materialist.studio.stack import Stack, summary
 
 A, B, C = (

@@ -7,7 +7,7 @@ import pytest
 from made_meshes import floor_scene
 from studio_scenes import click, named
 
-from materialist.edit.recipe import apply, read_recipe
+from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError, SetupError
 from materialist.studio import things
 from materialist.studio.context import glass_values, thing_values

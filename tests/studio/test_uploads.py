@@ -93,7 +93,7 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
 def test_a_scene_with_bodies_comes_back(tmp_path):
     from made_meshes import box_file, floor_scene
 
-    from materialist.edit.insert import insert
+    from materialist.edits.insert.insert import insert
     from materialist.io.package import save_scene
 
     scene = insert(floor_scene(), box_file(tmp_path / "box.ply"), (24, 26))
@@ -138,7 +138,7 @@ def test_meshes_name_no_other_files(tmp_path):
 
 
 def test_messages_name_no_folders(tmp_path):
-    from materialist.edit.meshes import read_model
+    from materialist.edits.insert.meshes import read_model
 
     (tmp_path / "mesh-1.ply").write_text("ply\nnonsense\n")
     with pytest.raises(InputError) as error, uploads.called(tmp_path / "mesh-1.ply", "My chair.ply"):

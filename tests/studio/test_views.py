@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from studio_scenes import block, package, room
 
-from materialist.edit.relight import checked_envmap
+from materialist.edits.light.relight import checked_envmap
 from materialist.errors import InputError
 from materialist.io.examples import example_path
 from materialist.studio import lights, tasks, views

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from materialist.bsdf.disney import diffuse_coefficients, specular_split
 from materialist.envmap import texel_directions
 from materialist.geometry.build import build_geometry
-from materialist.render.brdf import diffuse_coefficients, specular_split
 from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, TransportCache
 from materialist.types import Camera, Geometry, Mesh
 
@@ -96,7 +96,7 @@ def test_open_plane_under_constant_light_has_the_analytic_diffuse_lobe(open_floo
 
 def test_a_small_sun_is_neither_missed_nor_met_twice():
     """The whole floor sees it through the same directions: an error is that of the picture."""
-    from materialist.edit.relight import with_sun
+    from materialist.edits.light.relight import with_sun
 
     cache = TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA)
     ratio = []

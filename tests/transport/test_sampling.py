@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from materialist.render.brdf import diffuse_coefficients
+from materialist.bsdf.disney import diffuse_coefficients
 from materialist.transport import sampling
 
 N = 1 << 14

@@ -12,7 +12,6 @@ import numpy as np
 
 from materialist import metrics
 from materialist.bench.report import Column, Report, write
-from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.errors import InputError
 from materialist.fit.attempt import FULL, Job
 from materialist.fit.engine import prepared_envmap
@@ -21,6 +20,7 @@ from materialist.fit.loop import Schedule
 from materialist.fit.losses import l1_l2, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage
+from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials, Prediction
 
 if TYPE_CHECKING:

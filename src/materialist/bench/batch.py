@@ -12,9 +12,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from materialist.batch.listing import list_photos
-from materialist.batch.packages import package_hash, together
-from materialist.batch.work import ONE_THREAD
+from materialist.batches.listing import list_photos
+from materialist.batches.packages import package_hash, together
+from materialist.batches.work import ONE_THREAD
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError
 

@@ -16,9 +16,9 @@ import numpy as np
 from materialist import metrics
 from materialist.bench.edits import Edit, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, write
-from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Photo, Scene
 
 KINDS = ("hue", "metal", "relight", "insert")
@@ -130,7 +130,7 @@ def _compared(
     strips: list[list[Array]], options: dict[str, Any],
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rows of one edit: untouched, the ceilings, and each fit."""
-    from materialist.edit.composite import composite
+    from materialist.edits.composite.composite import composite
 
     spp, seed = options["spp"], options["seed"]
     before = sample.render(sample.envmap, spp=options["truth_spp"], seed=seed + 5)
@@ -164,12 +164,12 @@ def _scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:
 
 def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator[dict[str, Any]]:
     """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
-    from materialist.edit.composite import composite, into_photo
-    from materialist.edit.layers import render_layers
-    from materialist.edit.lights import Studio
-    from materialist.edit.material import edit
-    from materialist.edit.preview import Preview
-    from materialist.edit.relight import relight
+    from materialist.edits.composite.composite import composite, into_photo
+    from materialist.edits.composite.layers import render_layers
+    from materialist.edits.light.lights import Studio
+    from materialist.edits.light.relight import relight
+    from materialist.edits.material.material import edit
+    from materialist.edits.preview import Preview
 
     scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
     mask = np.zeros(scene.depth.shape, bool)

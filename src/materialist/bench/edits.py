@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench import shapes
-from materialist.bench.scenes import Item
-from materialist.bench.synthetic import SyntheticSample, TrueScene
+from materialist.procedural.arrangements import Item
+from materialist.procedural.objects import shapes
+from materialist.procedural.synthetic import SyntheticSample, TrueScene
 from materialist.types import Array, Body, Scene
 
 SHADOW = 0.02
@@ -68,14 +68,14 @@ def _masked(change: Callable[[Scene, Array], Scene], mask: Array) -> Callable[[S
 
 
 def _relit(scene: Scene, light: Array) -> Scene:
-    from materialist.edit.relight import relight
+    from materialist.edits.light.relight import relight
 
     return relight(scene, envmap=light)
 
 
 def _material(kind: str, item: Item) -> tuple[Callable[[Scene, Array], Scene], Item]:
     """The edit of a mask, and the true object after it."""
-    from materialist.edit.material import edit, shifted_hsv
+    from materialist.edits.material.material import edit, shifted_hsv
 
     if kind == "hue":
         change: dict[str, Any] = {"hue": 120.0}
@@ -106,8 +106,8 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Edit |
     """A cup in a free place of the floor; the true one has the vertices that the fitted scene is given."""
     import cv2
 
-    from materialist.edit.insert import insert
-    from materialist.edit.meshes import Model
+    from materialist.edits.insert.insert import insert
+    from materialist.edits.insert.meshes import Model
 
     floor = np.pad((item == 0).astype(np.uint8), 1)
     free = cv2.distanceTransform(floor, cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -131,7 +131,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Edit |
 
 
 def _body(solid: shapes.Solid) -> Body:
-    from materialist.edit.mesh_material import constant
+    from materialist.edits.insert.mesh_material import constant
 
     take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
     colour = np.array([0.15, 0.35, 0.6], np.float32)

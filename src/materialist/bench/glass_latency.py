@@ -24,8 +24,8 @@ def latencies(data: Path | None, size: int, *, spp: int, seed: int, device: str)
     The scene is a synthetic one with its true maps, `size` pixels wide; its object takes about a tenth of the picture.
     """
     from materialist.bench.edits import true_scene
-    from materialist.bench.synthetic import make_sample
-    from materialist.edit.glass_preview import GlassPreview
+    from materialist.edits.glass.preview import GlassPreview
+    from materialist.procedural.synthetic import make_sample
 
     scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
     mask = block(scene)

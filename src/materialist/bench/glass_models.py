@@ -28,8 +28,8 @@ def inpainted_background(
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
     albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
-    from materialist.edit.background import filled, looks, sources
-    from materialist.edit.behind import SKY, behind
+    from materialist.edits.remove.background import filled, looks, sources
+    from materialist.edits.remove.behind import SKY, behind
 
     hole = _grown(scene.mask)
     depth = np.where(hole, 0, scene.behind.depth)
@@ -62,8 +62,8 @@ def two_interface(
 
     back: one of `edit.two_interface.BACKS`, or "" for what is known.
     """
-    from materialist.edit.two_interface import back_of
-    from materialist.edit.two_interface import two_interface as model
+    from materialist.edits.glass.two_interface import back_of
+    from materialist.edits.glass.two_interface import two_interface as model
 
     front = scene.front
     known = back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
@@ -82,7 +82,7 @@ def closed_proxy(
 
 def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
-    from materialist.geometry.standing import standing_body
+    from materialist.solids.standing import standing_body
 
     return standing_body(scene.front.depth, scene.front.normal, scene.mask, found, scene.camera, behind=depth)
 
@@ -129,8 +129,8 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     add. The upright direction comes from the floor of the background, where there is one.
     """
     from materialist.errors import WeightsError
-    from materialist.geometry.symmetry import symmetric_thickness
     from materialist.predict.refraction import thickness
+    from materialist.solids.symmetry import symmetric_thickness
 
     front: Front = scene.front
     best = predicted(scene, photo, behind.depth, behind.normal)
@@ -143,8 +143,8 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
 
 def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
-    from materialist.geometry.half_turn import upright
     from materialist.predict.refraction.choice import best_thickness
+    from materialist.solids.half_turn import upright
 
     up = upright(depth, normal, planes_of(scene, depth, normal), scene.camera)
     front = scene.front

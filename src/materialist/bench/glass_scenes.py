@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench import lights, patterns, scenes, shapes
-from materialist.bench.shapes import Solid
 from materialist.camera import pixel_rays
 from materialist.color import luminance
 from materialist.errors import InputError
+from materialist.procedural import arrangements as scenes
+from materialist.procedural import lights, patterns
+from materialist.procedural.objects import shapes
+from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array, Camera
 
 GROUPS = ("symmetric", "asymmetric")
@@ -106,7 +108,7 @@ def _turned(index: int, seed: int) -> Thing:
 
 def _free(index: int, seed: int) -> Thing:
     """A lumpy or twisted body."""
-    from materialist.train.data import solids
+    from materialist.procedural.objects import solids
     from materialist.train.refraction.glassware import centred
 
     rng = np.random.default_rng([seed, 8, index])
@@ -157,7 +159,7 @@ class GlassScene:
     @cached_property
     def behind(self) -> Front:
         """The room alone."""
-        from materialist.train.data.solids import joined
+        from materialist.procedural.objects.solids import joined
 
         if not self.room:
             size = (self.camera.height, self.camera.width)
@@ -248,7 +250,7 @@ def path_traced(
 
     By paths of `depth` at most, or by another `integrator`.
     """
-    from materialist.bench.synthetic import _sensor
+    from materialist.procedural.synthetic import _sensor
 
     sensor, window = _sensor(camera), np.s_[:, :]
     if around is not None:

@@ -139,9 +139,9 @@ def _case(data: Path | None, photo: str | None, folder: Path, size: int, seed: i
 
 def _synthetic(folder: Path, size: int, seed: int, device: str) -> Case:
     """A photo of the benchmark's own scenes, with its true maps as the prior."""
-    from materialist.bench.synthetic import make_sample
     from materialist.io.exr import write_exr
     from materialist.io.image import write_png
+    from materialist.procedural.synthetic import make_sample
     from materialist.render.variant import setup
 
     setup(device)

@@ -17,9 +17,9 @@ import numpy as np
 
 from materialist import metrics
 from materialist.bench.report import CEILING, Column, Report, write
-from materialist.bench.synthetic import SyntheticSample, make_sample
 from materialist.errors import InputError
 from materialist.predict.base import NEUTRAL_METALLIC
+from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials
 
 NEUTRAL = 0.5

@@ -114,7 +114,7 @@ def run(
         add(data, "", limit)
         settings |= lost(data, split)
     if count:
-        from materialist.train.data.produce import CONTENT
+        from materialist.train.produce import CONTENT
 
         settings["procedural content"] = CONTENT["heldout"]
         with tempfile.TemporaryDirectory() as place:
@@ -125,7 +125,7 @@ def run(
 
 def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmaps: str, device: str) -> Path:
     """A new set of held-out procedural pictures; see `train.data.produce`."""
-    from materialist.train.data.produce import options_for, produce
+    from materialist.train.produce import options_for, produce
 
     options = options_for(
         size=size, seed=seed, split="heldout", device=device, meshes=Path(meshes) if meshes else None,

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.report import Column, Report, write
-from materialist.bench.scenes import arrangement
-from materialist.bench.synthetic import SyntheticSample, make_sample
-from materialist.edit.boxes import Box, grown
+from materialist.edits.select.boxes import Box, grown
 from materialist.errors import InputError
+from materialist.procedural.arrangements import arrangement
+from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Prediction, Scene
 
 NOTE = """Synthetic pictures whose objects are known (those of `bench light`); two clicks on every object of at least
@@ -79,7 +79,7 @@ def _rows(
     sample: SyntheticSample, scene: Scene, maps: str, method: str, name: str, number: int
 ) -> list[dict[str, Any]]:
     """A row a click, and a box."""
-    from materialist.edit.select import select
+    from materialist.edits.select.select import select
 
     rows = []
     for j, mask in enumerate(sample.things):

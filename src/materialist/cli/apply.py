@@ -42,8 +42,8 @@ def apply(
     force: Force = False,
 ) -> None:
     """Replay a list of edits on a scene: materials and light, in one picture."""
-    from materialist.edit.recipe import apply as replay
-    from materialist.edit.recipe import read_recipe
+    from materialist.edits.recipe import apply as replay
+    from materialist.edits.recipe import read_recipe
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force, device=device.value, full_render=full_render)

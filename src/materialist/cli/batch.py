@@ -17,7 +17,7 @@ from materialist.errors import MaterialistError
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from materialist.batch.outcome import Outcome, Status
+    from materialist.batches.outcome import Outcome, Status
 
 
 def register(app: typer.Typer) -> None:
@@ -59,7 +59,7 @@ def batch(
     ] = False,
 ) -> None:
     """Invert many photos, and apply a list of edits to each. Exit code 0: all done; 2: some failed, with reasons."""
-    from materialist.batch.run import batch as run
+    from materialist.batches.run import batch as run
 
     try:
         with BatchProgress(quiet=as_json) as progress:

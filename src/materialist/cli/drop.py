@@ -62,12 +62,12 @@ def drop(
     force: Force = False,
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it."""
-    from materialist.edit.composite import developed
-    from materialist.edit.drop import drop as simulate
-    from materialist.edit.film import filmed
-    from materialist.edit.frames import write_frames
-    from materialist.edit.material import told_since
-    from materialist.edit.meshes import read_model
+    from materialist.edits.composite.composite import developed
+    from materialist.edits.drop.drop import drop as simulate
+    from materialist.edits.insert.meshes import read_model
+    from materialist.edits.light.film import filmed
+    from materialist.edits.light.frames import write_frames
+    from materialist.edits.material.material import told_since
     from materialist.io.package import load_scene, save_scene
 
     check_paths(spp)

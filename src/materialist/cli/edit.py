@@ -59,8 +59,8 @@ def edit(
     force: Force = False,
 ) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
-    from materialist.edit.material import edit as change
-    from materialist.edit.recipe import read_texture
+    from materialist.edits.material.material import edit as change
+    from materialist.edits.recipe import read_texture
     from materialist.io.package import load_scene
 
     wanted = (hue, saturation, value, albedo, roughness, metallic, texture)

@@ -57,8 +57,8 @@ def export(
     """
     from rich.console import Console
 
-    from materialist.export.run import check_format
-    from materialist.export.run import export as write
+    from materialist.exporters.run import check_format
+    from materialist.exporters.run import export as write
     from materialist.io.package import load_scene
 
     check_format(output, to.value)

@@ -78,10 +78,10 @@ def glass(
     force: Force = False,
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
-    from materialist.edit.glass import OPEN, check_glass
-    from materialist.edit.glass import glass as change
-    from materialist.edit.hole import told_shadow
-    from materialist.edit.material import PICTURED, parse_colour
+    from materialist.edits.glass.glass import OPEN, check_glass
+    from materialist.edits.glass.glass import glass as change
+    from materialist.edits.material.material import PICTURED, parse_colour
+    from materialist.edits.remove.hole import told_shadow
     from materialist.errors import InputError
     from materialist.io.package import load_scene
 
@@ -120,9 +120,9 @@ def _preview(
 
     from materialist.cli.outcome import report_success
     from materialist.cli.progress import StageProgress
-    from materialist.edit.glass_preview import GlassPreview
-    from materialist.edit.material import told_since
-    from materialist.edit.output import write_composite
+    from materialist.edits.composite.output import write_composite
+    from materialist.edits.glass.preview import GlassPreview
+    from materialist.edits.material.material import told_since
 
     start = time.monotonic()
     with StageProgress(quiet=as_json) as progress:

@@ -52,8 +52,8 @@ def insert(
     force: Force = False,
 ) -> None:
     """Put a mesh into the photo: it stands on what is there, casts its shadow and is reflected."""
-    from materialist.edit.insert import insert as put
-    from materialist.edit.meshes import read_model
+    from materialist.edits.insert.insert import insert as put
+    from materialist.edits.insert.meshes import read_model
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force, device=device.value, full_render=full_render)

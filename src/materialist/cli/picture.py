@@ -28,7 +28,7 @@ def chosen_region(
     scene: Any, clicks: list[str] | None, box: str | None, mask: Path | None, method: Method, device: str = "auto"
 ) -> Any:
     """[H, W] bool from the options of the command line."""
-    from materialist.edit.select import select
+    from materialist.edits.select.select import select
 
     return select(
         scene,
@@ -44,7 +44,7 @@ def chosen_inpainter(text: str | None, seed: int, device: str) -> Any:
     """What --inpaint names, or None for patches."""
     if text is None:
         return None
-    from materialist.edit.inpaint import inpainter
+    from materialist.edits.remove.inpaint import inpainter
 
     return inpainter(text, seed=seed, device=device)
 
@@ -57,7 +57,7 @@ def check_paths(spp: int) -> None:
 
 def check_video(output: Path, fps: int, force: bool, device: str) -> None:
     """Everything about a video that can be wrong, before the work starts; renderings are done on `device`."""
-    from materialist.edit.frames import ensure_video_writable
+    from materialist.edits.light.frames import ensure_video_writable
 
     if not 1 <= fps <= 120:
         raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
@@ -107,10 +107,10 @@ def write_result(
     **facts: Any,
 ) -> None:  # fmt: skip
     """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
-    from materialist.edit.composite import composite, developed
-    from materialist.edit.layers import is_relit
-    from materialist.edit.material import told_since
-    from materialist.edit.output import write_composite
+    from materialist.edits.composite.composite import composite, developed
+    from materialist.edits.composite.layers import is_relit
+    from materialist.edits.composite.output import write_composite
+    from materialist.edits.material.material import told_since
     from materialist.io.package import save_scene
 
     start = time.monotonic()
@@ -142,7 +142,7 @@ def is_unseen(picture: Any, photo: Any, *, relit: bool = False) -> bool:
     import numpy as np
 
     from materialist.color import linear_to_srgb
-    from materialist.edit.upsample import strips
+    from materialist.edits.composite.upsample import strips
 
     if np.array_equal(picture, photo):
         return True

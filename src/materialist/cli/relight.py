@@ -76,9 +76,9 @@ def relight(
     force: Force = False,
 ) -> None:
     """Show the photo under other light."""
-    from materialist.edit.relight import lamp as make_lamp
-    from materialist.edit.relight import read_envmap
-    from materialist.edit.relight import relight as change
+    from materialist.edits.light.relight import lamp as make_lamp
+    from materialist.edits.light.relight import read_envmap
+    from materialist.edits.light.relight import relight as change
     from materialist.io.package import load_scene
 
     if envmap is None and rotate is None and not sun and not lamp and (ambient, dim, frames) == (1.0, None, None):
@@ -129,9 +129,9 @@ def _video(
     scene: Any, output: Path, count: int, moving: dict[str, Any], shared: dict[str, Any], fps: int, as_json: bool,
     force: bool,
 ) -> None:  # fmt: skip
-    from materialist.edit.composite import pictures
-    from materialist.edit.frames import moving_light, write_frames
-    from materialist.edit.material import told_since
+    from materialist.edits.composite.composite import pictures
+    from materialist.edits.light.frames import moving_light, write_frames
+    from materialist.edits.material.material import told_since
 
     start = time.monotonic()
     last = scene

@@ -53,8 +53,8 @@ def remove(
     force: Force = False,
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
-    from materialist.edit.background import without
-    from materialist.edit.hole import told_shadow
+    from materialist.edits.remove.background import without
+    from materialist.edits.remove.hole import told_shadow
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force, device=device.value, full_render=full_render)

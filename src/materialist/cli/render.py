@@ -28,8 +28,8 @@ def render(
     force: Force = False,
 ) -> None:
     """Path-trace a scene package."""
-    from materialist.edit.material import PICTURED, is_pictured
-    from materialist.edit.output import write_composite
+    from materialist.edits.composite.output import write_composite
+    from materialist.edits.material.material import PICTURED, is_pictured
     from materialist.io.image import ensure_image_writable
     from materialist.io.package import load_scene
 

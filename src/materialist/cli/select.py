@@ -47,7 +47,7 @@ def select(
     """Find the mask of an object from a click, a box or a rough mask; nothing of it is random."""
     import numpy as np
 
-    from materialist.edit.upsample import matte
+    from materialist.edits.composite.upsample import matte
     from materialist.io.image import ensure_image_writable, write_image
     from materialist.io.package import load_scene
 

@@ -13,11 +13,11 @@ import mitsuba as mi
 import numpy as np
 import torch
 
+from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.fit.losses import CLIPPED, Encoding, encode
 from materialist.fit.materials import prices, pure_dielectric
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
-from materialist.render.brdf import DIELECTRIC_R0
 from materialist.render.buffers import floats, integers
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 

@@ -12,7 +12,7 @@ from materialist.geometry.boundary import BOTTOM_LEFT, BOTTOM_RIGHT, QUAD, TOP_L
 from materialist.geometry.completion import join
 from materialist.geometry.objects import Objects
 from materialist.geometry.planes import Plane
-from materialist.geometry.shell import vertex_normals
+from materialist.solids.shell import vertex_normals
 from materialist.types import Array, Mesh
 
 CLEAR = 0.002

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from materialist.geometry.symmetry import spacing
+from materialist.solids.symmetry import spacing
 from materialist.types import Array
 
 CREASE = 60.0

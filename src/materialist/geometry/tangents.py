@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from materialist.geometry.symmetry import spacing
+from materialist.solids.symmetry import spacing
 from materialist.types import Array
 
 SHARP = 0.5

@@ -251,7 +251,9 @@ def _limit_threads() -> None:
 @lru_cache(maxsize=2)
 def _register_plugins(variant: str) -> None:
     """Once for each variant: Mitsuba keeps plugins by variant."""
-    from materialist.render import bodies, bsdf, frosted
+    from materialist.bsdf import disney_plugin as bsdf
+    from materialist.bsdf import rough_dielectric as frosted
+    from materialist.render import bodies
 
     bsdf.register()
     bodies.register()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from materialist.edit.recipe import Step, read_recipe
+from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.beside import partial
 from materialist.types import Array

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.glass import check_glass
-from materialist.edit.recipe import Step, glass_arguments
+from materialist.edits.glass.glass import check_glass
+from materialist.edits.recipe import Step, glass_arguments
 from materialist.errors import InputError
 from materialist.studio import child
 from materialist.studio.glass_worker import body_key

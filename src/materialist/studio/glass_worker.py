@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.recipe import Step, apply, glass_arguments
+from materialist.edits.recipe import Step, apply, glass_arguments
 from materialist.studio.worker import sentence, teller
 from materialist.types import Array
 
@@ -81,7 +81,7 @@ class Bench:
         scene = self._loaded(request["scene"])
         region, options = glass_arguments(scene, Step("glass", request["glass"], folder))
         if key not in self._built:
-            from materialist.edit.glass_preview import GlassPreview
+            from materialist.edits.glass.preview import GlassPreview
 
             stage("build")
             edited = apply(scene, [Step(kind, given, folder) for kind, given in request["others"]])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.recipe import Step, apply
+from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.studio import glass
 from materialist.studio.ghost import glazed, with_bodies, with_pane
@@ -126,7 +126,7 @@ def _after(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 
 def _build(scene: Scene) -> Any:
-    from materialist.edit.preview import Preview
+    from materialist.edits.preview import Preview
 
     return Preview(scene)
 

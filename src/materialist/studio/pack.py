@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from materialist.edit.recipe import Step
+from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import uploads
 from materialist.studio.desk import keep, read_list, with_files

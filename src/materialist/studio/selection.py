@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edit.select import select
+from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -84,7 +84,7 @@ def sam_missing() -> str | None:
     """Why SAM 2 cannot select here, in a sentence that says what to do; None where it can. Imports nothing large."""
     from importlib.util import find_spec
 
-    from materialist.edit.sam import REPO, folder_of
+    from materialist.edits.select.sam import REPO, folder_of
     from materialist.errors import WeightsError
 
     if find_spec("transformers") is None:

@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from materialist.edit.recipe import REGION, Step, region_of, write_recipe
+from materialist.edits.recipe import REGION, Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.studio import things, views
 from materialist.studio.desk import keep, new_name, read_steps, write_mask

@@ -7,7 +7,7 @@ from pathlib import Path
 from time import time
 from typing import TYPE_CHECKING, Any
 
-from materialist.edit.recipe import Step
+from materialist.edits.recipe import Step
 from materialist.errors import MaterialistError
 from materialist.studio import glass, views
 from materialist.studio.live import LIVE

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edit.recipe import Step
+from materialist.edits.recipe import Step
 
 _WORDS = {
     "edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fallen", "remove": "Removed",

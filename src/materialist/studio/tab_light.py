@@ -73,7 +73,7 @@ def wire(context: Context) -> None:
         session = context.session(request)
         if file is None:
             return {}
-        from materialist.edit.relight import read_envmap
+        from materialist.edits.light.relight import read_envmap
 
         suffix = uploads.checked_picture(Path(file), Path(file).name)
         with uploads.called(Path(file), Path(file).name):
@@ -146,7 +146,7 @@ def _written(session: Session, name: str) -> str:
 @cache
 def _gallery() -> list[tuple[Array, str]]:
     """Small pictures of the lights, the photo's own first."""
-    from materialist.export.pictures import light
+    from materialist.exporters.pictures import light
 
     own = np.full((64, 128, 3), 225, np.uint8)
     return [(own, OWN), *((light(lights.light(name, 64)), name) for name in lights.names())]

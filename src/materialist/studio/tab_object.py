@@ -82,7 +82,7 @@ def _wire_things(context: Context, live: dict[str, Any]) -> None:
         session = context.session(request)
         if file is None:
             return {}
-        from materialist.edit.meshes import read_model
+        from materialist.edits.insert.meshes import read_model
 
         suffix = uploads.checked_mesh(Path(file), Path(file).name)
         kept = session.keep(Path(file), "mesh", suffix)

@@ -61,7 +61,7 @@ def do_invert(
 
 def _show(progress: Progress, folder: Path, name: str, value: Any) -> None:
     """Pictures of what `invert` has found so far."""
-    from materialist.export import pictures
+    from materialist.exporters import pictures
 
     if isinstance(value, Prediction):
         shown = {"first depth": pictures.nearness(value.depth), "first normals": pictures.normals(value.normal)}
@@ -77,7 +77,7 @@ def _show(progress: Progress, folder: Path, name: str, value: Any) -> None:
 
 
 def _materials(before: str, maps: Materials) -> dict[str, Array]:
-    from materialist.export import pictures
+    from materialist.exporters import pictures
 
     return {
         f"{before}albedo": display(maps.albedo),
@@ -88,9 +88,9 @@ def _materials(before: str, maps: Materials) -> dict[str, Array]:
 
 def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
-    from materialist.edit.composite import composite
-    from materialist.edit.material import told_since
-    from materialist.edit.output import write_composite
+    from materialist.edits.composite.composite import composite
+    from materialist.edits.composite.output import write_composite
+    from materialist.edits.material.material import told_since
 
     loaded, edited = _edited(progress, scene, edits)
     picture = composite(loaded, edited, spp=spp, seed=seed, progress=progress)
@@ -104,9 +104,9 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
 
 def do_mesh(progress: Progress, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
-    from materialist.export.glb import write_glb
-    from materialist.export.parts import scene_parts
-    from materialist.export.target import whole_files
+    from materialist.exporters.glb import write_glb
+    from materialist.exporters.parts import scene_parts
+    from materialist.exporters.target import whole_files
     from materialist.io.package import load_scene
 
     progress("export", 0, 1)
@@ -131,9 +131,9 @@ def do_fall(
     height: str = "1.5", seed: str = "0", frames: int = 36, spp: int = 32,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist drop`: a mesh falls onto the photo, as a video."""
-    from materialist.edit.drop import drop
-    from materialist.edit.film import filmed
-    from materialist.edit.frames import ensure_video_writable, write_frames
+    from materialist.edits.drop.drop import drop
+    from materialist.edits.light.film import filmed
+    from materialist.edits.light.frames import ensure_video_writable, write_frames
     from materialist.io.package import load_scene
 
     ensure_video_writable(output, force=True)
@@ -149,7 +149,7 @@ def do_fall(
 
 def _edited(progress: Progress, scene: str, edits: str) -> tuple[Scene, Scene]:
     """The fitted scene, and the same after the list of edits (if there is one)."""
-    from materialist.edit.recipe import apply, read_recipe
+    from materialist.edits.recipe import apply, read_recipe
     from materialist.io.package import load_scene
 
     progress("load", 0, 1)
@@ -159,7 +159,7 @@ def _edited(progress: Progress, scene: str, edits: str) -> tuple[Scene, Scene]:
 
 def _package(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
     """The edited scene as a zipped package, its photo the composite."""
-    from materialist.edit.composite import composite, developed
+    from materialist.edits.composite.composite import composite, developed
     from materialist.io.package import save_scene
 
     result = loaded
@@ -174,7 +174,7 @@ def _package(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, 
 
 def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
     """Another program's format; several files come as a zip."""
-    from materialist.export.run import FOLDERS, export
+    from materialist.exporters.run import FOLDERS, export
 
     progress("export", 0, 1)
     if output.suffix != ".zip":
@@ -188,8 +188,8 @@ def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *,
 
 def _turntable(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
     """`materialist relight --rotate 360`: the light once round, over the edits."""
-    from materialist.edit.composite import pictures
-    from materialist.edit.frames import ensure_video_writable, moving_light, write_frames
+    from materialist.edits.composite.composite import pictures
+    from materialist.edits.light.frames import ensure_video_writable, moving_light, write_frames
 
     ensure_video_writable(output, force=True)
     scenes = list(moving_light(edited, frames, turn=360.0))

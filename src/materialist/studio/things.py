@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from materialist.edit.recipe import DROP, Step
+from materialist.edits.recipe import DROP, Step
 from materialist.errors import InputError
 from materialist.studio.stack import told
 

@@ -46,7 +46,7 @@ def file_url(path: Path) -> str:
 
 def maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
-    from materialist.export import pictures
+    from materialist.exporters import pictures
 
     materials = scene.materials
     return [

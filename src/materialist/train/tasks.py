@@ -48,7 +48,7 @@ class Task(Protocol):
 
 def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
     """The sample with its picture seen through a camera: tone, noise, blur, JPEG; linear again, in [0, 1]."""
-    from materialist.train.data.photographic import photographic
+    from materialist.procedural.photographic import photographic
 
     return replace(sample, image=np.clip(photographic(sample.image, rng), 0, 1).astype(np.float32), shading=None)
 

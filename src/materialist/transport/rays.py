@@ -15,7 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.render.brdf import DIELECTRIC_R0
+from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.render.buffers import floats, integers
 from materialist.transport.cache import TransportCache, spawn
 from materialist.transport.sampling import (

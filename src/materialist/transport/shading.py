@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from materialist.render.brdf import DIELECTRIC_R0
+from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 

@@ -6,10 +6,10 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
-from materialist.geometry.symmetry import symmetric_thickness
 from materialist.predict.refraction import WEIGHTS, thickness, weights
 from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
 from materialist.predict.refraction.network import LEAST, Architecture, RefractionNet
+from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 
 SMALL = Architecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))

@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from materialist.procedural import materials as m
+from materialist.procedural.objects import solids as s
+from materialist.procedural.walls import Wall, surface
+from materialist.procedural.world import Part, Portal, World, look
 from materialist.render.envmap import half_turn, on_mitsuba_grid
-from materialist.train.data import materials as m
-from materialist.train.data import solids as s
-from materialist.train.data.walls import Wall, surface
-from materialist.train.data.world import Part, Portal, World, look
 
 X, Y, Z = np.eye(3)
 

@@ -3,23 +3,12 @@
 import numpy as np
 import pytest
 
-from materialist.bench.lights import directions
 from materialist.color import luminance
-from materialist.train.data import (
-    furniture,
-    machines,
-    materials,
-    outdoors,
-    packing,
-    rooms,
-    skies,
-    things,
-    tiles,
-    wheels,
-    workshops,
-)
-from materialist.train.data import solids as s
-from materialist.train.data.sample import balance, exposure
+from materialist.procedural import materials, outdoors, packing, rooms, skies, tiles, workshops
+from materialist.procedural.lights import directions
+from materialist.procedural.objects import furniture, machines, things, wheels
+from materialist.procedural.objects import solids as s
+from materialist.procedural.sample import balance, exposure
 
 
 def volume(solid):

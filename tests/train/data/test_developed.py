@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.train.data import packing, sample, tiles
-from materialist.train.data import solids as s
-from materialist.train.data.materials import Material
-from materialist.train.data.tracer import Tracer
-from materialist.train.data.world import Part, World, look
+from materialist.procedural import packing, sample, tiles
+from materialist.procedural.materials import Material
+from materialist.procedural.objects import solids as s
+from materialist.procedural.tracer import Tracer
+from materialist.procedural.world import Part, World, look
 from materialist.types import Camera
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.train.data.photographic import photographic, white_balanced
+from materialist.procedural.photographic import photographic, white_balanced
 
 
 def scene(seed=0):

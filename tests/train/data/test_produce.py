@@ -15,10 +15,11 @@ import pytest
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError, OutputError
-from materialist.train.data import heldout, things
-from materialist.train.data.produce import options_for, produce, read_description, sample_path
-from materialist.train.data.sample import ATTEMPTS, make_sample, make_world
-from materialist.train.data.sheet import write_sheet
+from materialist.procedural import heldout
+from materialist.procedural.objects import things
+from materialist.procedural.sample import ATTEMPTS, make_sample, make_world
+from materialist.train.produce import options_for, produce, read_description, sample_path
+from materialist.train.sheet import write_sheet
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 SIZE = 32

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.train.data import packing, tracer
-from materialist.train.data import solids as s
-from materialist.train.data.sample import labels_of
-from materialist.train.data.world import Part, World, look
+from materialist.procedural import packing, tracer
+from materialist.procedural.objects import solids as s
+from materialist.procedural.sample import labels_of
+from materialist.procedural.world import Part, World, look
 from materialist.types import Camera
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -61,7 +61,7 @@ def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     image, shading = traced(world, spp=100)
     theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
     wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    from materialist.render.brdf import diffuse_coefficients, specular_split
+    from materialist.bsdf.disney import diffuse_coefficients, specular_split
 
     up = np.array([0.0, 0.0, 1.0])
     c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])
@@ -161,9 +161,9 @@ def test_sizes_that_do_not_fill_vectors_are_refused():
 def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
     from types import SimpleNamespace
 
-    from materialist.train.data.sample import things_of
-    from materialist.train.data.things import one_thing, placed
-    from materialist.train.data.world import Part
+    from materialist.procedural.objects.things import one_thing, placed
+    from materialist.procedural.sample import things_of
+    from materialist.procedural.world import Part
 
     solid, _ = SimpleNamespace(), None
     floor = Part(solid, None)

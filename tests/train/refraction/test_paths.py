@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.bench import shapes
-from materialist.train.data import solids
+from materialist.procedural.objects import shapes, solids
 from materialist.train.refraction.paths import Tracer
 
 RADIUS = 0.5

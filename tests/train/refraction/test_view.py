@@ -7,7 +7,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
-from materialist.train.data import solids
+from materialist.procedural.objects import solids
 from materialist.train.refraction import lessons, view
 from materialist.train.refraction.glassware import Shape, shape
 from materialist.train.refraction.paths import Tracer

@@ -15,12 +15,12 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
-from materialist.geometry.front import of_one_surface, smooth_front
-from materialist.geometry.half_turn import half_turn
-from materialist.geometry.lathe import lathed
-from materialist.geometry.outline import outlined
-from materialist.geometry.symmetry import surface_in, symmetric_thickness
 from materialist.predict.refraction.thickness import Thickness, thickness
+from materialist.solids.front import of_one_surface, smooth_front
+from materialist.solids.half_turn import half_turn
+from materialist.solids.lathe import lathed
+from materialist.solids.outline import outlined
+from materialist.solids.symmetry import surface_in, symmetric_thickness
 from materialist.types import Array, Camera
 
 CERTAIN = 0.02

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.geometry.symmetry import border_distance, mirrored, object_size, spacing
+from materialist.solids.symmetry import border_distance, mirrored, object_size, spacing
 from materialist.types import Array
 
 SIDE = 64

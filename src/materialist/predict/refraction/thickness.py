@@ -11,9 +11,9 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
-from materialist.geometry.lathe import Lathed
-from materialist.geometry.symmetry import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
+from materialist.solids.lathe import Lathed
+from materialist.solids.symmetry import surface_in
 from materialist.types import Array, Camera
 
 if TYPE_CHECKING:

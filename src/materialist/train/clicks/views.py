@@ -14,7 +14,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
 from materialist.predict.clicks.features import features
 from materialist.predict.weights import sha256
-from materialist.train.data.produce import identity
+from materialist.train.produce import identity
 from materialist.train.samples import SampleFolder, read_arrays, read_sample, write_arrays
 from materialist.types import Array
 
@@ -60,7 +60,7 @@ def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> i
     set, OutputError for one that cannot be written.
     """
     from materialist.predict.bundled.predictor import BundledPredictor
-    from materialist.train.data.photographic import photographic
+    from materialist.procedural.photographic import photographic
     from materialist.types import Camera, Photo
 
     source = SampleFolder(data)

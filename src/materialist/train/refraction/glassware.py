@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.bench import shapes
-from materialist.bench.shapes import Solid
-from materialist.train.data import solids
+from materialist.procedural.objects import shapes, solids
+from materialist.procedural.objects.shapes import Solid
 from materialist.train.refraction.grown import creature
 from materialist.types import Array
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from materialist.bench.shapes import Solid
-from materialist.train.data import solids
+from materialist.procedural.objects import solids
+from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
 POINTS = 60

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.bench.shapes import Solid
+from materialist.procedural.objects.shapes import Solid
 from materialist.render.buffers import floats, integers
 from materialist.types import Array
 

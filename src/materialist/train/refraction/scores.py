@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
-from materialist.train.data.things import mesh
+from materialist.procedural.objects.things import mesh
 from materialist.train.refraction.glassware import Shape, centred
 from materialist.train.refraction.paths import Tracer
 from materialist.train.refraction.view import lesson

@@ -1,0 +1,1 @@
+"""Many photos: scenes and edited photos by several workers, resumable."""

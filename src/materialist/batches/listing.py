@@ -1,0 +1,112 @@
+"""Which photos a batch is about: a folder, a list file, one photo, or a URL."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from materialist.batches.ledger import LEDGER
+from materialist.batches.remote import is_url, list_url, shown
+from materialist.errors import InputError
+from materialist.io.decode import FORMATS
+from materialist.io.examples import PREFIX
+from materialist.io.raw import RAW_SUFFIXES
+from materialist.io.target import MARKER
+
+SUFFIXES = RAW_SUFFIXES | frozenset(
+    (".png", ".jpg", ".jpeg", ".heic", ".heif", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".bmp", ".avif", ".mpo")
+)
+"""File names that a folder's photos are told by; a list may name others."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A photo of a batch."""
+
+    id: str
+    """Path below the folder, line of the list, or URL without secrets: the same wherever the folder lies."""
+    location: str
+    """Where it is read from."""
+
+
+def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
+    """The photos of SOURCE, sorted by name, each once.
+
+    SOURCE is a folder (searched with its subfolders; hidden files, scene packages and the results of batches are
+    passed over), a text file with a photo or URL on each line (relative to the file; # begins a comment, behind a name
+    only after a space), a single photo, or a URL of a folder, a pattern or a photo that fsspec can read. RUNS is passed
+    over in any case.
+
+    Raises InputError where there is nothing to do, SetupError where a URL needs a library that is not installed.
+    """
+    text = str(source)
+    if is_url(text):
+        found = [Listed(shown(url), url) for url in list_url(text, SUFFIXES)]
+    elif text.startswith(PREFIX) or (Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()):
+        found = [_named(text, Path())]
+    elif Path(text).is_dir():
+        found = _of_folder(Path(text), Path(runs))
+    elif Path(text).is_file():
+        found = _of_list(Path(text))
+    else:
+        raise InputError(f"There is no folder or list of photos at {text}.")
+    if not found:
+        raise InputError(f"{shown(text)} holds no photo; it may hold {FORMATS}.")
+    return sorted({photo.id: photo for photo in found}.values(), key=lambda photo: photo.id)
+
+
+def _of_folder(folder: Path, runs: Path) -> list[Listed]:
+    found = []
+    own = os.path.realpath(runs)
+    if os.path.realpath(folder) == own:
+        raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
+    try:
+        seen = set[str]()
+        for place, below, files in os.walk(folder, onerror=_raise, followlinks=True):
+            real = os.path.realpath(place)
+            if MARKER in files or LEDGER in files or real == own or real in seen:
+                below.clear()
+                continue
+            seen.add(real)
+            below[:] = sorted(name for name in below if not name.startswith("."))
+            for name in files:
+                if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:
+                    path = Path(place) / name
+                    found.append(Listed(_printable(path.relative_to(folder).as_posix()), os.path.abspath(path)))
+    except OSError as error:
+        raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
+    return found
+
+
+def _printable(text: str) -> str:
+    """A path whose bytes are no UTF-8 can be opened but not written into a table: those bytes as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def _raise(error: OSError) -> None:
+    raise error
+
+
+def _of_list(file: Path) -> list[Listed]:
+    try:
+        lines = file.read_text("utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
+    entries = [_entry(line.strip(), file.parent) for line in lines]
+    return [_named(entry, file.parent) for entry in entries if entry]
+
+
+def _entry(line: str, folder: Path) -> str:
+    """A line without its comment. A photo whose name goes on after " #" is one all the same."""
+    name = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].rstrip()
+    return line if name and name != line and os.path.isfile(folder / line) else name
+
+
+def _named(entry: str, folder: Path) -> Listed:
+    if is_url(entry):
+        return Listed(shown(entry), entry)
+    if entry.startswith(PREFIX):
+        return Listed(entry, entry)
+    return Listed(entry, os.path.abspath(folder / entry))

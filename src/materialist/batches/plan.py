@@ -1,0 +1,121 @@
+"""What a batch has to do: which photos are finished, which begun, under which names and options."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from materialist.batches.edits import edits_key
+from materialist.batches.job import INVERSION, Job
+from materialist.batches.ledger import Ledger
+from materialist.batches.listing import Listed
+from materialist.batches.names import unique_names
+from materialist.batches.packages import file_hash, whole_size
+from materialist.batches.remote import is_url, version
+from materialist.errors import InputError, MaterialistError
+from materialist.io.decoded import MIN_SIDE
+from materialist.pipeline import check_overrides
+from materialist.predict.base import CHOICES
+
+LARGEST = 8192
+"""Longer side of the working image, as `invert` takes it."""
+
+
+def check_options(options: dict[str, Any]) -> None:
+    """Refuse, before any photo is touched, what would fail every photo in the same way. Raises InputError."""
+    check_overrides(options)
+    size, fov, seed = options["size"], options["fov"], options["seed"]
+    if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= LARGEST:
+        raise InputError(
+            f"The working size must be a whole number of pixels from {MIN_SIDE} to {LARGEST}, not {size!r}."
+        )
+    try:
+        angle_fits = fov in ("auto", None) or 1 < float(fov) < 170
+    except (TypeError, ValueError):
+        angle_fits = False
+    if not angle_fits:
+        raise InputError(f"The field of view must be between 1 and 170 degrees (or auto), not {fov}.")
+    if not isinstance(seed, int) or seed < 0:
+        raise InputError(f"Seed is {seed}; give 0 or more.")
+    known = {choice.partition("[")[0].partition(":")[0] for choice in CHOICES.split(", ")}
+    for part in ("predictor", "albedo", "roughness", "metallic", "normal", "depth"):
+        spec = options.get(part)
+        if spec is not None and str(spec).partition(":")[0] not in known:
+            raise InputError(f"There is no predictor '{spec}'; choose one of {CHOICES}.")
+    try:
+        json.dumps(options)
+    except TypeError as error:
+        raise InputError(
+            f"The options of a batch are written down, so they must be texts and numbers: {error}."
+        ) from error
+
+
+def plan(
+    photos: Iterable[Listed], ledger: Ledger, runs: Path, options: dict[str, Any], *, edits: Path | None = None,
+    spp: int = 256, function: str = INVERSION,
+) -> tuple[list[Job], list[str]]:  # fmt: skip
+    """Jobs for what is not finished, and ids of what is.
+
+    A photo is finished when the ledger says so with the same options, the photo (by hash) and the edits are what they
+    were, and the results are whole. Where only the edit is missing or another, the job keeps the scene.
+    """
+    photos = list(photos)
+    names = unique_names([photo.id for photo in photos], ledger.names)
+    recipe = str(edits.resolve()) if edits is not None else None
+
+    def look(photo: Listed) -> tuple[Job, bool]:
+        job = Job(
+            photo.id, names[photo.id], photo.location, str(runs.resolve()), options, recipe, spp,
+            function=function,
+        )  # fmt: skip
+        entry = ledger.last.get(photo.id, {})
+        if entry.get("key") != ledger.key or not _inverted(entry, job):
+            return job, False
+        return replace(job, inverted=True), _edited(entry, job)
+
+    jobs, finished = [], []
+    with ThreadPoolExecutor(8) as threads:  # reading and hashing: the disk's time, not the interpreter's
+        for job, whole in threads.map(look, photos):
+            if whole:
+                finished.append(job.id)
+            else:
+                jobs.append(job)
+    return jobs, finished
+
+
+def fingerprint(location: str) -> str | None:
+    """What tells a photo from another at the same place: the hash of its bytes, or what a remote store says of it."""
+    from materialist.io.examples import PREFIX, example_path
+
+    try:
+        if is_url(location):
+            return version(location)
+        return file_hash(example_path(location) if location.startswith(PREFIX) else location)
+    except (OSError, MaterialistError):
+        return None
+
+
+def _inverted(entry: dict[str, Any], job: Job) -> bool:
+    """Whether the scene of the ledger's last word on a photo is there, whole, and of the photo as it is now."""
+    size = entry.get("scene_bytes")
+    if not size or size != whole_size(job.scene):
+        return False
+    known = entry.get("photo_version") if is_url(job.location) else entry.get("photo_hash")
+    return known is not None and known == fingerprint(job.location)
+
+
+def _edited(entry: dict[str, Any], job: Job) -> bool:
+    """Whether nothing is to be edited, or the edited photo is there and of the same edits."""
+    if entry.get("event") != "done":
+        return False
+    if job.edits is None:
+        return True
+    try:
+        same = entry.get("edits") == edits_key(job.edits, job.name, job.spp)
+        return same and entry.get("picture_hash") == file_hash(job.picture)
+    except OSError:
+        return False

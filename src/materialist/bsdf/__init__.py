@@ -1,0 +1,1 @@
+"""The paper's Disney BRDF and dielectric interfaces: numpy references and Mitsuba plugins."""

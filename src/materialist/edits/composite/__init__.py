@@ -1,0 +1,1 @@
+"""Bringing an edited rendering back into the photo."""

@@ -1,0 +1,231 @@
+"""The base and the edited picture, rendered with the same random numbers, and what truly differs between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from materialist.edits.composite.sparing import FEWEST, Begun, spared
+from materialist.edits.glass.fireflies import without_fireflies
+from materialist.edits.insert.portrait import Portrait
+from materialist.errors import InputError
+from materialist.types import Array, Scene
+
+FAR = 1e3
+"""Beyond any logarithm: pixels that are not asked."""
+DARKEST = 0.02
+"""Added to albedo before its logarithm is taken."""
+PATTERNED, AT_RIM = (0.3, 0.8), 2
+"""Contrast of albedo (logarithms) within so many pixels: none of a pattern, and certainly of one."""
+Render = Callable[[int, int], Array]
+"""render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Two renderings at working size and their cleaned difference."""
+
+    base: Array
+    """[H, W, 3] float32 linear: the fitted scene."""
+    edited: Array
+    """[H, W, 3] float32 linear: the edited scene; exactly `base` where the edit does not reach."""
+    reached: Array
+    """[H, W] bool: pixels that the edit changes by more than the noise."""
+    changed: Array
+    """[H, W] bool: pixels whose own surface, or what stands there, the edit replaced; part of `reached`."""
+    raw: Array
+    """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
+    relit: bool = False
+    """Whether the light is another one."""
+    portrait: Portrait | None = None
+    """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
+    covered: Array | None = None
+    """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
+    replaced: Array | None = None
+    """[H, W] bool: pixels that show another surface, other materials, or the sky of another light; None for not
+    known."""
+    held: Array | None = None
+    """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
+
+
+def render_layers(
+    studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, sparing: bool = False, progress=None
+) -> Layers:
+    """Render a fitted scene (`lights.Studio`) and an edit of it, and separate the edit from the noise.
+
+    `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
+    noise. See `difference`. With `sparing` pixels whose difference has little noise get a quarter of the paths (see
+    `sparing`); for the one edit of a scene, since the base picture then fits no other.
+    """
+    scene = studio.scene
+    base, other = studio.twins(edited)
+    replaced, relit = replaced_pixels(scene, edited), is_relit(scene, edited)
+    changed = replaced | relit  # another light changes every pixel
+    begun = studio.begun(edited) if sparing and spp >= FEWEST and not relit else None
+    guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
+    alone, covered = None, None
+    if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
+        alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
+        covered = anything = studio.covered(edited)
+        if alone is not None:
+            covered = anything & (alone.inside == 0)
+        changed, replaced = changed | covered, replaced | anything
+        if clean and anything.any():
+            albedo, normal = studio.body_guides(edited, anything)
+            guides = (guides[0], albedo, guides[2], normal)
+    layers = difference(
+        base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress,
+        focused=focused(edited),
+    )  # fmt: skip
+    if relit:
+        replaced = replaced | (edited.depth == 0)
+    held = texture_held(scene.materials.albedo, edited.materials.albedo)
+    return replace(layers, relit=relit, portrait=alone, covered=covered, replaced=replaced, held=held)
+
+
+def texture_held(albedo: Array, edited: Array) -> Array:
+    """[H, W] float32 in [0, 1]: the part of the contrast of an albedo [H, W, 3] that is left where an edit changes it.
+
+    What the photo has there beyond the fit is the rim of a pattern, which goes with it. 1 where there was none.
+    """
+    own = (albedo != edited).any(-1)
+    held = np.ones(own.shape, np.float32)
+    if not own.any():
+        return held
+    box = tuple(slice(v.min(), v.max() + 1) for v in (np.flatnonzero(own.any(1)), np.flatnonzero(own.any(0))))
+    albedo, edited, own = albedo[box], edited[box], own[box]
+    level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
+    before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, level * edited))
+    patterned = np.clip((before - PATTERNED[0]) / (PATTERNED[1] - PATTERNED[0]), 0, 1)
+    left = np.clip(after / np.maximum(before, 1e-6), 0, 1)
+    held[box] = np.where(own, 1 - patterned * (1 - left), 1)
+    return held
+
+
+def _contrast(values: Array, own: Array) -> Array:
+    """[H, W] largest difference of values [H, W] nearby, among the pixels `own` [H, W] bool."""
+    import cv2
+
+    window = np.ones((2 * AT_RIM + 1,) * 2, np.uint8)
+    high, low = (np.where(own, values, far).astype(np.float32) for far in (-FAR, FAR))
+    return np.maximum(np.asarray(cv2.dilate(high, window)) - np.asarray(cv2.erode(low, window)), 0)
+
+
+def focused(scene: Scene) -> bool:
+    """Whether small lights of the scene's own stand beside glass, through which no path can aim at them."""
+    from materialist.render.bodies import is_glowing, is_transparent
+
+    lit = bool(scene.lamps) or any(is_glowing(body.surface) for body in scene.bodies)
+    return lit and any(is_transparent(body.surface) for body in scene.bodies)
+
+
+def is_relit(scene: Scene, edited: Scene) -> bool:
+    """Whether the two scenes have different light."""
+    glowing = [[body for body in s.bodies if max(body.surface.emission) > 0] for s in (scene, edited)]
+    return (
+        scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
+    )  # fmt: skip
+
+
+def changed_pixels(scene: Scene, edited: Scene) -> Array:
+    """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
+    return replaced_pixels(scene, edited) | is_relit(scene, edited)
+
+
+def replaced_pixels(scene: Scene, edited: Scene) -> Array:
+    """[H, W] bool: where the maps or the depth of the two scenes differ, whatever their light."""
+    a, b = scene.materials, edited.materials
+    changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
+    # Where a surface was taken away, what stands behind it is seen, but for what a body hides before and after.
+    changed = (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
+    if changed.any() and scene.bodies and scene.bodies == edited.bodies[: len(scene.bodies)]:
+        from materialist.edits.select.region import placed
+
+        changed &= placed(scene) < 1
+    return changed
+
+
+def difference(
+    base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
+    clean: bool = True, begun: tuple[Begun, Begun] | None = None, progress=None, focused: bool = False,
+) -> Layers:  # fmt: skip
+    """Layers of any two renderings of one view.
+
+    Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
+    the difference counts where its mean over a neighbourhood stands out from what two half renderings disagree on
+    (a shrinkage by the estimated noise, as of Wiener), and is exactly zero where no path differs.
+
+    Args:
+        changed: [H, W] bool: pixels that the edit replaces.
+        guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
+            another one, of the edited scene.
+        clean: denoise both pictures before they are compared, where the denoiser is installed.
+        begun: the same two renderings in shares, to trace all paths only where noise would be seen.
+        focused: whether small lights stand beside glass, so that lone bright pixels are what lights the rest.
+    """
+    if spp < 2:
+        raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
+    tick = progress or (lambda *_: None)
+    if begun is not None:
+        halves = spared(begun, changed, spp=spp, seed=seed, tick=tick)[0]
+    else:
+        halves = []
+        for k in range(2):
+            pair = []
+            for j, render in enumerate((base, edited)):
+                tick("render", 2 * k + j, 4)
+                pair.append(render(-(-spp // 2), 2 * seed + k))
+            halves.append(pair)
+    tick("render", 4, 4)
+    (b0, e0), (b1, e1) = halves
+    b, e = (b0 + b1) / 2, (e0 + e1) / 2
+    differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
+    raw = e
+    if not differs.any():
+        return Layers(b, b, differs, changed & differs, raw)
+    gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
+    if clean:
+        b, e = denoised(b, without_fireflies(e, changed, spread=focused), guides)
+    reached = differs & (gain > 0)
+    e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
+    return Layers(b, e, reached, changed & reached, raw)
+
+
+def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) -> Array:
+    """[H, W] in [0, 1]: how far the mean of a difference over a window stands out from its noise.
+
+    d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
+    window and s its standard error, from (d0 - d1) / 2, the gain is max(0, 1 - (sigmas s / m)^2), the positive part
+    of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise. It is the larger one of the sum of
+    the channels, where a change is seen first, and of the three together, among which another hue cancels in the sum.
+    """
+    import cv2
+
+    box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (window, window), borderType=cv2.BORDER_REFLECT)  # noqa: E731
+    gain = np.zeros(d0.shape[:2])
+    for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
+        m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
+        for k in range(first.shape[-1]):
+            m2 += box((first[..., k] + second[..., k]) / 2) ** 2
+            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / window**2
+        gain = np.maximum(gain, 1 - sigmas**2 * variance / np.maximum(m2, 1e-30))
+    return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
+
+
+def denoised(base: Array, edited: Array, guides: tuple[Array, ...]) -> tuple[Array, Array]:
+    """Both pictures [H, W, 3] without noise; as they are where the denoiser is not installed.
+
+    guides: [H, W, 3] each, as for `difference`.
+    """
+    from materialist.errors import SetupError
+    from materialist.render.denoise import denoise
+
+    try:
+        return (
+            denoise(base, albedo=guides[0], normal=guides[2]),
+            denoise(edited, albedo=guides[1], normal=guides[-1]),
+        )
+    except SetupError:
+        return base, edited

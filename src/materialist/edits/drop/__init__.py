@@ -1,0 +1,1 @@
+"""Rigid bodies that fall onto the photographed scene."""

@@ -1,0 +1,280 @@
+"""Meshes that fall onto the photographed scene (paper, Physical Simulation)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.edits.drop.convex import convex_pieces, hull
+from materialist.edits.drop.drop_ground import Surroundings, blocks_of, middle
+from materialist.edits.drop.physics import Pose, Thing, fall, load
+from materialist.edits.insert.insert import moved, put, surface_points
+from materialist.edits.insert.meshes import Model, read_model, repainted
+from materialist.edits.insert.support import Support
+from materialist.edits.light.frames import MAX_FRAMES
+from materialist.edits.material.material import noted, warned
+from materialist.errors import InputError
+from materialist.types import Array, Body, Scene
+
+METRES = 0.2
+"""Longest side of a thing in the simulation: how fast it seems to fall tells its size."""
+UPRIGHT = 0.5
+"""Cosine to the camera's up from which a plane can be a floor or a table top."""
+
+
+@dataclass(frozen=True)
+class Release:
+    """How things are let go of. Raises InputError for a number out of its range."""
+
+    height: float = 1.5
+    """Of the lowest one over the ground, in multiples of its longest side, 0 to 100."""
+    spin: float = 0.3
+    """Turns a second about an axis that `seed` chooses, -20 to 20."""
+    scale: float = 1.0
+    """As in `insert`; so are `material` and `up`."""
+    material: str = "as-is"
+    gravity: tuple[float, float, float] | None = None
+    """Direction in the camera frame; None chooses as `drop` says."""
+    metres: float = METRES
+    """What the longest side is taken for, 0.001 to 100."""
+    seed: int = 0
+    up: str = "auto"
+
+    def __post_init__(self) -> None:
+        _check("height", self.height, 0, 100)
+        _check("spin", self.spin, -20, 20)
+        _check("metres", self.metres, 1e-3, 100)
+
+
+def drop(
+    scene: Scene,
+    meshes: str | Path | Model | Sequence[str | Path | Model],
+    at: tuple[float, float] | Sequence[tuple[float, float]],
+    *,
+    frames: int = 48,
+    fps: float = 24.0,
+    height: float = Release.height,
+    spin: float = Release.spin,
+    scale: float = Release.scale,
+    material: str = Release.material,
+    gravity: tuple[float, float, float] | None = Release.gravity,
+    metres: float = Release.metres,
+    seed: int = Release.seed,
+    up: str = Release.up,
+) -> list[Scene]:
+    """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
+
+    The visible surface and the planes that continue it are the ground; bodies that are in the scene already count as
+    part of it. Things are rigid, of one density, and collide as a few convex pieces each.
+
+    Args:
+        meshes: files, or what `meshes.read_model` made of them.
+        at: (x, y) at working size above which all fall, one over the other, or a place for each.
+        frames, fps: length of the film in frames, 2 to 3600, and frames a second.
+        height: of the lowest one over the ground, in multiples of its longest side.
+        spin: turns a second about an axis that `seed` chooses.
+        scale, material, up: as in `insert`.
+        gravity: direction in the camera frame; by default against the normal of the ground under the first place if it
+            can be a floor, of the largest plane that can, or the camera's -Y.
+        metres: what the longest side is taken for; small things fall fast.
+
+    Raises:
+        InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
+            missing.
+    """
+    if not 2 <= frames <= MAX_FRAMES:
+        raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
+    _check("frame rate", fps, 1, 240)
+    release = Release(height, spin, scale, material, gravity, metres, seed, up)
+    falling = prepared(scene, meshes, at, release)
+    film, last = [], scene
+    poses: list[Pose] | None = None
+    for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
+        if poses is None or moves(poses, frame, metres):
+            last, poses = falling.at(frame), frame
+        film.append(last)
+    return film
+
+
+@dataclass(frozen=True)
+class Falling:
+    """Things over a scene, before they fall."""
+
+    scene: Scene
+    things: list[Thing]
+    ground: list[Array]
+    """Convex blocks [n, 3], metres, z up."""
+    starts: list[tuple[tuple[Body, ...], Array]]
+    """For each thing its bodies as they would stand, camera frame, and the shift [3] (metres, z up) that lifts it."""
+    to_up: Array
+    """[3, 3] from the camera frame to the simulation's."""
+    factor: float
+    """Metres a scene unit."""
+    notes: tuple[str, ...]
+    what: dict[str, Any]
+    """For the provenance."""
+
+    def at(self, poses: list[Pose], notes: tuple[str, ...] = (), gone: frozenset[int] = frozenset()) -> Scene:
+        """The scene with the things in these poses, without those of the numbers `gone`."""
+        placed = tuple(
+            _posed(body, self.to_up, self.factor, shift, thing, pose)
+            for k, ((bodies, shift), thing, pose) in enumerate(zip(self.starts, self.things, poses))
+            for body in bodies
+            if k not in gone
+        )
+        dropped = replace(self.scene, bodies=(*self.scene.bodies, *placed))
+        return noted(warned(dropped, *self.notes, *notes), "drop", self.what)
+
+
+def prepared(
+    scene: Scene,
+    meshes: str | Path | Model | Sequence[str | Path | Model],
+    at: tuple[float, float] | Sequence[tuple[float, float]],
+    release: Release,
+) -> Falling:
+    """Meshes over the place where they will fall; see `drop`."""
+    load()
+    meshes = [meshes] if isinstance(meshes, str | Path | Model) else meshes
+    models = [repainted(m if isinstance(m, Model) else read_model(m, up=release.up), release.material) for m in meshes]
+    if not models:
+        raise InputError("Nothing falls; give at least one mesh.")
+    places = _places(at, len(models))
+    stood = [put(scene, model, place, scale=release.scale) for model, place in zip(models, places)]
+    direction = down(scene, stood[0][1], release.gravity)
+    to_up = upright(direction)
+    factor = release.metres / max(longest for *_, longest in stood)
+    around = Surroundings.of(scene, to_up, factor)
+    points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
+    names = [f"{model.name} at {place[0]:g},{place[1]:g}" for model, place in zip(models, places)]
+    shifts, tops, moved_aside = _starts(around, points, release, names)
+    field = around.ground([middle(p) for p in points], tops, release.metres)
+    starts = [(bodies, shift) for (bodies, *_), shift in zip(stood, shifts)]
+    things = _things(starts, to_up, factor, release)
+    ground = [hull(block) for block in blocks_of(field, release.metres)]
+    what: dict[str, Any] = {
+        "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
+        **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
+        "gravity": [round(float(v), 6) for v in direction],
+    }  # fmt: skip
+    notes = (*(note for model in models for note in model.warnings), *moved_aside)
+    return Falling(scene, things, ground, starts, to_up, factor, notes, what)
+
+
+def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | None) -> Array:
+    """[3] unit direction of gravity, camera frame; see `drop`. Raises InputError for a direction of no length."""
+    if gravity is not None:
+        direction = np.asarray(gravity, np.float64)
+        if direction.shape != (3,) or not np.isfinite(direction).all() or not np.linalg.norm(direction) > 0:
+            raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
+        return direction / np.linalg.norm(direction)
+    if support.normal[1] > UPRIGHT:
+        return -support.normal
+    from materialist.edits.insert.support import support_at
+
+    for label in range(int(scene.geometry.plane_label.max(initial=-1)) + 1):
+        rows, columns = np.nonzero(scene.geometry.plane_label == label)
+        if len(rows):
+            middle = len(rows) // 2
+            plane = support_at(scene, (float(columns[middle]), float(rows[middle])))
+            if plane.normal[1] > UPRIGHT:
+                return -plane.normal
+    return np.array([0.0, -1.0, 0.0])
+
+
+def upright(direction: Array) -> Array:
+    """[3, 3] rotation from the camera frame to one whose z axis is against gravity."""
+    z = -direction
+    x = np.cross([0.0, 0.0, 1.0], z) if abs(z[2]) < 0.9 else np.cross([0.0, 1.0, 0.0], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
+def _check(name: str, value: float, low: float, high: float) -> None:
+    if not (np.isfinite(value) and low <= value <= high):
+        raise InputError(f"The {name} is {value:g}; it must lie in [{low:g}, {high:g}].")
+
+
+def _places(at: Any, count: int) -> list[tuple[float, float]]:
+    """A place for each mesh."""
+    several = bool(np.ndim(at[0])) if len(at) else False
+    places = [tuple(place) for place in at] if several else [tuple(at)] * count
+    if len(places) == 1:
+        places = places * count
+    if len(places) != count:
+        raise InputError(f"There are {len(places)} places for {count} meshes; give one, or as many.")
+    return places
+
+
+def _starts(
+    around: Surroundings, points: list[Array], release: Release, names: list[str]
+) -> tuple[list[Array], list[float], list[str]]:
+    """For each thing the shift [3] to where it starts, and the z from which its ground is seen; and notes.
+
+    points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene.
+    Raises InputError where it cannot.
+    """
+    boxes: list[tuple[Array, Array]] = []
+    shifts, tops, notes = [], [], []
+    for own, name in zip(points, names):
+        low, high = own.min(0), own.max(0)
+        least = 0.0
+        for other_low, other_high in boxes:
+            if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
+                least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
+        lift = max(least, release.height * release.metres)
+        found = around.start(own, lift, least, release.metres, boxes)
+        if found is None:
+            raise InputError(
+                f"There is no room for {name}: it would start inside of something; choose another place, or a larger "
+                "height."
+            )
+        shift, top = found
+        if shift[:2].any():
+            share = float(np.hypot(*shift[:2])) / release.metres
+            notes.append(f"{name} starts {share:.2g} of its size to the side: something stands in its way.")
+        boxes.append((low + shift, high + shift))
+        shifts.append(shift)
+        tops.append(top)
+    return shifts, tops, notes
+
+
+def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, release: Release) -> list[Thing]:
+    """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
+    rng = np.random.default_rng(release.seed)
+    things = []
+    for bodies, shift in starts:
+        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
+        centre = (points.min(0) + points.max(0)) / 2
+        axis = rng.normal(size=3)
+        turning = 2 * np.pi * release.spin * axis / np.linalg.norm(axis)
+        pieces = _pieces(bodies, to_up, factor, shift, release.seed)
+        things.append(Thing(tuple(piece - centre for piece in pieces), centre, turning))
+    return things
+
+
+def _pieces(bodies: tuple[Body, ...], to_up: Array, factor: float, shift: Array, seed: int) -> list[Array]:
+    """Convex pieces [n, 3] of a thing, metres, z up."""
+    corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
+    faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
+    vertices = np.concatenate([body.vertices for body in bodies]).astype(np.float64) @ to_up.T * factor + shift
+    return convex_pieces(vertices, faces, seed=seed)
+
+
+def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, pose: Pose) -> Body:
+    """The body of the camera frame where the thing is now."""
+    turn = to_up.T @ pose.turn @ to_up
+    # In metres, z up: x -> R (x + shift - first centre) + centre.
+    move = (pose.turn @ (shift - thing.centre) + pose.centre) / factor @ to_up
+    return moved(body, turn, move)
+
+
+def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
+    """Whether anything has moved by more than a thousandth of a turn or of its size."""
+    return any(
+        np.abs(a.centre - b.centre).max() > 1e-3 * metres or np.abs(a.turn - b.turn).max() > 2e-3
+        for a, b in zip(before, now)
+    )

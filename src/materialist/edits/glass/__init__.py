@@ -1,0 +1,1 @@
+"""Turning an object to glass: closed proxy or the paper's two interfaces."""

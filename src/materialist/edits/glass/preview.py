@@ -1,0 +1,181 @@
+"""Glass while a slider moves: what does not change is made once, and only the pixels of the object are traced."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from materialist.edits.composite.layers import focused
+from materialist.edits.glass.fireflies import without_fireflies
+from materialist.edits.glass.glass import glass, glass_surface
+from materialist.edits.light.lights import add_lamps
+from materialist.errors import InputError
+from materialist.types import Array, Scene, Surface
+
+PATHS = 600_000
+"""Paths of one picture: with more pixels than they allow, fewer pixels are traced and the picture is enlarged."""
+FEWEST = 4
+"""Paths a traced pixel."""
+SKY = 0.25
+"""Share of them that each of the two pictures has by which the photo's sky comes into the glass."""
+MARGIN = 2
+"""Working pixels around the object that are traced as well."""
+
+
+class GlassPreview:
+    """An object of a fitted scene as glass, again and again with other glass.
+
+    The background, the closed body and the ray tracer's scene are made when it is built (seconds); a picture then takes
+    the paths inside the object's rectangle alone. Its shadow and caustics on the surroundings, which `composite` adds,
+    are not shown: around the object stands the photo with the object gone.
+
+    Args:
+        scene, mask, options: as for `glass.glass`; options that change the body or the background (`thickness`,
+            `hollow`, `background`, ...). `model` must be `closed`.
+
+    Raises:
+        InputError: as `glass.glass`, and for another model.
+    """
+
+    def __init__(self, scene: Scene, mask: Array, *, device: str = "auto", **options: Any):
+        from materialist.edits.glass.sky import sky_maps
+        from materialist.render.variant import setup
+
+        if options.get("model", "closed") != "closed":
+            raise InputError(f"The preview traces the closed body; model is '{options['model']}', leave it 'closed'.")
+        setup(device)
+        self.scene, self._device = scene, device
+        # The glass itself is exchanged for every picture.
+        self._edited = glass(scene, mask, **{**options, "ior": 1.5, "transmission": 1.0})
+        self._targets: dict[str, tuple[Any, Any]] = {}
+        as_photographed = np.array_equal((options.get("fitted") or scene).envmap, scene.envmap)
+        self._sky = sky_maps(self._edited) if as_photographed else None
+        self._name = f"body{len(self._edited.bodies) - 1}"
+        self._look()
+
+    def picture(
+        self, *, ior: float = 1.5, transmission: float = 1.0, tint: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        roughness: float = 0.0, spp: int = 16, seed: int = 0,
+    ) -> Array:  # fmt: skip
+        """[H, W, 3] float32 linear at working size: the photo with the object as this glass; values as for `glass`.
+
+        `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS.
+        """
+        from materialist.edits.glass.glass import check_glass
+        from materialist.edits.glass.sky import traced
+        from materialist.edits.insert.portrait import denoised, spread
+        from materialist.render.portrait import radiance
+        from materialist.render.scene import GLASS_DEPTH
+
+        check_glass(ior, transmission, tint, roughness)
+        if spp < 1:
+            raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
+        surface = glass_surface(self.scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
+        size, box = self._size(spp)
+        target = self._dressed(surface)
+        paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
+        options: dict[str, Any] = {"seed": seed, "max_depth": GLASS_DEPTH, "names": [self._name]}
+
+        def trace(share: float) -> Array:
+            return radiance(target, size, box, spp=max(1, round(share * paths)), **options)
+
+        seen = traced(trace, target, self._edited, self._sky, share=SKY)
+        return self._in_photo(
+            denoised(without_fireflies(spread(seen), spread=focused(self._edited)), self._guides[size]), surface
+        )
+
+    @property
+    def edited(self) -> Scene:
+        """The scene that is traced, as `glass.glass` gives it, with clear glass of index 1.5."""
+        return self._edited
+
+    @property
+    def share(self) -> Array:
+        """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
+        return self._share
+
+    @property
+    def filled(self) -> Array:
+        """[H, W] bool: where a picture is not the photo, for the object stood there and the glass does not."""
+        return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
+
+    def _look(self) -> None:
+        """What of the body is seen where, at the sizes that pictures are traced at."""
+        camera = self.scene.camera
+        working = (camera.height, camera.width)
+        share = self._sight(working, (0, working[0], 0, working[1])).share
+        rows, columns = np.flatnonzero(share.any(1)), np.flatnonzero(share.any(0))
+        if not len(rows):
+            raise InputError("The camera sees nothing of the object; mark another one.")
+        self._share = share
+        self._box = (
+            max(0, int(rows[0]) - MARGIN), min(working[0], int(rows[-1]) + 1 + MARGIN),
+            max(0, int(columns[0]) - MARGIN), min(working[1], int(columns[-1]) + 1 + MARGIN),
+        )  # fmt: skip
+        self._guides: dict[tuple[int, int], Any] = {}
+
+    def _sight(self, size: tuple[int, int], box: tuple[int, int, int, int]) -> Any:
+        from materialist.render.portrait import look
+
+        target = self._dressed(self._edited.bodies[-1].surface)
+        return look(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, size, box)
+
+    def _size(self, spp: int) -> tuple[tuple[int, int], tuple[int, int, int, int]]:
+        """Size of the whole picture, and the rectangle of it to trace."""
+        top, bottom, left, right = self._box
+        pixels = (bottom - top) * (right - left)
+        factor = min(1.0, float(np.sqrt(PATHS / (pixels * max(min(spp, 8), FEWEST)))))
+        camera = self.scene.camera
+        size = (max(2, round(camera.height * factor)), max(2, round(camera.width * factor)))
+        y, x = size[0] / camera.height, size[1] / camera.width
+        first, before = int(top * y), int(left * x)
+        box = (first, min(size[0], max(first + 2, int(np.ceil(bottom * y)))),
+               before, min(size[1], max(before + 2, int(np.ceil(right * x)))))  # fmt: skip
+        if size not in self._guides:
+            self._guides[size] = self._sight(size, box)
+        return size, box
+
+    def _dressed(self, surface: Surface) -> Any:
+        """The ray tracer's scene with the body of that glass: made once for each kind of glass."""
+        from materialist.render.bodies import SMOOTH
+
+        rough = surface.interface_roughness
+        coated = surface.transmission < 1
+        kind = "coated" if coated else ("smooth" if rough < SMOOTH else "rough")
+        if coated or kind not in self._targets:
+            # The coat's share is no parameter of Mitsuba's: its scene is made anew each time, and not kept twice.
+            self._targets[kind] = self._built(surface)
+        target, params = self._targets[kind]
+        if surface.transmission >= 1:
+            start = f"{self._name}.bsdf." + ("interface." if kind == "rough" else "")
+            params[start + "eta"] = max(float(surface.ior), 1.0001)
+            params[start + "specular_transmittance.value"] = target.mi.Color3f(*(c**0.5 for c in surface.tint))
+            if kind == "rough":
+                params[start + "alpha.value"] = rough**2
+            params.update()
+        return target
+
+    def _built(self, surface: Surface) -> tuple[Any, Any]:
+        from materialist.render.scene import RenderScene
+
+        edited = self._edited
+        bodies = (*edited.bodies[:-1], replace(edited.bodies[-1], surface=surface))
+        target = RenderScene(edited.geometry, edited.camera, bodies=bodies, device=self._device)
+        if edited.lamps:
+            add_lamps(target, edited.lamps)
+        target.set_materials(edited.materials)
+        target.set_envmap(edited.envmap)
+        return target, target.mi.traverse(target.mi_scene)
+
+    def _in_photo(self, traced: Array, surface: Surface) -> Array:
+        """[H, W, 3] the traced rectangle, at whatever size, in the photo without the object."""
+        import cv2
+
+        top, bottom, left, right = self._box
+        part = cv2.resize(traced, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
+        out = self._edited.photo.linear.copy()
+        share = self._share[top:bottom, left:right, None]
+        out[top:bottom, left:right] = share * part + (1 - share) * out[top:bottom, left:right]
+        return out

@@ -1,0 +1,76 @@
+"""The photo's sky as new glass shows it.
+
+Surfaces carry the photo's colours in their albedo; before the sky a path meets the fitted light, which has neither the
+photo's detail nor what was filled or given behind an object. Light is linear: the photo's sky less the fitted light,
+each rendered alone with surfaces that reflect nothing, is what is missing in the picture of the glass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from materialist.camera import project
+from materialist.edits.glass.two_interface import environment
+from materialist.envmap import texel_directions
+from materialist.types import Array, Materials, Scene
+
+ROWS = 768
+"""Most rows of the maps that stand for the photo's sky; a texel is about a pixel otherwise."""
+LEAST = 1e-6
+"""Added to both, for no light at all cannot be sampled; their difference does not know it."""
+CLIPPED = 0.98
+"""From here on a channel of an ordinary photo is a lower bound."""
+
+
+def sky_maps(scene: Scene) -> tuple[Array, Array] | None:
+    """(photo's sky, fitted light), [h, 2h, 3] float32 linear, where the photo shows sky; LEAST in others.
+
+    None for a scene whose photo shows no sky.
+    """
+    camera = scene.camera
+    if (scene.depth > 0).all():
+        return None
+    rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), ROWS))
+    directions = texel_directions(rows, 2 * rows).reshape(-1, 3)
+    place, ahead = project(directions, camera)
+    column, row = np.floor(place).astype(int).T
+    seen = (ahead > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    seen[seen] = scene.depth[row[seen], column[seen]] == 0
+    photo, fitted = np.zeros((2, len(directions), 3), np.float32)
+    photo[seen] = scene.photo.linear[row[seen], column[seen]]
+    fitted[seen] = environment(directions[seen], scene.envmap)
+    if not scene.photo.hdr:
+        photo = np.where((photo >= CLIPPED) & (fitted > photo), fitted, photo)
+    shape = (rows, 2 * rows, 3)
+    return photo.reshape(shape) + LEAST, fitted.reshape(shape) + LEAST
+
+
+def only_lit_by(scene: Scene, envmap: Array) -> Scene:
+    """The scene under another map: surfaces reflect nothing. Lamps shine on, and cancel in the difference of two."""
+    size = scene.depth.shape
+    black = Materials(np.zeros((*size, 3), np.float32), np.ones(size, np.float32), np.ones(size, np.float32))
+    return replace(scene, materials=black, envmap=envmap)
+
+
+def traced(
+    trace: Callable[[float], Array], target: Any, scene: Scene, maps: tuple[Array, Array] | None, *, share: float = 1.0
+) -> Array:
+    """[h, w, 3] what `trace` gives of a `RenderScene` dressed as the scene, with the sky of `sky_maps` in its glass.
+
+    trace: picture by a share of its paths. share: that of each of both maps; they follow the same paths, so that fewer
+    do: their difference has little noise.
+    """
+    picture = trace(1.0)
+    if maps is None:
+        return picture
+    target.set_materials(only_lit_by(scene, maps[0]).materials)
+    for envmap, sign in zip(maps, (1, -1)):
+        target.set_envmap(envmap)
+        picture = picture + sign * trace(share)
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    return np.maximum(picture, 0)

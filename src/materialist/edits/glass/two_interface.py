@@ -1,0 +1,353 @@
+"""The paper's glass: every camera ray is refracted twice and then looks up the background.
+
+Paper, Material Transparency Editing. The ray enters at the visible surface (direction omega_t1), goes the distance
+d1, leaves through a back whose normal is the front's at the exit's place in the picture, and reaches
+
+    x2 = x + d1 omega_t1 + d2 omega_t2,
+
+whose screen position S(x2) says what of the background is seen. Light that stays inside there is followed no further:
+it leaves elsewhere, and is taken to be the mean of what is seen through the object, so that no light is lost.
+
+Where more is known of the back than that, its own normals take the front's place, and a ray leaves where it meets it.
+What is reflected at the front is followed to the background, too, and to the environment map from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
+from materialist.camera import pixel_rays, project
+from materialist.errors import InputError
+from materialist.geometry.tangents import back_normals
+from materialist.solids.symmetry import surface_in
+from materialist.types import Array, Camera
+
+BACKS = ("mirrored", "same")
+"""What the back's normal is: the front's mirrored at the picture plane (lenses, vases), or its opposite (panes)."""
+LONGEST = 3.0
+"""Longest way through the object, in units of its largest thickness."""
+STEPS = 96
+"""Places along a ray where it is compared with the background's depth."""
+SIDES = (3, 5)
+"""Rays a pixel, along either side: of clear glass, and of a rough surface, whose every ray meets other facets."""
+
+
+@dataclass(frozen=True)
+class Behind:
+    """What is behind the object."""
+
+    picture: Array
+    """[H, W, 3] linear radiance of the picture without the object."""
+    depth: Array
+    """[H, W] planar depth, scene units; 0 for sky."""
+    envmap: Array
+    """[h, 2h, 3] linear radiance: what is not in the picture."""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Rays through the object."""
+
+    exit: Array
+    """[N, 3] where they leave, camera frame: x + d1 omega_t1."""
+    direction: Array
+    """[N, 3] unit, beyond the object: omega_t2, or the reflection where that is total."""
+    share: Array
+    """[N] part of the light that crosses both surfaces."""
+    reflected: Array
+    """[N, 3] unit direction of the reflection at the front."""
+    reflectance: Array
+    """[N] of the front; what its roughness hides of the reflection stays inside."""
+
+
+def two_interface(
+    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, background_depth: Array,
+    background: Array, envmap: Array, *, ior: float = 1.5, transmission: float = 1.0,
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, back: str | Array = "mirrored",
+) -> Array:  # fmt: skip
+    """The object under the mask as glass.
+
+    Args:
+        camera: its size is that of all maps.
+        normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
+        mask: [H, W] bool or weights.
+        thickness: [H, W] scene units, >= 0: along the camera ray; of a back without normals of its own also d1.
+        background_depth: [H, W] planar depth without the object, 0 for sky.
+        background: [H, W, 3] linear radiance without the object.
+        envmap: [h, 2h, 3] linear radiance: reflections, and what rays meet that leave the picture.
+        ior: index of refraction, 1 to 3. transmission: T in [0, 1]. tint: linear RGB in [0, 1].
+        roughness: perceptual r in [0, 1]; alpha = r^2.
+        back: see BACKS; or the back's own outward normals [H, W, 3], unit, read at the exit's place in the picture:
+            then d1 is the way to the surface that `thickness` tells.
+
+    Returns:
+        [H, W, 3] float32 linear radiance inside the mask, 0 outside.
+
+    Raises:
+        InputError: options out of range, or maps of another size than the camera's.
+    """
+    kind, own = (back, None) if isinstance(back, str) else ("mirrored", back)
+    _check(ior, transmission, tint, roughness, kind)
+    inside = surface_in(mask, depth, camera)
+    for name, value in (("thickness", thickness), ("background depth", background_depth), ("normals", normal),
+                        ("background", background), ("back", normal if own is None else own)):  # fmt: skip
+        if value.shape[:2] != inside.shape:
+            raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
+    behind = Behind(background, background_depth, envmap)
+    front = Front(camera, normal, depth, inside, own, None if own is None else thickness)
+    d1 = thickness[inside]
+    middle = cross(front, d1, ior=ior, back=kind)
+    place, in_picture = meeting(middle.exit, middle.direction, behind, camera)
+    through = radiance(place, in_picture, middle.direction, behind)
+    mean = through.mean(0)
+
+    def shown(crossing: Crossing, through: Array) -> Array:
+        inside_still = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
+        seen = crossing.share[:, None] * through + inside_still * mean
+        mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
+        return seen * transmission * np.asarray(tint, float) + mirror
+
+    colour = shown(middle, through)
+    spread = crowding(place, inside)
+    several = np.full(len(spread), roughness > 0) | (spread > 0)
+    side = SIDES[roughness > 0]
+    count = side**2 if several.any() else 0
+    rays = []
+    for k in range(count):
+        front.through(spread[several, None] * ((np.array([k % side, k // side]) + 0.5) / side - 0.5), several)
+        crossing = cross(front, d1[several], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
+        rays.append(shown(crossing, look(crossing.exit, crossing.direction, behind, camera)))
+    if rays:
+        colour[several] = np.mean(rays, axis=0)
+    result = np.zeros((*inside.shape, 3), np.float32)
+    result[inside] = colour
+    return result
+
+
+def back_of(depth: Array, own: Array, thickness: Array, back: Array | None, camera: Camera) -> Array:
+    """[H, W, 3] unit outward normals of an object's back: those that are known, or those of its depth.
+
+    depth: [H, W] planar, of the front. own: [H, W] bool. thickness: [H, W] along the camera rays.
+    """
+    if back is not None:
+        return back
+    rays = pixel_rays(camera).astype(np.float64)
+    return back_normals(depth + thickness / np.linalg.norm(rays, axis=-1), own, rays).astype(np.float32)
+
+
+class Front:
+    """The visible surface of the object: its points, and its normals also just outside the mask; its back, if known.
+
+    back: [H, W, 3] its own outward normals. thickness: [H, W] along the camera rays, for `way`.
+    """
+
+    def __init__(
+        self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None,
+        thickness: Array | None = None,
+    ):  # fmt: skip
+        from scipy.ndimage import distance_transform_edt
+
+        self.camera = camera
+        all_rays = pixel_rays(camera).astype(np.float64)
+        self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
+        rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
+        self._inverse = 1 / depth[rows, columns].astype(np.float64)[..., None]  # [H, W, 1], linear on planes
+        self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
+        self.through(np.zeros(2))
+        self._backs = None if back is None else back[rows, columns].astype(np.float64)
+        self._ends: Array | None = None
+        if thickness is not None:
+            ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
+            self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
+
+    def through(self, offset: Array, which: Array | slice = np.s_[:]) -> None:
+        """Look through the pixels `which`, [N] bool, at this distance [n, 2] (x right, y down) from their centres."""
+        place = self._centres[which] + offset
+        middle = np.array([self.camera.width, self.camera.height]) / 2
+        x, y = ((place - middle) / self.camera.focal).T
+        rays = np.stack([x, -y, -np.ones_like(x)], -1)
+        self.point = rays / bilinear(self._inverse, place)  # [N, 3] x
+        self.direction = _unit(rays)  # [N, 3]
+        self.normal = _facing(_unit(bilinear(self._normals, place)), self.direction)  # [N, 3]
+
+    def normal_at(self, point: Array) -> Array:
+        """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
+        return _facing(self._read(self._normals, point), _unit(point))
+
+    def back_at(self, point: Array, kind: str) -> Array:
+        """[N, 3] the back's outward unit normal at points [N, 3]: its own where it is known, else see BACKS."""
+        if self._backs is not None:
+            return self._read(self._backs, point)
+        front = self.normal_at(point)
+        return -front if kind == "same" else reflect(front, _unit(point))
+
+    def way(self, inner: Array, d1: Array) -> Array:
+        """[N] d1 of rays of unit directions [N, 3] inside: to the back where it is known, else d1 [N] as it is."""
+        if self._ends is None:
+            return d1
+        found = background_distance(self.point, inner, self._ends, self.camera)
+        return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
+
+    def _read(self, normals: Array, point: Array) -> Array:
+        place, _ = project(point, self.camera)
+        found = bilinear(normals, place)
+        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+
+
+def cross(
+    front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1), back: str = "mirrored"
+) -> Crossing:
+    """Rays through both surfaces; d1 [N] scene units.
+
+    `sample` (k, n) is the k-th of n facets of rough surfaces.
+    """
+    k, n = sample
+    points = [((k + 0.5) * g) % 1 for g in (0.7320508076, 1 / n, 0.6180339887, 0.4142135623)]
+    facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
+    inner, _ = refract(front.direction, facet, 1 / ior)
+    mirrored = reflect(front.direction, facet)
+    fresnel = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
+    reflectance = fresnel * _unmasked(mirrored, front.normal, alpha, below=False)
+    share = (1 - fresnel) * _unmasked(inner, front.normal, alpha, below=True)
+    exit_point = front.point + front.way(inner, d1)[:, None] * inner
+    outward = front.back_at(exit_point, back)
+    # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
+    against = -_facing(outward, -inner)
+    facet = visible_facet(inner, against, alpha, points[2], points[3])
+    direction, total = refract(inner, facet, ior)
+    passed = 1 - fresnel_dielectric(-np.sum(inner * facet, -1), 1 / ior)
+    passed = np.where(total, 1.0, passed) * _unmasked(direction, against, alpha, below=~total)
+    return Crossing(exit_point, direction, share * passed, mirrored, reflectance)
+
+
+def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool) -> Array:
+    """[N] the part of light that a rough surface lets go in `direction`; 0 on the wrong side of the surface."""
+    if alpha <= 0:
+        return np.ones(len(direction))
+    side = np.where(below, -1.0, 1.0) * np.sum(direction * normal, -1)
+    return np.where(side > 0, masking(direction, normal, alpha), 0)
+
+
+def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
+    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
+    return radiance(*meeting(origin, direction, behind, camera), direction, behind)
+
+
+def radiance(place: Array, in_picture: Array, direction: Array, behind: Behind) -> Array:
+    """[N, 3] of rays that end in the picture at `place` [N, 2], or go to the environment along unit [N, 3]."""
+    return np.where(in_picture[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
+
+
+def meeting(origin: Array, direction: Array, behind: Behind, camera: Camera) -> tuple[Array, Array]:
+    """[N, 2] where in the picture of the background rays end, S(x2), and [N] bool whether they end in it.
+
+    Where a ray that meets no surface looks at the picture's sky, the picture knows it better than the environment map.
+    """
+    distance = background_distance(origin, direction, behind.depth, camera)
+    met = np.isfinite(distance)
+    end = np.where(met[:, None], origin + np.where(met, distance, 0)[:, None] * direction, direction)
+    place, depth = project(end, camera)
+    size = np.array([camera.width, camera.height])
+    sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
+    sky[sky] = bilinear(behind.depth[..., None], place[sky])[:, 0] == 0
+    return place, met | sky
+
+
+def crowding(place: Array, inside: Array) -> Array:
+    """[N] 0 to 1: over how much of a pixel its rays are to be spread, from where its centre's and its neighbours' end.
+
+    One lookup between pixels is the mean of one pixel by itself: more is needed where the picture is crowded together.
+
+    place: [N, 2] pixels. inside: [H, W] bool, true for N pixels.
+    """
+    whole = np.full((*inside.shape, 2), np.nan)
+    whole[inside] = place
+    widest = np.zeros(inside.shape)
+    for axis in (0, 1):
+        step = np.nan_to_num(np.linalg.norm(np.diff(whole, axis=axis), axis=-1))  # 0 to what is outside
+        for beside in ((1, 0), (0, 1)):
+            pad = [(0, 0), (0, 0)]
+            pad[axis] = beside
+            widest = np.maximum(widest, np.pad(step, pad))
+    return np.clip(widest[inside] - 1, 0, 1)
+
+
+def background_distance(origin: Array, direction: Array, depth: Array, camera: Camera) -> Array:
+    """[N] the distance d2 to the surface that a depth map [H, W] describes; inf for rays that meet none.
+
+    Beyond the picture the surface goes on as at its nearest edge. A ray that starts behind the surface meets it at
+    once. Rays are followed to twice the largest depth, in steps that are even in the picture's inverse depth.
+    """
+    if not (depth > 0).any():
+        return np.full(len(origin), np.inf)
+    far = 2 * float(depth.max())
+    surface = np.where(depth > 0, depth, 1e6).astype(np.float64)
+    length = far * (np.arange(STEPS + 1) / STEPS) ** 2  # [STEPS + 1]
+    low, high = np.zeros(len(origin)), np.full(len(origin), np.inf)
+    open_ = np.ones(len(origin), bool)
+    for a, b in pairwise(length):
+        hit = open_.copy()
+        hit[open_] = _behind(origin[open_], direction[open_], np.full(int(open_.sum()), b), surface, camera)
+        low[hit], high[hit] = a, b
+        open_ &= ~hit
+        if not open_.any():
+            break
+    met = np.isfinite(high)
+    for _ in range(12):
+        middle = (low[met] + high[met]) / 2
+        beyond = _behind(origin[met], direction[met], middle, surface, camera)
+        high[met], low[met] = np.where(beyond, middle, high[met]), np.where(beyond, low[met], middle)
+    return high
+
+
+def _behind(origin: Array, direction: Array, distance: Array, surface: Array, camera: Camera) -> Array:
+    """[n] bool: whether the points on the rays at `distance` [n] are behind the surface [H, W], and in view."""
+    place, depth = project(origin + distance[:, None] * direction, camera)
+    return (depth > 0) & (depth >= bilinear(surface[..., None], place)[:, 0])
+
+
+def environment(direction: Array, envmap: Array) -> Array:
+    """[N, 3] bilinear lookup of an envmap [h, 2h, 3] in unit directions [N, 3]."""
+    height, width = envmap.shape[:2]
+    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * width
+    y = np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * height
+    wrapped = np.concatenate([envmap[:, -1:], envmap, envmap[:, :1]], 1)
+    return bilinear(wrapped, np.stack([x + 1, y], -1))
+
+
+def bilinear(picture: Array, place: Array) -> Array:
+    """[N, C] values of a picture [H, W, C] at pixel positions [N, 2] (x right, y down); the edge goes on outside."""
+    height, width = picture.shape[:2]
+    x = np.clip(np.nan_to_num(place[:, 0]) - 0.5, 0, width - 1)
+    y = np.clip(np.nan_to_num(place[:, 1]) - 0.5, 0, height - 1)
+    x0, y0 = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
+    x1, y1 = np.minimum(x0 + 1, width - 1), np.minimum(y0 + 1, height - 1)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
+    return top * (1 - fy) + (picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx) * fy
+
+
+def _facing(normal: Array, direction: Array) -> Array:
+    """Unit normals [N, 3] made to point against the directions, at least grazingly."""
+    cosine = np.sum(normal * direction, -1, keepdims=True)
+    turned = np.where(cosine > -1e-3, normal - (cosine + 1e-3) * direction, normal)
+    return _unit(turned)
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+
+
+def _check(ior: float, transmission: float, tint: tuple[float, float, float], roughness: float, back: str) -> None:
+    if not 1 <= ior <= 3:
+        raise InputError(f"The index of refraction is {ior:g}; give 1 to 3 (water 1.33, glass 1.5, diamond 2.4).")
+    if not (0 <= transmission <= 1 and 0 <= roughness <= 1):
+        raise InputError(f"Transmission is {transmission:g}, roughness {roughness:g}; both are 0 to 1.")
+    if not (len(tint) == 3 and all(0 <= c <= 1 for c in tint)):
+        raise InputError(f"The tint is {tint}; give three numbers from 0 to 1: R, G, B.")
+    if back not in BACKS:
+        raise InputError(f"The back is {back!r}; choose one of {', '.join(BACKS)}.")

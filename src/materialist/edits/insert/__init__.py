@@ -1,0 +1,1 @@
+"""Inserting mesh files into the photo."""

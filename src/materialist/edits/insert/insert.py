@@ -1,0 +1,168 @@
+"""Meshes put into the photograph (paper, Object insertion and relighting; Shadow Effects)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.camera import project
+from materialist.edits.insert.meshes import Model, read_model, repainted
+from materialist.edits.insert.support import Support, picture_width, support_at
+from materialist.edits.material.material import noted, warned
+from materialist.errors import InputError
+from materialist.types import Array, Body, Scene
+
+SHARE = 1 / 6
+"""Longest side of a mesh at scale 1, as a share of the width that the picture shows at its depth."""
+CLOSEST = 0.02
+"""Depth before which nothing may reach, as a share of the depth of its place."""
+SAMPLES = 6000
+"""Points of its surface that are looked at for intersections."""
+
+
+def insert(
+    scene: Scene,
+    mesh: str | Path | Model,
+    at: tuple[float, float],
+    *,
+    scale: float = 1.0,
+    turn: float = 0.0,
+    material: str = "as-is",
+    size: float | None = None,
+    up: str = "auto",
+) -> Scene:
+    """The scene with a mesh standing on the surface under a pixel; photo, maps and light are shared.
+
+    Args:
+        mesh: an OBJ, PLY, STL, glTF or GLB file, or what `meshes.read_model` made of one.
+        at: (x, y) at working size: where the middle of its base stands. Its up axis is the surface's normal, its
+            front (+Z) looks to the camera.
+        scale: factor on its size, in (0, 1000].
+        turn: degrees about the up axis, > 0 counter-clockwise seen from above.
+        material: `as-is`, `glass`, `mirror`, a linear "R,G,B" or "#rrggbb"; see `meshes.repainted`.
+        size: longest side in scene units; by default 1/6 of the width that the picture shows at that depth.
+        up: axis of the file that points up; see `meshes.read_model`.
+
+    Returns:
+        The scene with one more body for each material of the mesh. What is wrong with the mesh, or its place, is added
+        to `report.warnings`.
+
+    Raises:
+        InputError: a place outside the photo, on the sky, or so near that the mesh would reach behind the camera; a
+            mesh that cannot be used; a number out of its range.
+    """
+    model = repainted(mesh if isinstance(mesh, Model) else read_model(mesh, up=up), material)
+    placed, support, longest = put(scene, model, at, scale=scale, turn=turn, size=size)
+    warnings = [*model.warnings]
+    if _crosses(scene, placed, support):
+        warnings.append(
+            f"{model.name} runs into the surface behind or beside it; choose another place, or a smaller scale."
+        )
+    what: dict[str, Any] = {
+        "mesh": model.name, "at": [float(v) for v in at], "scale": scale, "turn": turn, "material": material,
+        "size": longest, "triangles": sum(len(body.faces) for body in placed),
+    }  # fmt: skip
+    return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *warnings), "insert", what)
+
+
+def put(
+    scene: Scene, model: Model, at: tuple[float, float], *, scale: float = 1.0, turn: float = 0.0,
+    size: float | None = None,
+) -> tuple[tuple[Body, ...], Support, float]:  # fmt: skip
+    """The model's parts as they stand in the camera frame, the plane they stand on, and their longest side.
+
+    The side is the model's own, in scene units; see `insert`.
+    """
+    for name, amount, high in (("scale", scale, 1e3), ("size", 1.0 if size is None else size, 1e9)):
+        if not (np.isfinite(amount) and 0 < amount <= high):
+            raise InputError(f"The {name} is {amount:g}; it must be above 0 and at most {high:g}.")
+    if not np.isfinite(turn):
+        raise InputError(f"The turn is {turn} degrees; give a finite number.")
+    low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
+    longest = float((high - low).max())
+    first = support_at(scene, at)
+    unit = scale * (size if size is not None else SHARE * picture_width(scene, first.depth)) / longest
+    footprint = unit * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+    support = support_at(scene, at, footprint)
+    base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    turned = frame(support) @ about_up(turn)
+    bodies = tuple(moved(part, turned * unit, support.point - (turned * unit) @ base) for part in model.parts)
+    nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
+    if nearest < CLOSEST * support.depth:
+        raise InputError(
+            f"{model.name} would reach behind the camera at scale {scale:g}; choose a smaller scale, or a place "
+            "further away."
+        )
+    return bodies, support, unit * longest
+
+
+def frame(support: Support) -> Array:
+    """[3, 3] rotation whose columns are right, up (the normal) and front: towards the camera along the surface.
+
+    Where the surface faces the camera, front is down the picture instead.
+    """
+    up = support.normal
+    towards = -support.point / np.linalg.norm(support.point)
+    front = towards - (towards @ up) * up
+    down = np.array([0.0, -1.0, 0.0])
+    down = down - (down @ up) * up
+    share = np.clip((np.linalg.norm(front) - 0.2) / 0.2, 0, 1)  # a steep wall turns gently from one to the other
+    front = share * front + (1 - share) * down
+    if np.linalg.norm(front) < 1e-6:
+        front = np.cross([1.0, 0.0, 0.0], up)
+    front = front / np.linalg.norm(front)
+    return np.stack([np.cross(up, front), up, front], -1)
+
+
+def about_up(degrees: float) -> Array:
+    """[3, 3] rotation about +Y."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def moved(body: Body, linear: Array, shift: Array) -> Body:
+    """The body under x -> linear x + shift; `linear` [3, 3] is a rotation times a factor."""
+    factor = np.cbrt(np.linalg.det(linear))
+    vertices = (body.vertices.astype(np.float64) @ linear.T + shift).astype(np.float32)
+    normals = (body.normals.astype(np.float64) @ (linear / factor).T).astype(np.float32)
+    return replace(body, vertices=vertices, normals=normals)
+
+
+def extent(bodies: tuple[Body, ...]) -> float:
+    """Longest side of the box around bodies, camera frame, scene units."""
+    return float(np.ptp(np.concatenate([body.vertices for body in bodies]), axis=0).max())
+
+
+def _crosses(scene: Scene, bodies: tuple[Body, ...], support: Support) -> bool:
+    """Whether the bodies pass through the visible surface, off the plane that they stand on.
+
+    Told by points of their surface just before and just behind it; what stands apart behind an object is hidden by
+    more than that.
+    """
+    points = np.concatenate([surface_points(body) for body in bodies])  # [n, 3]
+    above = (points - support.point) @ support.normal
+    points = points[above > 0.12 * max(float(above.max()), 1e-12)]
+    place, depth = project(points, scene.camera)
+    column, row = np.floor(place[:, 0]).astype(int), np.floor(place[:, 1]).astype(int)
+    seen = (depth > 0) & (column >= 0) & (column < scene.camera.width) & (row >= 0) & (row < scene.camera.height)
+    surface = scene.depth[row[seen], column[seen]]
+    before = np.where(surface > 0, surface - depth[seen], np.inf)  # > 0: the point is before the surface
+    band = 0.03 * extent(bodies)
+    least = 0.003 * max(len(points), 1)
+    return bool(((before > 0) & (before < band)).sum() > least and ((before < 0) & (before > -band)).sum() > least)
+
+
+def surface_points(body: Body) -> Array:
+    """[n, 3] points evenly over the body's surface, always the same ones."""
+    corners = body.vertices[body.faces].astype(np.float64)  # [F, 3, 3]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
+    if not area.sum() > 0:
+        return corners[:, 0]
+    rng = np.random.default_rng(0)
+    face = rng.choice(len(area), SAMPLES, p=area / area.sum())
+    u, v = np.sqrt(rng.random(SAMPLES)), rng.random(SAMPLES)
+    weights = np.stack([1 - u, u * (1 - v), u * v], -1)
+    return (corners[face] * weights[..., None]).sum(1)

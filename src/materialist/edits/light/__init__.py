@@ -1,0 +1,1 @@
+"""Relighting: environment map, sun, lamps, and emitters that the photo shows."""

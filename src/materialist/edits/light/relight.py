@@ -1,0 +1,205 @@
+"""Other light for a fitted scene: another map, a turn, a sun, lamps (paper, Object insertion and relighting)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.edits.light.lights import kelvin_colour
+from materialist.edits.material.material import noted, warned
+from materialist.edits.select.region import checked_pixel
+from materialist.envmap import row_solid_angle
+from materialist.errors import InputError
+from materialist.types import Array, Lamp, Scene
+
+SUN_RADIUS = 1.5
+"""Angular radius of an added sun, degrees: six times the real one, so that a map of 512 x 256 can hold it."""
+LAMP_UNIT = 0.25
+"""A lamp of power 1 shows a white wall that faces it as white in the photo from this share of the median depth."""
+LAMP_RADIUS = 0.015
+"""Radius of a lamp as a share of the scene's median depth."""
+
+
+def relight(
+    scene: Scene,
+    *,
+    dim: float | None = None,
+    lights: Array | None = None,
+    envmap: Array | None = None,
+    gain: float | str = 1.0,
+    rotate: float = 0.0,
+    sun: tuple[float, float] | None = None,
+    sun_power: float = 1.0,
+    ambient: float = 1.0,
+    lamps: tuple[Lamp, ...] | list[Lamp] = (),
+    fitted: Scene | None = None,
+) -> Scene:
+    """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of arguments.
+
+    Args:
+        dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. They become surfaces that glow and
+            stay where they are, whatever happens to the light from around.
+        lights: [H, W] bool: the lights that `dim` means, at working size; None takes those that are found.
+        envmap: [h, 2h, 3] linear radiance >= 0 in place of the fitted light, in the project's convention.
+        gain: factor on `envmap`; "auto" gives it the fitted map's mean light, for captures of unknown exposure.
+        rotate: turn of the light about the vertical, degrees; > 0 moves what is in front of the camera to its right.
+        sun: (azimuth, elevation) in degrees, see `with_sun`; it replaces the brightest spot of the map.
+        sun_power: irradiance of the sun on a surface that faces it, relative to that of the light before.
+        ambient: factor on the environment map (not on its new sun), 0 for lamps alone.
+        lamps: glowing spheres to add; make them with `lamp`.
+        fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
+
+    Raises:
+        InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
+    """
+    for name, amount, high in (("ambient", ambient, 1e4), ("sun power", sun_power, 1e4)):
+        if not (np.isfinite(amount) and 0 <= amount <= high):
+            raise InputError(f"The {name} is {amount}; it must lie in [0, {high:g}].")
+    if dim is not None:
+        from materialist.edits.light.glows import dimmed
+
+        scene = dimmed(scene, dim, lights=lights, fitted=fitted)
+    elif lights is not None:
+        raise InputError("The mask of lights says nothing without a dimming; give dim, too.")
+    light = scene.envmap
+    if envmap is not None:
+        light = checked_envmap(envmap) * _gain(gain, envmap, scene.envmap)
+    if rotate:
+        light = rotated(light, rotate)
+    disc = np.zeros_like(light)
+    if sun is not None:
+        light, disc = with_sun(light, *sun, power=sun_power)
+    light = (light * np.float32(ambient) + disc).astype(np.float32)
+    if not light.any() and not (lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)):
+        raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
+    what = {
+        "envmap": None if envmap is None else list(np.shape(envmap)), "gain": gain if envmap is not None else None,
+        "rotate": rotate or None, "sun": sun, "ambient": ambient if ambient != 1 else None, "lamps": len(lamps) or None,
+        "dim": dim,
+    }  # fmt: skip
+    new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
+    return noted(
+        warned(new, *_warnings(scene)), "light", {name: value for name, value in what.items() if value is not None}
+    )
+
+
+def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: float) -> Lamp:
+    """A lamp at pixel (x, y) of the working size, `depth` scene units along the view axis.
+
+    kelvin: colour temperature, 1667 to 25000. power: 1 shows a white wall that faces the lamp from a quarter of the
+    scene's median depth as white in the photo. Raises InputError for values out of range.
+    """
+    for name, value in (("depth", depth), ("power", power)):
+        if not (np.isfinite(value) and 0 < value <= 1e6):
+            raise InputError(f"The lamp's {name} is {value:g}; it must be above 0.")
+    column, row = checked_pixel(scene, (x, y), "lamp")
+    middle = float(np.median(scene.depth[scene.depth > 0]))
+    position = pixel_rays(scene.camera)[row, column].astype(np.float64) * depth
+    # White wall: radiance = albedo / pi * I / d^2 = power at d = LAMP_UNIT * middle, with flux 4 pi I.
+    flux = 4 * np.pi * np.pi * power * (LAMP_UNIT * middle) ** 2 * kelvin_colour(kelvin)
+    return Lamp(triple(position), triple(flux), LAMP_RADIUS * middle)
+
+
+def triple(values: Array) -> tuple[float, float, float]:
+    """Three numbers as a tuple of plain floats, as files and comparisons want them."""
+    a, b, c = (float(v) for v in values)
+    return a, b, c
+
+
+def checked_envmap(envmap: Array) -> Array:
+    """float32 [h, 2h, 3]. Raises InputError for another shape, or values that are not finite and >= 0."""
+    shape = np.shape(envmap)
+    if len(shape) != 3 or shape[2] != 3 or shape[1] != 2 * shape[0] or shape[0] < 4:
+        raise InputError(f"The environment map is {shape}; it must be twice as wide as high, RGB, and 4 rows or more.")
+    envmap = np.asarray(envmap, np.float32)
+    if not (np.isfinite(envmap).all() and envmap.min() >= 0):
+        raise InputError("The environment map has values that are NaN, infinite or negative; repair the file.")
+    if not envmap.any():
+        raise InputError("The environment map is entirely black; there is no light in it.")
+    return envmap
+
+
+def read_envmap(path: str | Path, *, rows: int = 256) -> Array:
+    """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `rows` rows. Raises InputError."""
+    import cv2
+
+    from materialist.io.photo import decode_photo
+
+    envmap = checked_envmap(decode_photo(Path(path), over=0).linear)
+    if envmap.shape[0] > rows:
+        envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
+    return envmap
+
+
+def rotated(envmap: Array, degrees: float) -> Array:
+    """[h, 2h, 3] turned about the vertical; > 0 to the right of the camera. Between columns, linear."""
+    if not np.isfinite(degrees):
+        raise InputError(f"The rotation is {degrees} degrees; give a finite number.")
+    columns = degrees / 360 * envmap.shape[1]
+    whole = int(np.floor(columns))
+    share = np.float32(columns - whole)
+    turned = np.roll(envmap, whole, 1)
+    return turned if share == 0 else (1 - share) * turned + share * np.roll(envmap, whole + 1, 1)
+
+
+def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 1.0) -> tuple[Array, Array]:
+    """(map without its brightest spot, the sun alone), both [h, 2h, 3].
+
+    azimuth: degrees from straight ahead of the camera, > 0 to the right, in [-360, 360]; 180 is behind the camera.
+    elevation: degrees above the horizon, in [-90, 90]. power: irradiance on a surface that faces the sun, as a
+    multiple of the mean irradiance of the map.
+    """
+    if not (np.isfinite(azimuth) and -360 <= azimuth <= 360):
+        raise InputError(f"The sun's azimuth is {azimuth:g}; it must lie in [-360, 360] degrees.")
+    if not (np.isfinite(elevation) and -90 <= elevation <= 90):
+        raise InputError(f"The sun's elevation is {elevation:g}; it must lie in [-90, 90] degrees.")
+    from materialist.color import luminance
+
+    angle = _angle_to(envmap.shape[0], azimuth, elevation)  # [h, 2h] degrees
+    solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
+    texel = 180 / envmap.shape[0]
+    disc = np.clip((max(SUN_RADIUS, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
+    mean = luminance((envmap * solid[..., None]).sum((0, 1)) / (4 * np.pi))
+    radiance = power * np.pi * mean / (disc * solid).sum()
+    bright = luminance(envmap)
+    limit = max(float(np.quantile(bright, 0.98)), float(mean))
+    calm = envmap * np.minimum(1, limit / np.maximum(bright, 1e-12))[..., None]
+    sun = disc[..., None] * radiance * kelvin_colour(5500)
+    return calm.astype(np.float32), sun.astype(np.float32)
+
+
+def _angle_to(rows: int, azimuth: float, elevation: float) -> Array:
+    """[h, 2h] angle between texel centres and a direction, degrees."""
+    theta = np.pi * (np.arange(rows) + 0.5)[:, None] / rows
+    phi = np.pi * ((np.arange(2 * rows) + 0.5)[None] / rows - 1)
+    az, el = np.radians(azimuth), np.radians(elevation)
+    cosine = np.sin(theta) * np.cos(el) * np.cos(phi - az) + np.cos(theta) * np.sin(el)
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
+    if gain == "auto":
+        mean = lambda e: float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())  # noqa: E731
+        return np.float32(mean(np.asarray(fitted)) / mean(np.asarray(envmap)))
+    if isinstance(gain, str) or not (np.isfinite(gain) and 0 < gain <= 1e6):
+        raise InputError(f"The gain is {gain!r}; it must be a number above 0, or auto.")
+    return np.float32(gain)
+
+
+def _warnings(scene: Scene) -> list[str]:
+    """What relighting may show of the photo's own light (paper, failure cases)."""
+    from materialist.render.envmap import is_peaked
+
+    notes: list[str] = []
+    if is_peaked(scene.envmap):
+        notes.append(
+            "The photo has hard light: its shadows may be baked into the albedo and stay beside the new ones "
+            "(double shadows); look at maps/albedo.exr."
+        )
+    clipped = float((scene.photo.linear >= 0.99).any(-1).mean())
+    if clipped > 0.05 and not scene.photo.hdr:
+        notes.append(f"{clipped:.0%} of the photo is clipped; light and albedo are uncertain there.")
+    return notes

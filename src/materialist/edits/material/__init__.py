@@ -1,0 +1,1 @@
+"""Edits of albedo, roughness and metallic inside a region."""

@@ -1,0 +1,374 @@
+"""A list of edits as a file, so that they can be replayed and batched: `materialist apply SCENE edits.yaml`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from materialist.edits.drop.drop_rest import settle
+from materialist.edits.glass.glass import OPEN, glass
+from materialist.edits.glass.thickness import METHODS
+from materialist.edits.insert.insert import insert
+from materialist.edits.light.relight import lamp, read_envmap, relight
+from materialist.edits.material.material import edit, parse_colour
+from materialist.edits.remove.background import without
+from materialist.edits.remove.hole import told_shadow
+from materialist.edits.select.select import select
+from materialist.errors import InputError, OutputError
+from materialist.types import Array, Scene
+
+REGION = ("mask", "click", "box", "with")
+MATERIAL = (
+    "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
+)  # fmt: skip
+LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps", *REGION)
+INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
+DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
+REMOVE = ("background", "inpaint", "shadow", "grow", "seed")
+GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
+KINDS = {
+    "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "drop": DROP, "glass": (*REGION, *GLASS),
+    "remove": (*REGION, *REMOVE),
+}  # fmt: skip
+"""Kind of step -> what it may say."""
+
+
+ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+"""How YAML spells a switch."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One edit."""
+
+    kind: str
+    """One of KINDS."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """As in the file: texts, lists of texts, lists of lists."""
+    folder: Path = Path(".")
+    """What file names in it are relative to."""
+    seed: int = field(default=0, compare=False)
+    """Where the step names none of its own."""
+    device: str = field(default="auto", compare=False)
+
+    @property
+    def skipped(self) -> bool:
+        """Whether the step is kept in the list without being applied (`skip: true`)."""
+        return str(self.options.get("skip", "")).lower() in ON
+
+
+def read_recipe(path: str | Path) -> list[Step]:
+    """The steps of a YAML file; see docs/editing.md. Raises InputError with the step and the key at fault."""
+    import yaml
+
+    path = Path(path)
+    try:
+        content = yaml.load(path.read_text("utf-8"), Loader=_loader())
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
+    unknown = [str(key) for key in content if key != "edits"] if isinstance(content, dict) else []
+    if unknown and "edits" in content:
+        raise InputError(f"{path} says '{unknown[0]}' beside its edits; it knows edits alone.")
+    entries = content.get("edits") if isinstance(content, dict) else content
+    if not isinstance(entries, list) or not entries:
+        raise InputError(f"{path} holds no list of edits; begin each with '- edit:' or '- relight:'.")
+    return [_step(entry, number, path) for number, entry in enumerate(entries, 1)]
+
+
+def _loader() -> Any:
+    import yaml
+
+    class Texts(yaml.BaseLoader):
+        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice."""
+
+        def construct_mapping(self, node, deep=False):
+            names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            twice = [name for k, name in enumerate(names) if name in names[:k]]
+            if twice:
+                raise yaml.constructor.ConstructorError(None, None, f"'{twice[0]}' is given twice", node.start_mark)
+            return super().construct_mapping(node, deep)
+
+    return Texts
+
+
+def _step(entry: Any, number: int, path: Path) -> Step:
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
+        said = f"'{next(iter(entry))}'" if isinstance(entry, dict) and len(entry) == 1 else "not one kind of edit"
+        known = ", ".join(KINDS)
+        raise InputError(f"Step {number} of {path} is {said}; it must be one of {known} with its options below it.")
+    kind, options = next(iter(entry.items()))
+    if not isinstance(options, dict):
+        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
+    unknown = sorted(set(options) - {*KINDS[kind], "skip"})
+    if unknown:
+        raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
+    try:
+        _switch(options.get("skip", "false"), "skip")
+    except InputError as error:
+        raise InputError(f"Step {number} of {path}: {error}") from error
+    return Step(kind, options, path.parent)
+
+
+def write_recipe(path: str | Path, steps: list[Step]) -> None:
+    """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
+    import yaml
+
+    path = Path(path)
+    entries = [{step.kind: _plain(step.options)} for step in steps]
+    text = yaml.safe_dump(entries, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        temporary.write_text(text, "utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def _plain(value: Any) -> Any:
+    """Texts that spell a number as that number, so that the file reads well; a shift such as +0.5 stays a text."""
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if not isinstance(value, str) or value.startswith("+"):
+        return value
+    if value in ("true", "false"):
+        return value == "true"
+    try:
+        number = float(value)
+    except ValueError:
+        return value
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number
+
+
+def apply(
+    scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto", onto: Scene | None = None
+) -> Scene:  # fmt: skip
+    """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
+
+    `seed` is that of the steps that name none, where chance has a part in them; `onto` the scene after earlier steps.
+    """
+    edited = scene if onto is None else onto
+    for number, step in enumerate(steps, 1):
+        if step.skipped:
+            continue
+        try:
+            edited = _MAKERS[step.kind](scene, edited, replace(step, seed=seed, device=device))
+        except InputError as error:
+            raise InputError(f"Step {number} ({step.kind}): {error}") from error
+    return edited
+
+
+def region_of(scene: Scene, step: Step) -> Array:
+    """[H, W] bool of the step's mask, click or box. Raises InputError."""
+    given = step.options
+    where: dict[str, Any] = {
+        "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
+        "box": _numbers(given["box"], 4, "box") if "box" in given else None,
+        "mask": _file(step, "mask") if "mask" in given else None,
+    }
+    return select(scene, method=given.get("with", "network"), **where)
+
+
+def _left(scene: Scene, edited: Scene, region: Array) -> Array:
+    """[H, W] bool: what of a region chosen on the original photo earlier steps have not taken away."""
+    gone = region & (edited.depth != scene.depth)
+    if 2 * gone.sum() > region.sum():
+        raise InputError(
+            "An earlier step took away what is there; leave this one out, or save the scene (--save) and edit that one."
+        )
+    return region & ~gone
+
+
+def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    region = _left(scene, edited, region_of(scene, step))
+    options: dict[str, Any] = {
+        k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
+    }
+    options |= {k: given[k] for k in ("roughness", "metallic") if k in given}
+    if "albedo" in given:
+        options["albedo"] = (
+            given["albedo"] if isinstance(given["albedo"], str) else _numbers(given["albedo"], 3, "albedo")
+        )
+    if "texture" in given:
+        options["texture"] = read_texture(_file(step, "texture"))
+    return edit(edited, region, **options)
+
+
+def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    if not given:
+        raise InputError("A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim.")
+    for name, needed in (("gain", "envmap"), ("sun_power", "sun")):
+        if name in given and needed not in given:
+            raise InputError(f"relight: {name} says nothing without {needed}; give that, too, or leave {name} out.")
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
+    region = [name for name in REGION if name in given]
+    if region and "dim" not in given:
+        raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
+    if region:
+        options["lights"] = region_of(scene, step)
+    if "envmap" in given:
+        options["envmap"] = read_envmap(_file(step, "envmap"))
+        gain = given.get("gain", "auto")
+        options["gain"] = gain if gain == "auto" else _number(gain, "gain")
+    if "sun" in given:
+        options["sun"] = _numbers(given["sun"], 2, "sun")
+    if "lamps" in given:
+        options["lamps"] = [lamp(scene, *_numbers(one, 5, "lamp")) for one in _list_of(given["lamps"])]
+    return relight(edited, **options, fitted=scene)
+
+
+def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    missing = [name for name in ("mesh", "at") if name not in given]
+    if missing:
+        raise InputError(f"An insert needs its {missing[0]}, as in insert: {{mesh: mug.glb, at: [310, 220]}}.")
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("scale", "turn", "size") if k in given}
+    for place in [_numbers(one, 2, "at") for one in _list_of(given["at"])]:
+        edited = insert(edited, _file(step, "mesh"), place, **options, **_thing(step))
+    return edited
+
+
+def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
+    given = step.options
+    missing = [name for name in ("mesh", "at") if name not in given]
+    if missing:
+        raise InputError(f"A drop needs its {missing[0]}, as in drop: {{mesh: [mug.glb, ball.ply], at: [310, 220]}}.")
+    options: dict[str, Any] = {
+        k: _number(given[k], k) for k in ("height", "spin", "scale", "metres") if k in given
+    } | _thing(step)
+    if "gravity" in given:
+        options["gravity"] = _numbers(given["gravity"], 3, "gravity")
+    options["seed"] = _seed(step)
+    places = [_numbers(one, 2, "at") for one in _list_of(given["at"])]
+    return settle(edited, _files(step, "mesh"), places, **options)
+
+
+def _seed(step: Step) -> int:
+    """The step's own seed, or that of all."""
+    seed = _number(step.options.get("seed", step.seed), "seed")
+    if not (0 <= seed < 2**31 and seed == int(seed)):
+        raise InputError(f"The seed is {seed:g}; give a whole number from 0 to {2**31 - 1}.")
+    return int(seed)
+
+
+def _thing(step: Step) -> dict[str, Any]:
+    """What an inserted and a dropped mesh share."""
+    given, options = step.options, {}
+    if "material" in given:
+        colour = given["material"]
+        options["material"] = ",".join(colour) if isinstance(colour, list) else str(colour)
+    if "up" in given:
+        options["up"] = str(given["up"])
+    return options
+
+
+def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
+    return without(edited, _left(scene, edited, region_of(scene, step)), **_removal(step), fitted=scene)
+
+
+def _removal(step: Step) -> dict[str, Any]:
+    """What a removal and glass share."""
+    given = step.options
+    options: dict[str, Any] = {"seed": _seed(step)}
+    if "grow" in given:
+        options["grow"] = _number(given["grow"], "grow")
+    if "shadow" in given:
+        options["shadow"] = told_shadow(given["shadow"])
+    if "background" in given:
+        options["background"] = _file(step, "background")
+    if "inpaint" in given:
+        from materialist.edits.remove.inpaint import inpainter
+
+        options["inpaint"] = inpainter(str(given["inpaint"]), seed=options["seed"], device=step.device)
+    return options
+
+
+def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
+    region, options = glass_arguments(scene, step)
+    return glass(edited, _left(scene, edited, region), **options, fitted=scene)
+
+
+def glass_arguments(scene: Scene, step: Step):
+    """([H, W] bool region, options of `glass.glass`) of a glass step. Raises InputError."""
+    given = step.options
+    options: dict[str, Any] = {k: _number(given[k], k) for k in ("ior", "transmission", "roughness") if k in given}
+    if "tint" in given:
+        tint = given["tint"]
+        options["tint"] = tuple(
+            float(c) for c in parse_colour(tint if isinstance(tint, str) else _numbers(tint, 3, "tint"), "tint")
+        )
+    if "hollow" in given:
+        open_top = str(given["hollow"]).lower() == OPEN
+        options["hollow"] = OPEN if open_top else _switch(given["hollow"], "hollow", f", or {OPEN}")
+    if "model" in given:
+        options["model"] = str(given["model"])
+    if "thickness" in given:
+        known = str(given["thickness"]) in METHODS
+        options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
+        if not known and not options["thickness"].is_file():
+            raise InputError(f"There is no file {options['thickness']}; thickness is one, or {', '.join(METHODS)}.")
+    return region_of(scene, step), options | _removal(step)
+
+
+_MAKERS = {
+    "edit": _edit, "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
+}  # fmt: skip
+"""Kind of step -> (original scene, scene so far, step) -> scene."""
+
+
+def read_texture(path: str | Path):
+    """[h, w, 3] float32 linear picture for `edit(texture=...)`. Raises InputError."""
+    import numpy as np
+
+    from materialist.io.photo import decode_photo
+
+    return np.clip(decode_photo(Path(path)).linear, 0, 1)
+
+
+def _switch(value: Any, name: str, other: str = "") -> bool:
+    text = str(value).lower()
+    if text not in (*ON, *OFF):
+        raise InputError(f"The {name} must be true or false{other}, not {value!r}.")
+    return text in ON
+
+
+def _file(step: Step, name: str) -> Path:
+    value = step.options[name]
+    if not isinstance(value, str):
+        raise InputError(f"The {name} must be a file name, not {value!r}.")
+    return step.folder / value
+
+
+def _files(step: Step, name: str) -> list[Path]:
+    """One file name, or a list of them."""
+    value = step.options[name]
+    if isinstance(value, list) and value and all(isinstance(one, str) for one in value):
+        return [step.folder / one for one in value]
+    return [_file(step, name)]
+
+
+def _list_of(value: Any) -> list[Any]:
+    """A single entry, or a list of them: of lists, or of texts such as 310,220."""
+    several = isinstance(value, list) and value and all(isinstance(v, list) or "," in str(v) for v in value)
+    return value if several else [value]
+
+
+def _number(value: Any, name: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {name} must be a number, not {value!r}.") from error
+
+
+def _numbers(value: Any, count: int, name: str) -> tuple:
+    """`count` numbers from a list, or from a text such as 310,220."""
+    parts = value.split(",") if isinstance(value, str) else value
+    if not isinstance(parts, list) or len(parts) != count:
+        raise InputError(f"The {name} must be {count} numbers, not {value!r}.")
+    return tuple(_number(part, name) for part in parts)

@@ -1,0 +1,1 @@
+"""Removing an object: the background behind it in photo, maps and depth."""

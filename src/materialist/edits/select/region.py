@@ -1,0 +1,82 @@
+"""The region of an edit: a mask at working size that has been checked."""
+
+from __future__ import annotations
+
+from threading import Lock
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.types import Array, Scene
+
+HIDDEN = 0.5
+"""Share of a mask that may be hidden by things that were put into the scene."""
+PLACED = (
+    "a thing that was put into the scene, or made glass, and edits reach only what the photo shows: put it there "
+    "again as you want it"
+)
+DIMMED = "a light of the photo that an earlier step dimmed: edit it first, and dim afterwards"
+
+
+def checked_region(scene: Scene, mask: Array) -> Array:
+    """[H, W] float32 weight in [0, 1] of an edit, from a bool mask or soft weights; 0 where there is no surface.
+
+    Raises InputError when the mask is of another size, has values outside [0, 1], is empty, or covers no surface.
+    """
+    mask = np.asarray(mask)
+    shape = (scene.camera.height, scene.camera.width)
+    if mask.shape != shape:
+        raise InputError(f"The mask is {mask.shape}, the photo at working size {shape} (rows, columns); resize it.")
+    weight = mask.astype(np.float32)
+    if not (np.isfinite(weight).all() and weight.min() >= 0 and weight.max() <= 1):
+        raise InputError(
+            f"The mask has values from {weight.min():g} to {weight.max():g}; they must be 0 to 1, or bool."
+        )
+    if not weight.any():
+        raise InputError("The mask is empty; mark at least one pixel.")
+    weight = weight * (scene.depth > 0)
+    if not weight.any():
+        raise InputError("The mask covers only sky, where the scene has no surface to edit; mark a surface.")
+    if scene.bodies and float((placed(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
+        from materialist.edits.light.lights import Studio
+
+        lights = Studio(scene).photo_lights(scene)
+        what = DIMMED if float((lights * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
+        raise InputError(f"What is marked is {what}, or mark something else.")
+    return weight
+
+
+def placed(scene: Scene) -> Array:
+    """[H, W] share of each pixel in which something is seen that was put into the scene, or made glass."""
+    from materialist.edits.light.lights import Studio
+
+    asked = (scene.geometry, *scene.bodies)
+    key = tuple(map(id, asked))
+    with _LOCK:
+        known = _answered.get(key)
+    if known is None:
+        known = asked, Studio(scene).bodies_seen(scene)
+        with _LOCK:
+            _answered[key] = known
+            while len(_answered) > _KEPT:
+                del _answered[next(iter(_answered))]
+    return known[1]
+
+
+_LOCK, _KEPT = Lock(), 8
+_answered: dict[tuple[int, ...], tuple[tuple, Array]] = {}
+"""What `placed` was asked of of late, which keeps their ids theirs, and its answers."""
+
+
+def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:
+    """(column, row) of a point (x, y) at working size. Raises InputError when it lies outside the picture."""
+    width, height = scene.camera.width, scene.camera.height
+    try:
+        x, y = (float(v) for v in point)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {name} must be two numbers X,Y, not {point!r}.") from error
+    if not (0 <= x < width and 0 <= y < height):
+        raise InputError(
+            f"The {name} {x:g},{y:g} lies outside the photo, which is {width} x {height} pixels at working size."
+        )
+    return int(x), int(y)

@@ -1,0 +1,1 @@
+"""Scenes as glTF, Blender, USD, Mitsuba and HTML files."""

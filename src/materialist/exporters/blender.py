@@ -1,0 +1,144 @@
+"""Blender: a script and the files it builds the .blend from, and the running of it where Blender is at hand."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import SetupError
+from materialist.exporters.body_parts import in_photo
+from materialist.exporters.parts import Part
+from materialist.exporters.run import Exported
+from materialist.exporters.target import ensure_free, whole_files, whole_folder
+from materialist.io.exr import write_exr
+from materialist.io.image import write_png
+from materialist.render.bodies import SMOOTH, is_glowing, is_transparent
+from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
+from materialist.types import Scene
+
+_MINUTES = 20
+"""How long Blender may take to build the file before it counts as hung."""
+
+
+def export_blend(
+    path: Path, scene: Scene, parts: list[Part], force: bool, *, blender: str | None, options: list[str]
+) -> Exported:
+    """PATH.blend with everything packed where Blender is found; else, or for a folder PATH, the script and its files.
+
+    Args:
+        blender: the program to use, None: look for one. options: of `build.py`.
+
+    Raises SetupError when a Blender that was named, or was found, does not build the file.
+    """
+    if path.suffix.lower() != ".blend":
+        with whole_folder(path, force, format="blend") as folder:
+            write_blender_assets(folder, scene, parts)
+        command = _command(["blender"], path / "build.py", path.with_name(f"{path.name}.blend"), options)
+        return Exported(path, (), (f"Make the .blend with: {shlex.join(command)}",))
+    ensure_free(path, force, folder=False)
+    program = _find_blender(blender)
+    if program is None:
+        folder_path = path.with_suffix("")
+        with whole_folder(folder_path, force, format="blend") as folder:
+            write_blender_assets(folder, scene, parts)
+        command = _command(["blender"], folder_path / "build.py", path, options)
+        note = f"No Blender was found, so {folder_path} has a script; make {path} with: {shlex.join(command)}"
+        return Exported(folder_path, (), (note,))
+    with tempfile.TemporaryDirectory() as scratch, whole_files([path], force) as (result,):
+        write_blender_assets(Path(scratch), scene, parts)
+        _run(_command(program, Path(scratch) / "build.py", result, options), result)
+    return Exported(path)
+
+
+def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
+    """Fill an empty folder with `build.py` and what it reads: meshes, float32 maps, light, photo, camera."""
+    arrays = {}
+    for part in parts:
+        mesh = part.mesh
+        for key in ("vertices", "normals", "uv", "faces"):
+            arrays[f"{part.name}_{key}"] = getattr(mesh, key)
+        if not part.constant:
+            for key in ("albedo", "roughness", "metallic"):
+                write_exr(folder / f"{_prefix(part)}{key}.exr", getattr(part.materials, key))
+    np.savez_compressed(folder / "meshes.npz", **arrays)  # type: ignore[arg-type]
+    write_exr(folder / "envmap.exr", scene.envmap)
+    write_png(folder / "photo.png", scene.photo.original)
+    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    camera, native = scene.camera, scene.photo.original.shape
+    facts = {
+        "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,
+        "photo_width": native[1], "photo_height": native[0],
+        "parts": {part.name: _look(part) for part in parts},
+        "bounces": (GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH) - 2,
+        "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(in_photo(scene)))],
+        "lamps": [asdict(lamp) for lamp in scene.lamps],
+    }  # fmt: skip
+    (folder / "scene.json").write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
+    shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")
+
+
+def _prefix(part: Part) -> str:
+    """What the names of a part's maps begin with."""
+    return "" if part.surface is None else f"{part.name}_"
+
+
+def _look(part: Part) -> dict:
+    """The material of a part, for `build.py`: its maps or three constants, and for a body what it has beyond them."""
+    m, surface = part.materials, part.surface
+    look: dict = {"maps": _prefix(part), "repeat": surface is not None}
+    if part.constant:
+        look = {
+            "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]),
+            "metallic": float(m.metallic[0, 0]),
+        }  # fmt: skip
+    if surface is not None and is_glowing(surface):
+        look["emission"] = [float(c) for c in surface.emission]
+    if surface is not None and is_transparent(surface):
+        roughness = surface.interface_roughness
+        look["glass"] = {
+            "share": float(surface.transmission), "ior": max(float(surface.ior), 1.0001),
+            "roughness": 0.0 if roughness < SMOOTH else roughness,
+            "tint": [float(c) for c in surface.tint],
+        }  # fmt: skip
+    return look
+
+
+def _find_blender(named: str | None) -> list[str] | None:
+    """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
+    if named is not None:
+        found = shutil.which(named)
+        if found is None:
+            raise SetupError(f"There is no program {named}; give the path of blender, or of a Python that has bpy.")
+        return [found]
+    found = shutil.which("blender")
+    if found is not None:
+        return [found]
+    return [sys.executable] if importlib.util.find_spec("bpy") else None
+
+
+def _command(program: list[str], script: Path, output: Path, options: list[str]) -> list[str]:
+    """Run the script by `blender`, or by a Python."""
+    start = list(program)
+    if "python" not in Path(program[0]).name.lower():
+        start += ["-b", "--factory-startup", "--python-exit-code", "1", "--python"]
+    return [*start, str(script), "--", "-o", str(output), *options]
+
+
+def _run(command: list[str], result: Path) -> None:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60 * _MINUTES)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise SetupError(f"{command[0]} did not build the file ({error}); give another with --blender.") from error
+    if done.returncode != 0 or not result.is_file():
+        lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
+        last = lines[-1].strip() if lines else f"exit code {done.returncode}"
+        raise SetupError(f"{command[0]} did not build the file ({last}); Blender 4.2 or later is needed.")

@@ -1,0 +1,208 @@
+"""glTF 2.0 binary: mesh, PBR textures, camera. The light goes beside it as a Radiance .hdr.
+
+glTF's frame, its camera (looking down -Z, +Y up), its texture coordinates (v down) and its material model (metallic
+and perceptual roughness, alpha = r^2, F0 = 0.04) are ours; only the diffuse lobe is Lambert's instead of Disney's.
+Light stays outside: the one extension for it, EXT_lights_image_based, wants prefiltered cube maps, and few read it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from materialist import __version__
+from materialist.errors import OutputError
+from materialist.exporters.body_parts import mean_chord, one_roughness
+from materialist.exporters.parts import Part
+from materialist.exporters.textures import base_color, metallic_roughness, png
+from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface
+
+_FLOAT, _UINT = 5126, 5125
+_VERTICES, _INDICES = 34962, 34963
+_NEAREST, _NEAREST_MIPMAP_LINEAR, _CLAMP = 9728, 9986, 33071
+_LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
+
+
+def write_glb(path: Path, scene: Scene, parts: list[Part]) -> None:
+    """Write the parts and the camera of a scene to PATH, one self-contained file."""
+    path.write_bytes(glb_bytes(scene, parts))
+
+
+def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
+    """The same as bytes: header, JSON chunk, binary chunk (glTF 2.0 specification, section 4)."""
+    document = _Document()
+    meshes = [document.add_part(part) for part in parts]
+    nodes = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
+    nodes.append({"name": "camera", "camera": 0})
+    nodes += _lamps(scene, document)
+    camera = scene.camera
+    content = {
+        "asset": {"version": "2.0", "generator": f"materialist {__version__}"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "nodes": nodes,
+        "cameras": [_camera(camera, parts)],
+        **document.content,
+        "buffers": [{"byteLength": len(document.data)}],
+        "extras": {"photo": {"width": camera.width, "height": camera.height, "horizontal_fov_degrees": camera.fov}},
+    }
+    if scene.lamps:
+        content["extensions"] = {"KHR_lights_punctual": {"lights": [_light(lamp) for lamp in scene.lamps]}}
+    if document.extensions:
+        content["extensionsUsed"] = sorted(document.extensions)
+    text = json.dumps(content, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    chunks += struct.pack("<II", len(document.data), 0x004E4942) + bytes(document.data)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def write_hdr(path: Path, envmap: Array) -> None:
+    """The light [h, 2h, 3] as a Radiance picture (8 bits of mantissa and a shared exponent), rows and columns as is."""
+    import cv2
+
+    done, data = cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))
+    if not done:
+        raise OutputError(f"{path} cannot be written: the environment map {envmap.shape} was not taken.")
+    path.write_bytes(data.tobytes())
+
+
+def _lamps(scene: Scene, document: _Document) -> list[dict]:
+    """Nodes of the lamps, as KHR_lights_punctual has them."""
+    if scene.lamps:
+        document.extensions.add("KHR_lights_punctual")
+    return [
+        {
+            "name": f"lamp{k}", "translation": [float(c) for c in lamp.position],
+            "extensions": {"KHR_lights_punctual": {"light": k}},
+        }
+        for k, lamp in enumerate(scene.lamps)
+    ]  # fmt: skip
+
+
+def _light(lamp: Lamp) -> dict:
+    """A point of the lamp's intensity, power / (4 pi), in the radiance of the photo x scene units squared."""
+    most = float(max(lamp.power))
+    color = [float(c) / max(most, 1e-30) for c in lamp.power]
+    return {"type": "point", "color": color, "intensity": most / (4 * math.pi)}
+
+
+class _Document:
+    """Meshes, materials, textures and the buffer behind them, as they are added."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.extensions: set[str] = set()
+        self.content: dict[str, list] = {
+            "meshes": [], "materials": [], "textures": [], "images": [], "accessors": [], "bufferViews": [],
+            "samplers": [
+                {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP},
+                {"magFilter": _LINEAR, "minFilter": _LINEAR_MIPMAP_LINEAR, "wrapS": _REPEAT, "wrapT": _REPEAT},
+            ],
+        }  # fmt: skip
+
+    def add_part(self, part: Part) -> int:
+        """Index of the mesh of a part."""
+        mesh = part.mesh
+        attributes = {
+            "POSITION": self._accessor(mesh.vertices.astype("<f4"), "VEC3", bounds=True),
+            "NORMAL": self._accessor(_unit(mesh.normals).astype("<f4"), "VEC3"),
+        }
+        if not part.constant:
+            attributes["TEXCOORD_0"] = self._accessor(mesh.uv.astype("<f4"), "VEC2")
+        indices = self._accessor(mesh.faces.astype("<u4").ravel(), "SCALAR", indices=True)
+        primitive = {"attributes": attributes, "indices": indices, "material": self._material(part)}
+        return self._add("meshes", {"name": part.name, "primitives": [primitive]})
+
+    def _material(self, part: Part) -> int:
+        pbr: dict = {}
+        m = _passing(part)
+        if part.constant or (part.surface is not None and part.surface.transmission >= 1):
+            pbr["baseColorFactor"] = [*(float(c) for c in m.albedo[0, 0]), 1.0]
+            pbr["roughnessFactor"] = float(m.roughness[0, 0])
+            pbr["metallicFactor"] = float(m.metallic[0, 0])
+        else:
+            sampler = 0 if part.surface is None else 1
+            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(m), sampler)}
+            packed = metallic_roughness(m)
+            pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
+        material: dict = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
+        if part.surface is not None and max(part.surface.emission) > 0:
+            strength = float(max(part.surface.emission))
+            material["emissiveFactor"] = [float(c) / strength for c in part.surface.emission]
+            material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+            self.extensions.add("KHR_materials_emissive_strength")
+        if part.surface is not None and part.surface.transmission > 0:
+            thick = mean_chord(part)
+            material.setdefault("extensions", {}).update(self._glass(part.surface, thick))
+            material["doubleSided"] = thick == 0
+        return self._add("materials", material)
+
+    def _glass(self, surface: Surface, thick: float) -> dict:
+        """KHR_materials_transmission, _ior and _volume; the base colour tints what passes, see `_passing`.
+
+        Without a thickness glass is a thin wall by the specification, and bends nothing.
+        """
+        glass: dict[str, dict] = {
+            "KHR_materials_transmission": {"transmissionFactor": float(surface.transmission)},
+            "KHR_materials_ior": {"ior": float(surface.ior)},
+        }
+        if thick > 0:
+            glass["KHR_materials_volume"] = {"thicknessFactor": thick}
+        self.extensions |= set(glass)
+        return glass
+
+    def _texture(self, name: str, pixels: Array, sampler: int) -> int:
+        view = self._view(png(pixels))
+        image = self._add("images", {"name": name, "mimeType": "image/png", "bufferView": view})
+        return self._add("textures", {"sampler": sampler, "source": image})
+
+    def _accessor(self, values: Array, kind: str, *, bounds: bool = False, indices: bool = False) -> int:
+        """Index of an accessor of values [N, components] or [N]."""
+        view = self._view(values.tobytes(), _INDICES if indices else _VERTICES)
+        accessor: dict = {
+            "bufferView": view, "componentType": _UINT if indices else _FLOAT, "count": len(values), "type": kind
+        }  # fmt: skip
+        if bounds:
+            accessor |= {"min": values.min(0).tolist(), "max": values.max(0).tolist()}
+        return self._add("accessors", accessor)
+
+    def _view(self, data: bytes, target: int | None = None) -> int:
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(data)}
+        self.data += data + b"\0" * (-len(data) % 4)
+        return self._add("bufferViews", view | ({"target": target} if target else {}))
+
+    def _add(self, kind: str, item: dict) -> int:
+        self.content[kind].append(item)
+        return len(self.content[kind]) - 1
+
+
+def _camera(camera: Camera, parts: list[Part]) -> dict:
+    """The photo's pinhole; near and far well outside of the scene."""
+    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    nearest = float(-parts[0].mesh.vertices[:, 2].max())  # the depth surface lies before the camera
+    aspect = camera.width / camera.height
+    vertical = 2 * math.atan(math.tan(math.radians(camera.fov) / 2) / aspect)
+    near = max(nearest * 0.1, reach * 1e-5)
+    perspective = {"yfov": vertical, "aspectRatio": aspect, "znear": near, "zfar": reach * 4}
+    return {"name": "photo", "type": "perspective", "perspective": perspective}
+
+
+def _unit(normals: Array) -> Array:
+    """[V, 3] unit to float32 rounding; straight to the viewer where there is none."""
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0, 0, 1], np.float32))
+
+
+def _passing(part: Part) -> Materials:
+    """The maps of a part; one colour of glTF is for what glass reflects diffusely and what passes: their mean."""
+    m, surface = one_roughness(part), part.surface
+    if surface is None or surface.transmission == 0:
+        return m
+    share = np.float32(surface.transmission)
+    return replace(m, albedo=((1 - share) * m.albedo + share * np.array(surface.tint, np.float32)).astype(np.float32))

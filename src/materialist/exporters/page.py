@@ -1,0 +1,175 @@
+"""One HTML page that holds everything and asks the network for nothing."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import math
+import zlib
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.color import linear_to_srgb
+from materialist.exporters import pictures
+from materialist.exporters.parts import Part
+from materialist.exporters.textures import jpeg
+from materialist.io.display import to_bytes
+from materialist.types import Array, Camera, Scene
+
+_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)])
+"""A vertex as page.js reads it; colour with alpha 0 means the texture."""
+_NAMES = {
+    "rerender_psnr_path": ("Re-rendering, PSNR", "{:.2f} dB"),
+    "rerender_ssim_path": ("Re-rendering, SSIM", "{:.3f}"),
+    "prior_l1_albedo": ("Albedo, distance from prior", "{:.3f}"),
+    "prior_l1_roughness": ("Roughness, distance from prior", "{:.3f}"),
+    "prior_l1_metallic": ("Metallic, distance from prior", "{:.3f}"),
+    "clipped_fraction": ("Clipped pixels", "{:.1%}"),
+    "poor_fraction": ("Pixels off by more than 0.1", "{:.1%}"),
+    "total_seconds": ("Time", "{:.0f} s"),
+    "peak_rss_mb": ("Peak memory", "{:.0f} MB"),
+}
+"""Figure of the report -> what a person reads."""
+
+
+def write_page(path: Path, scene: Scene, parts: list[Part]) -> None:
+    """Write PATH: slider between photo and re-rendering, the mesh to turn, maps, light, report."""
+    path.write_text(page(scene, parts), "utf-8")
+
+
+def page(scene: Scene, parts: list[Part]) -> str:
+    """The page as text; everything that came from outside is escaped, and a policy in it forbids any request."""
+    assets = files("materialist.exporters") / "assets"
+    camera, title = scene.camera, _title(scene)
+    values = {
+        "title": html.escape(title),
+        "subtitle": html.escape(_subtitle(scene)),
+        "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in _warnings(scene)),
+        "width": str(camera.width),
+        "height": str(camera.height),
+        "photo": _image(to_bytes(linear_to_srgb(scene.photo.linear)), quality=94),
+        "rerender": _image(to_bytes(linear_to_srgb(scene.rerender)), quality=94),
+        "triangles": f"{sum(len(part.mesh.faces) for part in parts):,}",
+        "maps": _maps(scene),
+        "envmap": _image(pictures.light(scene.envmap)),
+        "light_note": f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
+        "metrics": _metrics(scene.report.metrics),
+        "stages": _table(
+            (s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–") for s in scene.report.stages
+        ),
+        "provenance": _table(_options(scene)),
+        "scene": json.dumps(_packed(camera, scene.depth, parts)),
+        "style": (assets / "page.css").read_text("utf-8"),
+        "script": (assets / "page.js").read_text("utf-8"),
+    }
+    # Split, not replaced one after the other: what a value holds is never read as a place for another.
+    pieces = (assets / "page.html").read_text("utf-8").split("{{")
+    rest = (piece.split("}}", 1) for piece in pieces[1:])
+    return pieces[0] + "".join(values[name] + text for name, text in rest)
+
+
+def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
+    """What the scene was made with, in few words."""
+    for key, value in scene.provenance.items():
+        if isinstance(value, list | tuple):
+            plain = all(isinstance(one, int | float | str) for one in value)
+            yield key, " x ".join(map(str, value)) if plain and value else f"{len(value)} of them"
+        elif value is not None and not isinstance(value, dict):
+            yield key, value
+
+
+def _title(scene: Scene) -> str:
+    return (scene.photo.path or "photo").replace("\\", "/").rsplit("/", 1)[-1]
+
+
+def _subtitle(scene: Scene) -> str:
+    camera, native = scene.camera, scene.photo.original.shape
+    return (
+        f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
+        f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}"
+    )
+
+
+def _warnings(scene: Scene) -> list[str]:
+    return list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
+
+
+def _maps(scene: Scene) -> str:
+    m = scene.materials
+    figures = (
+        ("albedo", "Albedo", to_bytes(linear_to_srgb(m.albedo))),
+        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", pictures.grey(m.roughness)),
+        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", pictures.grey(m.metallic)),
+        ("normal", "Normal, camera frame", pictures.normals(scene.normal)),
+        ("depth", "Depth, near bright", pictures.nearness(scene.depth)),
+        (
+            "error",
+            f"Error of the re-rendering × {pictures.ERROR_GAIN}",
+            pictures.error(scene.photo.linear, scene.rerender),
+        ),
+    )
+    return "".join(
+        f'<figure><img id="{name}" src="{_image(pixels)}" alt="{html.escape(caption)}">'
+        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+        for name, caption, pixels in figures
+    )
+
+
+def _metrics(metrics: dict[str, float]) -> str:
+    def shown(key: str, value: Any) -> tuple[str, str]:
+        name, form = _NAMES.get(key, (key, "{:.4g}"))
+        finite = isinstance(value, int | float) and math.isfinite(value)
+        return name, form.format(value) if finite else "–"
+
+    return _table(shown(key, value) for key, value in metrics.items())
+
+
+def _table(rows: Iterable[tuple[Any, Any]]) -> str:
+    return "".join(f"<tr><th>{html.escape(str(a))}</th><td>{html.escape(str(b))}</td></tr>" for a, b in rows)
+
+
+def _image(pixels: Array, quality: int = 90) -> str:
+    return "data:image/jpeg;base64," + base64.b64encode(jpeg(np.ascontiguousarray(pixels), quality)).decode()
+
+
+def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
+    """What page.js needs: the meshes one after the other, deflated, and the camera. Continued planes come last."""
+    shown = [parts[0], *(part for part in parts if part.surface is not None)]
+    parts = [*shown, *(part for part in parts[1:] if part.surface is None)]
+    vertices = np.concatenate([_vertices(part) for part in parts])
+    starts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
+    indices = np.concatenate([part.mesh.faces + start for part, start in zip(parts, starts)]).astype("<u4")
+    reach = float(np.linalg.norm(vertices["position"], axis=1).max())
+    nearest = float(depth[depth > 0].min()) if (depth > 0).any() else 1.0
+    return {
+        "vertices": _deflated(vertices), "indices": _deflated(indices),
+        "surface": 3 * sum(len(part.mesh.faces) for part in shown), "all": indices.size,
+        "tangent": math.tan(math.radians(camera.fov) / 2), "aspect": camera.width / camera.height,
+        "pivot": float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0,
+        "near": nearest * 0.05, "far": reach * 4,
+    }  # fmt: skip
+
+
+def _vertices(part: Part) -> Array:
+    """[V] records of one part; in those of a body, or of a constant part, is the colour."""
+    mesh = part.mesh
+    made = np.zeros(len(mesh.vertices), _VERTEX)
+    made["position"] = mesh.vertices
+    made["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
+    made["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
+    if part.constant or part.surface is not None:
+        albedo = part.materials.albedo  # of a body it repeats
+        height, width = albedo.shape[:2]
+        column, row = np.floor(mesh.uv * (width, height)).astype(int).T
+        made["colour"][:, :3] = to_bytes(linear_to_srgb(albedo[row % height, column % width]))
+        made["colour"][:, 3] = 255
+    return made
+
+
+def _deflated(array: Array) -> str:
+    return base64.b64encode(zlib.compress(array.tobytes(), 9)).decode()

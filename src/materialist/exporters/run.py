@@ -1,0 +1,148 @@
+"""`materialist.export`: which format, where to, and is it free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from materialist.edits.material.material import PICTURED, is_pictured
+from materialist.errors import InputError
+from materialist.exporters.body_parts import body_parts, left_out
+from materialist.exporters.parts import Part, scene_parts
+from materialist.types import Scene
+
+FORMATS = ("glb", "blend", "usd", "mitsuba", "html")
+SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
+"""Format -> suffix of its single file."""
+FOLDERS = ("blend", "usd", "mitsuba")
+"""Formats that may also be a folder: PATH without a suffix of its own."""
+COATED = (
+    "glass whose coat is seen from outside alone: where the transmission is below 1 it is darker there, by 7 to 30 %"
+)
+PAGE_TRIANGLES = 60_000
+"""Triangles in an HTML page unless the caller says otherwise."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written."""
+
+    path: Path
+    """The file or folder to open."""
+    beside: tuple[Path, ...] = ()
+    """Further files that belong to it."""
+    notes: tuple[str, ...] = ()
+    """What the reader should know or do next."""
+
+
+def export(
+    scene: Scene,
+    path: str | Path,
+    *,
+    to: str | None = None,
+    force: bool = False,
+    max_triangles: int | None = None,
+    blender: str | None = None,
+    shadow_catcher: bool = False,
+    fitted_material: bool = False,
+) -> Exported:
+    """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
+
+    Args:
+        path: a file with the suffix of the format; for blend, usd and mitsuba a folder (a name without suffix).
+        to: `glb`, `blend`, `usd`, `mitsuba` or `html`; None: by the suffix of PATH.
+        force: replace PATH where it is an earlier export.
+        max_triangles: rebuild the mesh from a coarser depth map where it has more than these.
+        blender: for blend, the `blender` program or a Python that has `bpy`; None: look for one.
+        shadow_catcher: for blend, start with the reconstruction as a shadow catcher over the photo.
+        fitted_material: for blend, the material model of the fit instead of Blender's Principled.
+
+    Raises:
+        InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
+        SetupError: the extra for the format is missing, or `blender` does not work.
+    """
+    path = Path(path)
+    to = check_format(path, to)
+    if to != "blend" and (blender is not None or shadow_catcher or fitted_material):
+        raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
+    if to == "html" and max_triangles is None:
+        max_triangles = PAGE_TRIANGLES
+    bodies = body_parts(scene)
+    note: tuple[str, ...] = ()
+    if names := left_out(bodies, to):
+        note = (f"{to} shows bodies without {' and '.join(names)}; glb, blend and mitsuba have all of it.",)
+    if scene.lamps and to == "html":
+        count = len(scene.lamps)
+        note = (*note, f"html has none of the scene's {count} lamp{'s' * (count != 1)}; the other formats have.")
+    if is_pictured(scene) and to != "html":
+        note = (*note, f"{PICTURED}{to} shows the scene without it.")
+    if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
+        note = (*note, f"Mitsuba has no {COATED}.")
+    parts = [*scene_parts(scene, max_triangles), *bodies]
+    if to != "blend":
+        made = _writer(to)(path, scene, parts, force)
+        return replace(made, notes=(*made.notes, *note))
+    from materialist.exporters.blender import export_blend
+
+    chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
+    options = [option for option, wanted in chosen.items() if wanted]
+    made = export_blend(path, scene, parts, force, blender=blender, options=options)
+    return replace(made, notes=(*made.notes, *note))
+
+
+def check_format(path: Path, to: str | None) -> str:
+    """The format of an export to PATH. Raises InputError where it is unknown or PATH's suffix is another's."""
+    suffix = path.suffix.lower()
+    if to is None:
+        named = [name for name, end in SUFFIX.items() if end == suffix]
+        if not named:
+            raise InputError(f"{path} does not say its format; give to= one of {', '.join(FORMATS)}.")
+        to = named[0]
+    if to not in FORMATS:
+        raise InputError(f"The format is '{to}'; choose one of {', '.join(FORMATS)}.")
+    folder = to in FOLDERS and suffix not in (".usda", ".usdc", ".usd", ".xml", *SUFFIX.values())
+    if not folder and suffix != SUFFIX.get(to):
+        expected = [f"NAME{SUFFIX[to]}"] if to in SUFFIX else []
+        expected += ["a folder name"] if to in FOLDERS else []
+        raise InputError(f"The output {path} does not fit the format {to}; give {' or '.join(expected)}.")
+    return to
+
+
+def _writer(to: str) -> Callable[..., Exported]:
+    """The function that writes a format, loaded when it is needed."""
+    if to == "usd":
+        from materialist.exporters.usd import export_usd
+
+        return export_usd
+    return {"glb": _glb, "mitsuba": _mitsuba, "html": _html}[to]
+
+
+def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.exporters.glb import write_glb, write_hdr
+    from materialist.exporters.target import whole_files
+
+    light = path.with_suffix(".light.hdr")
+    with whole_files([path, light], force) as (mesh_file, light_file):
+        write_glb(mesh_file, scene, parts)
+        write_hdr(light_file, scene.envmap)
+    note = f"glTF holds no environment light: {light.name} is it, its centre column along the camera's -Z."
+    return Exported(path, (light,), (note,))
+
+
+def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.exporters.mitsuba_xml import write_mitsuba
+    from materialist.exporters.target import whole_folder
+
+    with whole_folder(path, force, format="mitsuba") as folder:
+        write_mitsuba(folder, scene, parts)
+    return Exported(path / "scene.xml", (), (f"Render it with: mitsuba -m scalar_rgb {path / 'scene.xml'}",))
+
+
+def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.exporters.page import write_page
+    from materialist.exporters.target import whole_files
+
+    with whole_files([path], force) as (page,):
+        write_page(page, scene, parts)
+    return Exported(path)

@@ -1,0 +1,164 @@
+"""USD: UsdPreviewSurface materials, the photo's camera and a dome light; one .usdz file, or a folder."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.errors import SetupError
+from materialist.exporters.body_parts import one_roughness
+from materialist.exporters.parts import Part
+from materialist.exporters.run import Exported
+from materialist.exporters.target import whole_files, whole_folder
+from materialist.exporters.textures import base_color, png
+from materialist.io.display import to_bytes
+from materialist.io.exr import write_exr
+from materialist.types import Camera, Lamp, Scene
+
+_APERTURE = 36.0
+"""Width of the film, millimetres; only its ratio to the focal length counts."""
+
+
+def export_usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    """PATH.usdz, or a folder PATH with `scene.usdc` and its textures. Raises SetupError without usd-core."""
+    try:
+        from pxr import UsdUtils
+    except ImportError as error:
+        raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
+    if path.suffix.lower() != ".usdz":
+        with whole_folder(path, force, format="usd") as folder:
+            write_usd(folder, scene, parts)
+        return Exported(path / "scene.usdc")
+    with tempfile.TemporaryDirectory() as scratch, whole_files([path], force) as (result,):
+        write_usd(Path(scratch), scene, parts)
+        if not UsdUtils.CreateNewUsdzPackage(str(Path(scratch) / "scene.usdc"), str(result)):
+            raise OSError(f"usd-core could not pack {path}")
+    return Exported(path)
+
+
+def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
+    """Fill an empty folder with `scene.usdc` and the textures beside it; our frame is USD's with the Y axis up."""
+    from pxr import Sdf, Usd, UsdGeom
+
+    stage = Usd.Stage.CreateNew(str(folder / "scene.usdc"))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Scene").GetPrim())
+    UsdGeom.Scope.Define(stage, "/Scene/Materials")
+    for part in parts:
+        _mesh(stage, part, _material(stage, folder, part, Sdf))
+    _camera(stage, scene.camera, parts)
+    _light(stage, folder, scene)
+    for number, lamp in enumerate(scene.lamps):
+        _lamp(stage, f"/Scene/lamp{number}", lamp)
+    stage.GetRootLayer().Save()
+
+
+def _mesh(stage: Any, part: Part, material: Any) -> None:
+    """A mesh with normals and texture coordinates; USD's v runs up."""
+    from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+    source = part.mesh
+    mesh = UsdGeom.Mesh.Define(stage, f"/Scene/{part.name}")
+    points = np.ascontiguousarray(source.vertices, np.float32)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(source.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(source.faces.ravel(), np.int32)))
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(source.normals, np.float32)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
+    uv = np.stack([source.uv[:, 0], 1 - source.uv[:, 1]], 1).astype(np.float32)  # [V, 2]
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
+    st.Set(Vt.Vec2fArray.FromNumpy(uv))
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
+    """Preview surface of the maps as 8-bit PNG, or of constants."""
+    from pxr import UsdShade
+
+    path = f"/Scene/Materials/{part.name}"
+    material = UsdShade.Material.Define(stage, path)
+    surface = UsdShade.Shader.Define(stage, f"{path}/surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    surface.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.5)
+    material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
+    m = one_roughness(part)
+    color = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    roughness = surface.CreateInput("roughness", Sdf.ValueTypeNames.Float)
+    metallic = surface.CreateInput("metallic", Sdf.ValueTypeNames.Float)
+    if part.surface is not None and max(part.surface.emission) > 0:
+        glow = surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
+        glow.Set(tuple(float(c) for c in part.surface.emission))
+    if part.surface is not None and part.surface.transmission > 0:
+        surface.GetInput("ior").Set(float(part.surface.ior))
+        surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(1 - float(part.surface.transmission))
+    if part.constant:
+        color.Set(tuple(float(c) for c in m.albedo[0, 0]))
+        roughness.Set(float(m.roughness[0, 0]))
+        metallic.Set(float(m.metallic[0, 0]))
+        return material
+    prefix, wrap = ("", "clamp") if part.surface is None else (f"{part.name}_", "repeat")
+    reader = UsdShade.Shader.Define(stage, f"{path}/st")
+    reader.CreateIdAttr("UsdPrimvarReader_float2")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+    for socket, name, pixels, space, output in (
+        (color, "base_color", base_color(m), "sRGB", "rgb"),
+        (roughness, "roughness", to_bytes(m.roughness), "raw", "r"),
+        (metallic, "metallic", to_bytes(m.metallic), "raw", "r"),
+    ):
+        file = f"{prefix}{name}.png"
+        (folder / file).write_bytes(png(pixels))
+        texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
+        texture.CreateIdAttr("UsdUVTexture")
+        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{file}")
+        texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
+        for axis in ("wrapS", "wrapT"):
+            texture.CreateInput(axis, Sdf.ValueTypeNames.Token).Set(wrap)
+        st = texture.CreateInput("st", Sdf.ValueTypeNames.Float2)
+        st.ConnectToSource(reader.ConnectableAPI(), "result")
+        socket.ConnectToSource(texture.ConnectableAPI(), output)
+    return material
+
+
+def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
+    """The photo's pinhole at the origin, which looks down -Z in USD too."""
+    from pxr import Gf, UsdGeom
+
+    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    camera = UsdGeom.Camera.Define(stage, "/Scene/Photo")
+    camera.CreateHorizontalApertureAttr(_APERTURE)
+    camera.CreateVerticalApertureAttr(_APERTURE * photo.height / photo.width)
+    camera.CreateFocalLengthAttr(_APERTURE / 2 / math.tan(math.radians(photo.fov) / 2))
+    camera.CreateClippingRangeAttr(Gf.Vec2f(reach * 1e-5, reach * 4))
+
+
+def _light(stage: Any, folder: Path, scene: Scene) -> None:
+    """The environment map. The centre of USD's (OpenEXR's) lies along +Z, the centre of ours along -Z."""
+    from pxr import Sdf, UsdGeom, UsdLux
+
+    write_exr(folder / "envmap.exr", scene.envmap)
+    light = UsdLux.DomeLight.Define(stage, "/Scene/Light")
+    light.CreateTextureFileAttr(Sdf.AssetPath("./envmap.exr"))
+    light.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+    UsdGeom.Xformable(light).AddRotateYOp().Set(180.0)
+
+
+def _lamp(stage: Any, path: str, lamp: Lamp) -> None:
+    """A glowing sphere: intensity times colour is the radiance of its surface."""
+    from pxr import Gf, UsdGeom, UsdLux
+
+    most = max(lamp.radiance)
+    light = UsdLux.SphereLight.Define(stage, path)
+    light.CreateRadiusAttr(float(lamp.radius))
+    light.CreateIntensityAttr(float(most))
+    light.CreateColorAttr(Gf.Vec3f(*(float(c) / max(most, 1e-30) for c in lamp.radiance)))
+    UsdGeom.Xformable(light).AddTranslateOp().Set(Gf.Vec3d(*(float(c) for c in lamp.position)))

@@ -1,0 +1,1 @@
+"""Procedural shapes, patterns, scenes and lights, and the tracer that makes labelled pictures of them."""

@@ -1,0 +1,150 @@
+"""Random arrangements of objects on a floor, and cameras that look at them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.procedural import patterns
+from materialist.procedural.objects import shapes
+from materialist.procedural.objects.shapes import Solid
+from materialist.types import Array
+
+
+@dataclass(frozen=True)
+class Item:
+    """One object of a scene: its shape and its material."""
+
+    solid: Solid
+    albedo: Array
+    """[h, w, 3] float32 linear picture, repeated over the texture coordinates."""
+    roughness: float
+    metallic: float
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera in the scene frame."""
+
+    position: Array
+    """[3] metres."""
+    to_scene: Array
+    """[3, 3] rotation that turns camera directions into scene directions."""
+    fov: float
+    """Horizontal field of view, degrees."""
+
+
+def arrangement(scene_index: int, *, seed: int, data: Path | None) -> list[Item]:
+    """The floor (with none, one or two walls) and 3 to 7 objects standing on it; the same numbers, the same scene."""
+    rng = np.random.default_rng([seed, 1, scene_index])
+    meshes = _mesh_files(data)
+    items = _room(rng, walls=scene_index % 3)
+    taken: list[tuple[float, float, float]] = []
+    for _ in range(int(rng.integers(3, 8))):
+        solid = _object(rng, meshes)
+        turned = shapes.placed(solid, scale=rng.uniform(0.75, 1.25), turn=rng.uniform(0, 2 * np.pi))
+        radius = float(np.hypot(turned.vertices[:, 0], turned.vertices[:, 2]).max())
+        at = _free_place(rng, radius, taken)
+        if at is not None:
+            taken.append((*at, radius))
+            items.append(_painted(rng, shapes.placed(turned, at=at)))
+    return items
+
+
+def view(scene_index: int, view_index: int, *, seed: int) -> View:
+    """A camera that looks down 10 to 35 degrees onto the objects, with a field of view of 35 to 60 degrees.
+
+    It stays on the side of the scene that has no wall.
+    """
+    rng = np.random.default_rng([seed, 2, scene_index, view_index])
+    fov, tilt = rng.uniform(35, 60), np.radians(rng.uniform(10, 35))
+    azimuth = np.radians({0: rng.uniform(-180, 180), 1: rng.uniform(-55, 55), 2: rng.uniform(5, 60)}[scene_index % 3])
+    distance = 0.95 / np.tan(np.radians(fov) / 2) + 0.3
+    back = np.array([np.cos(tilt) * np.sin(azimuth), np.sin(tilt), np.cos(tilt) * np.cos(azimuth)])
+    target = np.array([rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.35), rng.uniform(-0.1, 0.1)])
+    right = np.cross([0, 1, 0], back)
+    right /= np.linalg.norm(right)
+    return View(target + distance * back, np.stack([right, np.cross(back, right), back], -1), fov)
+
+
+def in_camera(item: Item, camera: View) -> Item:
+    """The item with its shape in the frame of the camera."""
+    solid = item.solid
+    vertices = (solid.vertices - camera.position) @ camera.to_scene
+    return replace(item, solid=replace(solid, vertices=vertices, normals=solid.normals @ camera.to_scene))
+
+
+def _mesh_files(data: Path | None) -> list[Path]:
+    """The PLY files below DATA/meshes; raises InputError when DATA is given and has none."""
+    if data is None:
+        return []
+    files = sorted((data / "meshes").rglob("*.ply"))
+    if not files:
+        raise InputError(f"{data / 'meshes'} holds no .ply meshes; give a folder that does, or leave out --data.")
+    return files
+
+
+def _room(rng: np.random.Generator, walls: int) -> list[Item]:
+    """Floor, back wall and left wall, as many as wanted; a floor alone is a table top under the open sky."""
+    half = rng.uniform(1.5, 2.0) if walls == 0 else 4.0
+    edge = 2 * half
+    x, y, z = np.eye(3)
+    floor = shapes.panel(np.array([-half, 0, half]), edge * x, -edge * z, (edge, edge))
+    panels = [_painted(rng, floor, kinds=("wood", "checker", "noise", "plain"), metals=0)]
+    back, height = rng.uniform(1.3, 1.7), rng.uniform(1.0, 1.6)
+    if walls >= 1:
+        wall = shapes.panel(np.array([-half, 0, -back]), edge * x, height * y, (edge / 2, height / 2))
+        panels.append(_painted(rng, wall, kinds=("plain", "noise", "stripes"), metals=0))
+    if walls >= 2:
+        wall = shapes.panel(np.array([-back, 0, half]), -edge * z, height * y, (edge / 2, height / 2))
+        panels.append(_painted(rng, wall, kinds=("plain", "noise"), metals=0))
+    return panels
+
+
+def _object(rng: np.random.Generator, meshes: list[Path]) -> Solid:
+    """One solid of about 0.3 to 0.8 metres: a mesh from the folder, if there are any, half of the time."""
+    if meshes and rng.random() < 0.6:
+        return shapes.placed(shapes.load(meshes[rng.integers(len(meshes))]), scale=rng.uniform(0.5, 0.75))
+    size = rng.uniform(0.25, 0.55, 3)
+    kind = rng.integers(6)
+    if kind == 0:
+        return shapes.box(size)
+    if kind == 1:
+        return shapes.superquadric(np.full(3, rng.uniform(0.35, 0.6)), 1, 1)
+    if kind == 2:
+        return shapes.superquadric(size, rng.uniform(0.25, 0.8), rng.uniform(0.25, 1))
+    if kind == 3:
+        return shapes.capsule(rng.uniform(0.1, 0.18), rng.uniform(0.15, 0.4))
+    if kind == 4:
+        radius, height = rng.uniform(0.12, 0.2), rng.uniform(0.4, 0.75)
+        neck = rng.uniform(0.4, 0.7)
+        control = np.array([(0.6, 0), (1, 0.3), (rng.uniform(0.8, 1.0), 0.5), (neck, 0.8), (neck * 1.2, 1)])
+        return shapes.vessel(control * [radius, height], thickness=0.02)
+    radius = rng.uniform(0.13, 0.22)
+    control = np.array([(0.7, 0), (0.9, 0.2), (1, 0.6), (1.02, 1)]) * [radius, rng.uniform(1.2, 2.2) * radius]
+    return shapes.vessel(control, thickness=0.025)
+
+
+def _painted(
+    rng: np.random.Generator, solid: Solid, kinds: tuple[str, ...] = patterns.KINDS, metals: float = 0.2
+) -> Item:
+    """The solid with a random material: a share `metals` of them is metal, the others dielectric."""
+    metal = rng.random() < metals
+    kind = "plain" if metal else str(rng.choice(kinds))
+    roughness = rng.uniform(0.2, 0.5) if metal else rng.uniform(0.25, 0.9)
+    return Item(solid, patterns.pattern(rng, kind, metal=metal), float(roughness), float(metal))
+
+
+def _free_place(
+    rng: np.random.Generator, radius: float, taken: list[tuple[float, float, float]]
+) -> tuple[float, float] | None:
+    """A place (x, z) where a disc of that radius touches no other (x, z, radius); None when none was found."""
+    for _ in range(60):
+        angle, distance = rng.uniform(0, 2 * np.pi), 0.85 * np.sqrt(rng.random())
+        x, z = distance * np.cos(angle), distance * np.sin(angle)
+        if all(np.hypot(x - a, z - b) > radius + r + 0.02 for a, b, r in taken):
+            return float(x), float(z)
+    return None

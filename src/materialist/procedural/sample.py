@@ -1,0 +1,164 @@
+"""One labelled picture: a random world, rendered, denoised and exposed like a photograph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from materialist.color import linear_to_srgb, luminance
+from materialist.procedural import outdoors, packing, rooms, workshops
+from materialist.procedural.world import World
+from materialist.render.denoise import denoise
+from materialist.types import Array, Camera
+
+PROBE = 4
+"""Label rays a pixel and axis."""
+ATTEMPTS = 6
+"""Cameras that see too little are thrown away at most that often."""
+_KINDS: tuple[tuple[str, Callable[..., World], float, float], ...] = (
+    ("room", rooms.room, 0.45, 0.27),
+    ("table", rooms.table_top, 0.17, 0.17),
+    ("still-life", outdoors.still_life, 0.15, 0.525),
+    ("outdoor", outdoors.outdoor, 0.23, 0.184),
+    ("workshop", workshops.workshop, 0.25, 0.0),
+)
+"""Name, maker, share of a training set, share of a held-out one: that prefers captured meshes and light, and stays as
+it was, so that scores remain comparable."""
+KINDS = tuple(name for name, *_ in _KINDS)
+_KEY: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
+"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What decides, with the number of a sample, what it shows."""
+
+    size: int = 256
+    """Pixels on a side."""
+    seed: int = 0
+    spp: int = 16
+    """Samples per pixel before denoising."""
+    split: str = "train"
+    meshes: tuple[Path, ...] = ()
+    """Files that the split may use, sorted."""
+    envmaps: tuple[Path, ...] = ()
+    device: str = "auto"
+    only: str = ""
+    """One of KINDS, where all samples are to be of it."""
+
+
+def make_sample(index: int, options: Options) -> dict[str, Array]:
+    """The arrays of sample `index`, as they are stored (docs/training_data.md); the same for the same arguments.
+
+    Raises SetupError where Mitsuba or the denoiser is missing.
+    """
+    for attempt in range(ATTEMPTS):
+        rng = np.random.default_rng([options.seed, index, attempt, *_KEY[options.split]])
+        world = make_world(rng, options)
+        probe, tracer = _look(world, rng, options)
+        if attempt == ATTEMPTS - 1 or worth_seeing(probe):
+            break
+    return _developed(world, probe, tracer, rng, options)
+
+
+def make_world(rng: np.random.Generator, options: Options) -> World:
+    """A random scene of the kinds' shares, or of the one kind that the options name."""
+    names, makers, train, heldout = zip(*_KINDS)
+    weight = np.array(heldout if options.split == "heldout" else train)
+    if options.only:
+        weight = np.array([float(name == options.only) for name in names])
+    return makers[rng.choice(len(makers), p=weight / weight.sum())](rng, options.meshes, options.envmaps)
+
+
+def _look(world: World, rng: np.random.Generator, options: Options):
+    from materialist.procedural.tracer import Tracer
+
+    camera = Camera(options.size, options.size, world.view.fov)
+    tracer = Tracer(packing.pack(world, rng), camera, device=options.device)
+    return tracer.probe(PROBE), tracer
+
+
+def worth_seeing(probe: dict[str, Array]) -> bool:
+    """Whether a view shows several things at a distance, rather than the inside of a cupboard."""
+    owner, depth = probe["owner"][..., 0], probe["depth"][..., 0]
+    seen = owner >= 0
+    _, counts = np.unique(owner[seen], return_counts=True)
+    if seen.mean() < 0.3 or (counts > owner.size / 400).sum() < 6:
+        return False
+    near = np.median(depth[seen]) * 0.25
+    return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
+
+
+def _developed(world: World, probe, tracer, rng: np.random.Generator, options: Options) -> dict[str, Array]:
+    """Render, denoise, expose, quantise."""
+    noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
+    normal = probe["normal"].mean(2)
+    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal)
+    # The shading is of white surfaces: a guide of their texture would print it into the shading.
+    covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
+    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal)
+    labels = labels_of(probe)
+    gain = exposure(image, rng) * balance(shading, rng)
+    byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
+    half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
+    return {
+        "image": half(image * gain), "shading": half(shading * gain),
+        "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
+        "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
+        "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),
+        "thing": things_of(world, probe), "kind": np.array(world.kind),
+    }  # fmt: skip
+
+
+def things_of(world: World, probe: dict[str, Array]) -> Array:
+    """[H, W] int16: the number of the thing at a pixel's centre, negative for walls and the like, 0 for nothing."""
+    number: dict[object, int] = {}
+    of_part = [0]
+    for k, part in enumerate(world.parts):
+        own = number.setdefault(("part", k) if part.thing is None else part.thing, len(number) + 1)
+        of_part.append(-own if part.thing is None else own)
+    owner = probe["owner"][..., _centre(probe)].astype(int)
+    return np.array(of_part, np.int16)[owner + 1]
+
+
+def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
+    """Maps [H, W, ...] of a probe [H, W, N, ...]: of the surface at the pixel's centre, its texture averaged over the
+    rays of the pixel that see the same part; all 0 where there is no surface."""
+    centre = _centre(probe)
+    owner = probe["owner"][..., centre]
+    mask = (owner >= 0) & (probe["surface"][..., centre] > 0.5)
+    same = ((probe["owner"] == owner[..., None]) & mask[..., None]).astype(np.float32)
+    share = same / np.maximum(same.sum(-1, keepdims=True), 1)
+    out = {k: (probe[k] * share).sum(2) for k in ("roughness", "metallic")}
+    out["albedo"] = (probe["albedo"] * share[..., None]).sum(2)
+    out["normal"] = probe["normal"][:, :, centre] * mask[..., None]
+    out["depth"] = probe["depth"][..., centre] * mask
+    out["mask"] = mask
+    return out
+
+
+def _centre(probe: dict[str, Array]) -> int:
+    """The number of the ray through the middle of a pixel."""
+    side = round(np.sqrt(probe["owner"].shape[2]))
+    return side * (side // 2) + side // 2
+
+
+def exposure(image: Array, rng: np.random.Generator) -> float:
+    """Factor that exposes linear radiance [H, W, 3] as cameras do, give or take: middle grey, some highlights lost."""
+    light = luminance(image)
+    middle = float(np.exp(np.log(np.maximum(light, 1e-4 * light.mean() + 1e-9)).mean()))
+    # Lamps in the picture must not make the rest black, nor a bright window.
+    high = min(float(np.percentile(light, 93)), 12 * middle)
+    aim = (0.17 / max(middle, 1e-9)) ** 0.6 * (0.75 / max(high, 1e-9)) ** 0.4
+    return float(np.clip(aim * np.exp(rng.normal(0, 0.3)), 1e-6, 1e6))
+
+
+def balance(shading: Array, rng: np.random.Generator) -> Array:
+    """[3] gains, about 1, that make most of the light's colour white, as the maker of a camera would have it."""
+    light = np.median(shading.reshape(-1, 3), 0) + 1e-6 + 1e-3 * shading.mean()
+    strength = rng.uniform(0.4, 1.0) if rng.random() < 0.85 else rng.uniform(0.0, 0.4)
+    gains = (luminance(light) / light) ** strength * np.exp(rng.normal(0, 0.04, 3))
+    return np.clip(gains, 0.2, 5).astype(np.float32)

@@ -1,0 +1,256 @@
+"""What the path tracer knows about a point: surface, material, light. Dr.Jit code on flat buffers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from materialist.procedural import tiles
+from materialist.procedural.packing import ENV_ROWS, ENV_TABLE, FACE, LIGHT_TABLE, MATERIAL, MAX_PORTALS, PORTAL
+
+_ALBEDO_RANGE = (0.01, 0.95)
+_LEAST_ROUGHNESS = 0.05
+
+
+@dataclass
+class Hit:
+    """A point on the mesh, seen along some direction; the names of a surface interaction."""
+
+    valid: Any
+    p: Any
+    t: Any
+    ng: Any
+    """Unit geometric normal on the side of the viewer."""
+    n: Any
+    """Unit shading normal on that side."""
+    frame: Any
+    uv: Any
+    front: Any
+    """Whether the front side is seen."""
+    owner: Any
+    """Number of the part and row of its material, UInt32."""
+    density: Any
+    """Probability density of aiming at this point as a light, 1 / m2."""
+
+
+@dataclass
+class Look:
+    """The material at a point."""
+
+    albedo: Any
+    roughness: Any
+    metallic: Any
+    emission: Any
+    surface: Any
+
+
+@dataclass
+class ToLight:
+    """A direction that was aimed at a light; `pdf` is per solid angle, over all ways of aiming."""
+
+    d: Any
+    distance: Any
+    radiance: Any
+    pdf: Any
+
+
+@dataclass
+class Surfaces:
+    """The mesh and its materials: `face` [F * FACE] and `material` [M * MATERIAL] Floats, `bank` UInt32 texels."""
+
+    face: Any
+    material: Any
+    bank: Any
+
+    def hit(self, found, d) -> Hit:
+        """The surface at preliminary intersections `found` of rays with directions d."""
+
+        return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid())
+
+    def at(self, index, b, d, t, valid) -> Hit:
+        """The surface at barycentric coordinates b of faces, seen along directions d."""
+        import drjit as dr
+        import mitsuba as mi
+
+        row = [dr.gather(mi.Vector4f, self.face, index * (FACE // 4) + k, valid) for k in range(FACE // 4)]
+        corners = [(row[2 * k], row[2 * k + 1]) for k in range(3)]
+        place = [mi.Point3f(a.x, a.y, a.z) for a, _ in corners]
+        normal = [mi.Vector3f(a.w, c.x, c.y) for a, c in corners]
+        uv = [mi.Point2f(c.z, c.w) for _, c in corners]
+        mix = lambda v: v[0] * (1 - b.x - b.y) + v[1] * b.x + v[2] * b.y  # noqa: E731
+        ng = dr.cross(place[1] - place[0], place[2] - place[0])
+        ng = ng * dr.rsqrt(dr.maximum(dr.squared_norm(ng), 1e-30))
+        n = mix(normal)
+        n = n * dr.rsqrt(dr.maximum(dr.squared_norm(n), 1e-20))
+        front = dr.dot(ng, d) < 0
+        ng = dr.select(front, ng, -ng)
+        n = dr.select(dr.dot(n, ng) < 0, -n, n)
+        # Bend normals that turn away from the viewer back to the silhouette.
+        away = dr.dot(n, d) + 0.01
+        n = dr.select(away > 0, dr.normalize(n - d * away * 1.01), n)
+        return Hit(valid, mix(place), t, ng, n, mi.Frame3f(n), mix(uv), front, mi.UInt32(row[6].x), row[6].y)
+
+    def look(self, hit: Hit, texel) -> Look:
+        """The material at hits; `texel` in [0, 1)^2 spreads the lookup over neighbouring texels."""
+        import drjit as dr
+        import mitsuba as mi
+
+        r = [dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid) for k in range(7)]
+        s = hit.uv.x * r[3].z + hit.uv.y * r[3].w + r[4].z
+        t = hit.uv.x * r[4].x + hit.uv.y * r[4].y + r[4].w
+        side = tiles.SIZE
+        column = mi.UInt32(mi.Int32(dr.floor((s - dr.floor(s)) * side + texel.x - 0.5)) + side) % side
+        line = mi.UInt32(mi.Int32(dr.floor((t - dr.floor(t)) * side + texel.y - 0.5)) + side) % side
+        word = dr.gather(mi.UInt32, self.bank, (mi.UInt32(r[5].w) * side + line) * side + column, hit.valid)
+        f: list[Any] = [mi.Float((word >> (8 * k)) & 255) / 255 for k in range(4)]
+        colours: list[Any] = [mi.Color3f(v.x, v.y, v.z) for v in r[:3]]
+        albedo: Any = dr.lerp(dr.lerp(colours[0], colours[1], f[0]), colours[2], f[1])
+        albedo = dr.clip(albedo * dr.exp(r[2].w * (f[2] - 0.5)), *_ALBEDO_RANGE)
+        roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _LEAST_ROUGHNESS, 1)
+        metallic = dr.lerp(r[3].x, r[3].y, f[0])
+        emission = mi.Color3f(r[5].x, r[5].y, r[5].z) * albedo
+        return Look(albedo, roughness, metallic, emission, r[6].x)
+
+
+@dataclass
+class Lights:
+    """Light from afar and from luminous faces; the buffers of `packing.Packed`."""
+
+    env: Any
+    sizes: Any
+    env_table: Any
+    env_density: Any
+    portals: Any
+    faces: Any
+    shares: Any
+    turn: Any
+    """Three rows of the rotation from camera to scene directions."""
+
+    def sky(self, d):
+        """Radiance from direction d (camera frame), bilinear."""
+        import drjit as dr
+        import mitsuba as mi
+
+        u, v = self._place(d)
+        x, y = u * self.sizes[1] - 0.5, v * self.sizes[0] - 0.5
+        columns, rows = mi.Int32(self.sizes[1]), mi.Int32(self.sizes[0])
+        x0, y0 = dr.floor(x), dr.floor(y)
+        fx, fy = x - x0, y - y0
+        total = mi.Color3f(0)
+        for dy in (0, 1):
+            row = dr.clip(mi.Int32(y0) + dy, 0, rows - 1)
+            for dx in (0, 1):
+                column = (mi.Int32(x0) + dx + columns) % columns
+                value = dr.gather(mi.Vector4f, self.env, mi.UInt32(row * columns + column))
+                weight = (fx if dx else 1 - fx) * (fy if dy else 1 - fy)
+                total += mi.Color3f(value.x, value.y, value.z) * weight
+        return total
+
+    def _place(self, d):
+        """(u, v) in [0, 1) of directions in the camera frame."""
+        import drjit as dr
+        import mitsuba as mi
+
+        s = mi.Vector3f(*(dr.dot(row, d) for row in self.turn))
+        u = dr.atan2(s.x, -s.z) * (0.5 * dr.inv_pi) + 0.5
+        return u - dr.floor(u), dr.acos(dr.clip(s.y, -1, 1)) * dr.inv_pi
+
+    def density(self, ray, hit: Hit):
+        """Density per solid angle with which `aim` would have found what the ray found, seen from its origin."""
+        import drjit as dr
+
+        cosine = dr.abs(dr.dot(hit.ng, ray.d))
+        lamp = self.shares[2] * hit.density * hit.t * hit.t / dr.maximum(cosine, 1e-6)
+        return dr.select(hit.valid, dr.select(hit.front, lamp, 0), self._sky_density(ray.o, ray.d))
+
+    def _sky_density(self, p, d):
+        import drjit as dr
+        import mitsuba as mi
+
+        u, v = self._place(d)
+        column = dr.minimum(mi.UInt32(u * (2 * ENV_ROWS)), 2 * ENV_ROWS - 1)
+        row = dr.minimum(mi.UInt32(v * ENV_ROWS), ENV_ROWS - 1)
+        total = self.shares[0] * dr.gather(mi.Float, self.env_density, row * (2 * ENV_ROWS) + column)
+        return total + self.shares[1] * self._portal_density(p, d)
+
+    def _portal_density(self, p, d):
+        import drjit as dr
+        import mitsuba as mi
+
+        total = mi.Float(0)
+        for k in range(MAX_PORTALS):
+            corner, right, up, normal, share = self._portal(mi.UInt32(k))
+            cosine = -dr.dot(normal, d)
+            t = -dr.dot(normal, corner - p) / dr.maximum(cosine, 1e-6)
+            q = p + d * t - corner
+            a = dr.dot(q, right) / dr.maximum(dr.squared_norm(right), 1e-9)
+            b = dr.dot(q, up) / dr.maximum(dr.squared_norm(up), 1e-9)
+            inside = (cosine > 1e-4) & (t > 0) & (a >= 0) & (a < 1) & (b >= 0) & (b < 1)
+            total += dr.select(inside, share * t * t / dr.maximum(cosine, 1e-4), 0)
+        return total
+
+    def _portal(self, k):
+        import drjit as dr
+        import mitsuba as mi
+
+        r = [dr.gather(mi.Vector4f, self.portals, k * (PORTAL // 4) + i) for i in range(PORTAL // 4)]
+        corner, right = mi.Point3f(r[0].x, r[0].y, r[0].z), mi.Vector3f(r[0].w, r[1].x, r[1].y)
+        return corner, right, mi.Vector3f(r[1].z, r[1].w, r[2].x), mi.Vector3f(r[2].y, r[2].z, r[2].w), r[3].x
+
+    def aim(self, hit: Hit, surfaces: Surfaces, draws) -> ToLight:
+        """One direction from each hit towards a light, chosen by `draws.which` and `draws.light`."""
+        import drjit as dr
+        import mitsuba as mi
+
+        s0, s1, s2 = self.shares
+        to_sky, to_portal = draws.which < s0, draws.which < s0 + s1
+        # The envmap: a texel from the table, a uniform direction within it.
+        entry = mi.UInt32(dr.clip(draws.which / dr.maximum(s0, 1e-6), 0, 0.999999) * ENV_TABLE)
+        d_sky = self._texel_direction(dr.gather(mi.UInt32, self.env_table, entry), draws.light)
+        # A portal: a uniform point on it.
+        count = dr.maximum(mi.Float(0), draws.which - s0) / dr.maximum(s1, 1e-6)
+        k = mi.UInt32(dr.clip(count, 0, 0.999999) * self._portal_count())
+        corner, right, up, _, _ = self._portal(dr.minimum(k, MAX_PORTALS - 1))
+        d_portal = dr.normalize(corner + right * draws.light.x + up * draws.light.y - hit.p + 1e-9)
+        # A luminous face: a uniform point on it.
+        rest = dr.clip((draws.which - s0 - s1) / dr.maximum(s2, 1e-6), 0, 0.999999)
+        face = dr.gather(mi.UInt32, self.faces, mi.UInt32(rest * LIGHT_TABLE))
+        root = dr.sqrt(draws.light.x)
+        b = mi.Point2f(1 - root, root * draws.light.y)
+        lamp_active = ~to_portal
+        lamp = surfaces.at(face, b, mi.Vector3f(0, 0, 1), mi.Float(0), lamp_active)
+        away = lamp.p - hit.p
+        distance = dr.norm(away)
+        d_lamp = away / dr.maximum(distance, 1e-9)
+        towards = dr.dot(dr.select(lamp.front, lamp.ng, -lamp.ng), d_lamp)
+        look = surfaces.look(lamp, draws.texel)
+        lamp_pdf = s2 * lamp.density * distance * distance / dr.maximum(-towards, 1e-6)
+        d = dr.select(to_sky, d_sky, dr.select(to_portal, d_portal, d_lamp))
+        pdf = dr.select(to_portal, self._sky_density(hit.p, d), dr.select(towards < 0, lamp_pdf, 0))
+        radiance = dr.select(to_portal, self.sky(d), look.emission)
+        return ToLight(d, dr.select(to_portal, 1e8, distance * 0.999), radiance, pdf)
+
+    def _portal_count(self):
+        """Number of portals, from the rows in use."""
+        import drjit as dr
+        import mitsuba as mi
+
+        used = [dr.gather(mi.Float, self.portals, mi.UInt32(k * PORTAL + 12)) > 0 for k in range(MAX_PORTALS)]
+        return sum((dr.select(u, mi.Float(1), 0) for u in used), mi.Float(0))
+
+    def _texel_direction(self, texel, u):
+        import drjit as dr
+        import mitsuba as mi
+
+        row, column = texel // (2 * ENV_ROWS), texel % (2 * ENV_ROWS)
+        step = float(np.pi / ENV_ROWS)
+        top, bottom = dr.cos(mi.Float(row) * step), dr.cos(mi.Float(row + 1) * step)
+        y = dr.lerp(top, bottom, u.y)
+        phi = (mi.Float(column) + u.x) * step - dr.pi
+        s, c = dr.sincos(phi)
+        r = dr.safe_sqrt(1 - y * y)
+        scene = mi.Vector3f(r * s, y, -r * c)
+        rows = self.turn
+        return mi.Vector3f(*(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3)))

@@ -1,0 +1,259 @@
+"""Synthetic photographs with everything known: materials, shape, light, and the true scene to render again.
+
+The protocol is that of the paper (section "Environment Map Optimization": 10 scenes x 10 viewpoints x 10 lightings);
+the scenes are our own. The frame of the camera is the only frame: objects and light are turned into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.procedural import arrangements as scenes
+from materialist.procedural import lights
+from materialist.render.buffers import floats, integers, tensor
+from materialist.types import Array, Camera, Materials, Photo, Prediction
+
+PHOTO_SPP = 576
+"""Samples a pixel of a reference picture: two seeds then agree to about 40 dB. A square, for the stratified sampler."""
+MAX_DEPTH = 6
+"""Path length of the reference pictures: five bounces."""
+WAVEFRONT = 2**24
+"""Paths traced at a time."""
+EXPOSED = 0.85
+"""Luminance at which the brightest two hundredths of the surfaces are exposed."""
+
+
+@dataclass(frozen=True)
+class SyntheticSample:
+    """One picture of the benchmark and its truth."""
+
+    photo: Photo
+    truth: Prediction
+    """The true maps at the photo's size: shading normal, planar depth with 0 for sky."""
+    envmap: Array
+    """[256, 512, 3] float32 linear: the light of the photo, in the camera frame and at the photo's exposure."""
+    render: Callable[..., Array]
+    """render(envmap, spp=256, seed=0) -> [H, W, 3] float32 linear, unclipped: the true scene under another light."""
+    name: str = ""
+    things: tuple[Array, ...] = ()
+    """[H, W] bool masks of the objects that are seen, ground and walls left out."""
+
+
+def make_sample(
+    scene_index: int,
+    view_index: int,
+    light_index: int,
+    *,
+    size: int | tuple[int, int] = 128,
+    data: str | Path | None = None,
+    seed: int = 0,
+    spp: int = PHOTO_SPP,
+) -> SyntheticSample:
+    """The sample of these three numbers; the same numbers and seed give the same sample.
+
+    `size` is the side of a square photo or (height, width), in pixels. With `data`, objects also come from
+    DATA/meshes/**/*.ply and light from DATA/envmaps/*.exr; without, everything is procedural. Raises InputError when
+    DATA lacks them. Needs a Mitsuba variant to be set (render.variant.setup).
+    """
+    height, width = (size, size) if isinstance(size, int) else size
+    folder = None if data is None else Path(data)
+    truth_scene = _true_scene(scene_index, view_index, height, width, folder, seed)
+    radiance = lights.environment(light_index, seed=seed, data=folder)
+    envmap = lights.envmap(radiance, truth_scene.view.to_scene)
+    picture = truth_scene.render(envmap, spp=spp, seed=_photo_seed(scene_index, view_index, light_index))
+    exposure = _exposure(picture, truth_scene.truth.depth > 0)
+    linear = np.clip(picture * exposure, 0, 1).astype(np.float32)
+    name = f"scene {scene_index} view {view_index} light {light_index}"
+    photo = Photo(linear=linear, camera=truth_scene.camera, original=linear, fov_source="option", path=name)
+    return SyntheticSample(
+        photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene.render, name=name,
+        things=truth_scene.things,
+    )  # fmt: skip
+
+
+def _photo_seed(*index: int) -> int:
+    """A seed of its own for the path tracer of every photo."""
+    return int(np.random.default_rng(index).integers(1, 2**31))
+
+
+def _exposure(picture: Array, surface: Array) -> float:
+    """Factor that brings the 98th percentile of the surfaces' luminance to EXPOSED, as a camera would."""
+    from materialist.color import luminance
+
+    bright = float(np.percentile(luminance(picture)[surface], 98)) if surface.any() else float(picture.max())
+    return EXPOSED / max(bright, 1e-6)
+
+
+class TrueScene:
+    """The true geometry and materials of one view in Mitsuba, to be rendered under any envmap."""
+
+    def __init__(self, items: list[scenes.Item], view: scenes.View, height: int, width: int):
+        import mitsuba as mi
+
+        self.view = view
+        self.camera = Camera(width, height, view.fov)
+        self.items = items
+        shapes = {f"item{k:02d}": _mesh(item, k) for k, item in enumerate(items)}
+        self._scene = mi.load_dict({"type": "scene", "sensor": _sensor(self.camera), "light": _emitter(), **shapes})
+        self._params = mi.traverse(self._scene)
+        self._params.keep(["light.data"])
+        self._item_of_shape = _registry(list(shapes.values()))
+        self.truth = self._true_maps()
+
+    def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
+        """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
+        import mitsuba as mi
+
+        from materialist.render.envmap import on_mitsuba_grid
+
+        self._params["light.data"] = tensor(mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+        self._params.update()
+        integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH})
+        # Whole squares suit the stratified sampler; batches bound the memory.
+        total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
+        for k, part in enumerate(batches):
+            picture = mi.render(
+                self._scene, integrator=integrator, spp=part, seed=mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
+            )
+            total += np.array(picture)[..., :3] * part
+        return (total / sum(batches)).astype(np.float32)
+
+    def _batches(self, spp: int) -> list[int]:
+        """Samples a pixel of each pass: squares, together at least spp, each within WAVEFRONT paths."""
+        most = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
+        count = -(-spp // most)
+        return [int(np.ceil(np.sqrt(spp / count))) ** 2] * count
+
+    def _true_maps(self, sub: int = 4) -> Prediction:
+        """Depth and normal at pixel centres; albedo averaged over sub x sub places on the object at the centre."""
+        centre = self._probe((0.5, 0.5))
+        item = centre["item"]
+        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
+        self.things = tuple(item == k for k in np.unique(item[item >= 0]) if k not in flat)
+        total, count = np.zeros((*item.shape, 3)), np.zeros((*item.shape, 1))
+        for place in np.ndindex(sub, sub):
+            part = self._probe(tuple((np.array(place) + 0.5) / sub))
+            same = (part["item"] == item)[..., None]
+            total += np.where(same, self._albedo(part), 0)
+            count += same
+        albedo = np.where(count > 0, total / np.maximum(count, 1), self._albedo(centre))
+        # Item -1, the sky, finds the value at the end.
+        roughness = np.array([*(i.roughness for i in self.items), 0.5])
+        metallic = np.array([*(i.metallic for i in self.items), 0.0])
+        materials = Materials(*(x.astype(np.float32) for x in (albedo, roughness[item], metallic[item])))
+        return Prediction(materials, centre["normal"], centre["depth"], predictor="truth")
+
+    def _albedo(self, seen: dict[str, Array]) -> Array:
+        """[H, W, 3] albedo of what a probe saw, looked up as Mitsuba does: bilinear, repeated; 0 for sky."""
+        albedo = np.zeros((*seen["item"].shape, 3))
+        for k, item in enumerate(self.items):
+            here = seen["item"] == k
+            albedo[here] = _bilinear(item.albedo, seen["uv"][here])
+        return albedo
+
+    def _probe(self, offset: tuple[float, float]) -> dict[str, Array]:
+        """What rays through that (x, y) place in each pixel see: item (-1 = sky), depth, normal [., 3], uv [., 2]."""
+        import drjit as dr
+        import mitsuba as mi
+
+        height, width = self.camera.height, self.camera.width
+        columns, rows = np.meshgrid(np.arange(width) + offset[0], np.arange(height) + offset[1])
+        x = floats(mi, (columns - width / 2) / self.camera.focal)
+        y = floats(mi, (height / 2 - rows) / self.camera.focal)
+        si = self._scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1))))
+        normal = dr.select(si.is_valid(), si.sh_frame.n, mi.Normal3f(0, 0, 1))
+        depth = dr.select(si.is_valid(), -si.p.z, 0)
+        picture = lambda v: np.moveaxis(np.array(v, np.float32).reshape(-1, height, width), 0, -1)  # noqa: E731
+        item = self._item_of_shape[np.array(dr.reinterpret_array(mi.UInt32, si.shape))].reshape(height, width)
+        return {"item": item, "depth": picture(depth)[..., 0], "normal": picture(normal), "uv": picture(si.uv)}
+
+
+def _bilinear(picture: Array, uv: Array) -> Array:
+    """[n, 3] values of picture [h, w, 3] at texture coordinates [n, 2], repeated outside [0, 1]."""
+    h, w = picture.shape[:2]
+    x, y = uv[:, 0] * w - 0.5, uv[:, 1] * h - 0.5
+    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    row = lambda yy: picture[yy % h, x0 % w] * (1 - fx) + picture[yy % h, (x0 + 1) % w] * fx  # noqa: E731
+    return row(y0) * (1 - fy) + row(y0 + 1) * fy
+
+
+@lru_cache(maxsize=1)
+def _true_scene(scene_index: int, view_index: int, height: int, width: int, data: Path | None, seed: int) -> TrueScene:
+    """The scene of a view; the last one is kept, since all lights of a view share it."""
+    view = scenes.view(scene_index, view_index, seed=seed)
+    items = [scenes.in_camera(item, view) for item in scenes.arrangement(scene_index, seed=seed, data=data)]
+    return TrueScene(items, view, height, width)
+
+
+def _registry(meshes: list[Any]) -> Array:
+    """[n] item number by Mitsuba's number of a shape; -1 for number 0 (nothing was hit)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    numbers = [int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes]
+    table = np.full(max(numbers) + 1, -1)
+    table[numbers] = np.arange(len(meshes))
+    return table
+
+
+def _mesh(item: scenes.Item, number: int) -> Any:
+    """A Mitsuba mesh with the item's material."""
+    import mitsuba as mi
+
+    def texture(values: Array) -> dict[str, Any]:
+        bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
+        return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat"}
+
+    maps = {"base_color": texture(item.albedo)}
+    maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
+    props = mi.Properties()
+    props["bsdf"] = mi.load_dict({"type": "materialist_disney", **maps})
+    solid = item.solid
+    mesh = mi.Mesh(
+        f"item{number:02d}",
+        len(solid.vertices),
+        len(solid.faces),
+        props=props,
+        has_vertex_normals=True,
+        has_vertex_texcoords=True,
+    )
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = floats(mi, solid.vertices)
+    params["vertex_normals"] = floats(mi, solid.normals)
+    params["vertex_texcoords"] = floats(mi, solid.uv)
+    params["faces"] = integers(mi, solid.faces)
+    params.update()
+    return mesh
+
+
+def _sensor(camera: Camera) -> dict[str, Any]:
+    """Pinhole at the origin looking along -Z; every pixel is the mean over its own square."""
+    import mitsuba as mi
+
+    film = {"type": "hdrfilm", "width": camera.width, "height": camera.height, "rfilter": {"type": "box"}}
+    return {
+        "type": "perspective",
+        "fov": camera.fov,
+        "fov_axis": "x",
+        "near_clip": 1e-3,
+        "far_clip": 1e3,
+        "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0]),
+        "film": film | {"pixel_format": "rgb"},
+        # Stratified samples: 3 to 5 dB less noise than independent ones at the same count.
+        "sampler": {"type": "multijitter"},
+    }
+
+
+def _emitter() -> dict[str, Any]:
+    """An envmap emitter whose centre column looks along -Z; Mitsuba's own convention has it along +Z."""
+    import mitsuba as mi
+
+    placeholder = mi.Bitmap(np.ones((9, 8, 3), np.float32))
+    return {"type": "envmap", "bitmap": placeholder, "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180)}

@@ -1,0 +1,243 @@
+"""A path tracer of one fixed kernel, for many small scenes: every scene is the same code on other buffers.
+
+Mitsuba's own integrators compile again whenever the set of shapes, materials or lamps changes, which costs more than
+a 256 x 256 picture. Here all shapes are one mesh, all materials rows of a table over one bank of tiles, and lamps are
+luminous faces of the mesh. The reflectance is that of `render.bsdf` (paper, section Preliminary). Light is sampled by
+the balance heuristic between the BSDF and one draw from {envmap, portals, luminous faces}.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.procedural import scatter, tiles
+from materialist.procedural.packing import Packed
+from materialist.procedural.shading import Hit, Lights, Surfaces
+from materialist.render.buffers import floats, integers
+from materialist.render.variant import setup
+from materialist.types import Array, Camera
+
+MAX_DEPTH = 5
+"""Surfaces a path may meet."""
+KEEP = (0.6, 0.5)
+"""Probability that a path goes on from its first and from a later surface."""
+VECTOR = 16
+"""Lanes whose paths end together: a vector of the processor costs as much for one path as for all of them."""
+CLAMP = 30.0
+"""Largest contribution of one light sample after the first surface, against fireflies; mean light is about 1."""
+
+_BANK: dict[str, Any] = {}
+
+
+def _bank(mi):
+    """The tiles on the device, once a process: [N * SIZE * SIZE] UInt32, four channels of 8 bits."""
+    if "tiles" not in _BANK:
+        packed = np.ascontiguousarray(tiles.bank()[0]).view(np.uint32).ravel()
+        _BANK["tiles"] = integers(mi, packed)
+    return _BANK["tiles"]
+
+
+class Tracer:
+    """One packed world, ready to be rendered."""
+
+    def __init__(self, packed: Packed, camera: Camera, *, device: str = "auto"):
+        self.mi = mi = setup(device)
+        import drjit as dr
+
+        if camera.width * camera.height % VECTOR:
+            raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
+        self.camera = camera
+        zero = dr.opaque(mi.Float, 0.0)
+
+        def flat(array: Array):
+            """The array in Dr.Jit's own memory: numpy's may be aligned otherwise, and then other code is compiled."""
+            copy = floats(mi, array) + zero
+            dr.eval(copy)
+            return copy
+
+        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(mi, packed)})
+        self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank(mi))
+        rows, columns = packed.env.shape[:2]
+        sizes = dr.opaque(mi.Float, float(rows)), dr.opaque(mi.Float, float(columns))
+        shares = [dr.opaque(mi.Float, float(s)) for s in packed.shares]
+        turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
+        self.lights = Lights(
+            flat(packed.env), sizes, integers(mi, packed.env_table), flat(packed.env_density), flat(packed.portals),
+            integers(mi, packed.lights), shares, turn,
+        )  # fmt: skip
+        self.offset = dr.opaque(mi.Float, 2e-5 * (1 + packed.reach))
+        self.focal = dr.opaque(mi.Float, float(camera.focal))
+
+    def render(self, *, spp: int, seed: int) -> tuple[Array, Array]:
+        """([H, W, 3] linear radiance, [H, W, 3] diffuse shading), noisy.
+
+        The shading is what the diffuse lobe of the first surface would send back with albedo 1 and metallic 0.
+        """
+        import drjit as dr
+
+        mi, (h, w) = self.mi, (self.camera.height, self.camera.width)
+        rows = max(1, int(np.sqrt(spp)))
+        spp = rows * rows
+        lane = dr.arange(mi.UInt32, h * w * spp)
+        # Lanes that end together belong to pixels far from each other: their common fate leaves no streaks.
+        place, sample = lane % (h * w), lane // (h * w)
+        pixel = place // VECTOR + (place % VECTOR) * (h * w // VECTOR)
+        rng = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))
+        jitter = mi.Point2f(mi.Float(sample % rows) + rng.next_float32(), mi.Float(sample // rows) + rng.next_float32())
+        ray = self._camera_ray(pixel, jitter / rows)
+        total, white = self._paths(ray, pixel, sample, rng, dr.opaque(mi.UInt32, seed))
+        dr.eval(*total, *white)
+        planes = [np.array(c).reshape(spp, h * w // VECTOR, VECTOR).mean(0).T for c in (*total, *white)]
+        both = np.stack([p.reshape(h, w) for p in planes], -1)
+        return np.ascontiguousarray(both[..., :3]), np.ascontiguousarray(both[..., 3:])
+
+    def probe(self, side: int) -> dict[str, Array]:
+        """What side x side rays through each pixel see.
+
+        Returns arrays of a leading [H, W, side * side]: owner (-1 for nothing), surface (0 or 1), depth (planar,
+        metres, 0 for nothing), normal [., 3] (camera frame, towards the camera), albedo [., 3], roughness, metallic.
+        """
+        import drjit as dr
+
+        mi, (h, w), n = self.mi, (self.camera.height, self.camera.width), side * side
+        lane = dr.arange(mi.UInt32, h * w * n)
+        pixel, sample = lane // n, lane % n
+        places = (mi.Point2f(mi.Float(sample % side), mi.Float(sample // side)) + 0.5) / side
+        ray = self._camera_ray(pixel, places)
+        hit = self._hit(ray, mi.Bool(True))
+        look = self.surfaces.look(hit, mi.Point2f(0.5, 0.5))
+        depth = dr.select(hit.valid, -hit.p.z, 0)
+        owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
+        out = {
+            "owner": owner, "surface": dr.select(hit.valid, look.surface, 0), "depth": depth,
+            "normal": [dr.select(hit.valid, c, 0) for c in hit.n],
+            "albedo": [dr.select(hit.valid, c, 0) for c in look.albedo],
+            "roughness": look.roughness, "metallic": look.metallic,
+        }  # fmt: skip
+        dr.eval(*(x for v in out.values() for x in (v if isinstance(v, list) else [v])))
+        shape = lambda v: np.array(v, np.float32).reshape(h, w, n)  # noqa: E731
+        return {k: np.stack([shape(c) for c in v], -1) if isinstance(v, list) else shape(v) for k, v in out.items()}
+
+    def _camera_ray(self, pixel, place):
+        """Rays through `place` in [0, 1)^2 of pixels, from the origin along -Z."""
+        import drjit as dr
+
+        mi, (h, w) = self.mi, (self.camera.height, self.camera.width)
+        x = (mi.Float(pixel % w) + place.x - w / 2) / self.focal
+        y = (h / 2 - mi.Float(pixel // w) - place.y) / self.focal
+        return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
+
+    def _hit(self, ray, active) -> Hit:
+        found = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        return self.surfaces.hit(found, ray.d)
+
+    def _paths(self, ray, pixel, sample, rng, seed):
+        """Radiance and white diffuse shading along camera rays; each three Floats."""
+        import drjit as dr
+
+        mi = self.mi
+        even, lanes = _Even(mi, pixel, sample, seed), dr.width(pixel)
+        zero, one = mi.Color3f(0), mi.Color3f(1)
+        fate = mi.PCG32(initstate=mi.UInt64(seed) + 311, initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR))
+        state = (
+            mi.Ray3f(ray),
+            rng,
+            fate,
+            mi.UInt32(0),
+            one,
+            mi.Color3f(0),
+            zero,
+            mi.Color3f(0),
+            mi.Float(-1),
+            mi.Bool(True),
+        )
+
+        def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
+            hit = self._hit(ray, active)
+            draws = even.draw(rng, depth)
+            look = self.surfaces.look(hit, draws.texel)
+            # What the ray itself found: the sky, or a lamp; weighed against having been aimed at.
+            aimed = self.lights.density(ray, hit)
+            weight = dr.select(pdf < 0, 1, pdf / dr.maximum(pdf + aimed, 1e-20))
+            glow = dr.select(hit.valid, dr.select(hit.front, look.emission, mi.Color3f(0)), self.lights.sky(ray.d))
+            glow = dr.select(active, dr.select(depth > 1, dr.minimum(glow * weight, CLAMP), glow * weight), 0)
+            total = total + beta * glow
+            white = white + beta_white * glow
+            active = active & hit.valid & (depth < MAX_DEPTH)
+            # Aim at a light.
+            to_light = self.lights.aim(hit, self.surfaces, draws)
+            start = hit.p + hit.ng * self.offset
+            wo = hit.frame.to_local(to_light.d)
+            above = dr.dot(hit.ng, to_light.d) > 0
+            wanted = active & above & (wo.z > 0) & (to_light.pdf > 0)
+            shadow = mi.Ray3f(start, to_light.d)
+            shadow.maxt = to_light.distance
+            wanted &= ~self.scene.ray_test(shadow, coherent=False, active=wanted)
+            wi = hit.frame.to_local(-ray.d)
+            diffuse, specular, density = scatter.value(wi, wo, look)
+            share = to_light.radiance / dr.maximum(to_light.pdf + density, 1e-20)
+            share = dr.select(wanted, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
+            first = depth == 0
+            full = look.albedo * (1 - look.metallic) * diffuse + specular
+            total = total + beta * full * share
+            white = white + dr.select(first, mi.Color3f(diffuse), beta_white * full) * share
+            # Go on.
+            wo = scatter.sample(wi, look, draws)
+            diffuse, specular, pdf = scatter.value(wi, wo, look)
+            full = look.albedo * (1 - look.metallic) * diffuse + specular
+            d = hit.frame.to_world(wo)
+            active &= (wo.z > 0) & (pdf > 0) & (dr.dot(hit.ng, d) > 0)
+            beta_white = dr.select(first, mi.Color3f(diffuse), beta_white * full) / dr.maximum(pdf, 1e-20)
+            beta = beta * full / dr.maximum(pdf, 1e-20)
+            keep = dr.select(first, *KEEP)
+            active &= fate.next_float32() < keep
+            beta, beta_white = beta / keep, beta_white / keep
+            return mi.Ray3f(start, d), rng, fate, depth + 1, beta, beta_white, total, white, pdf, active
+
+        labels = ("ray", "rng", "fate", "depth", "beta", "beta_white", "total", "white", "pdf", "active")
+        out = dr.while_loop(state, lambda *s: s[-1], body, labels=labels, mode="symbolic")
+        return out[6], out[7]
+
+
+def _mesh(mi, packed: Packed):
+    mesh = mi.Mesh("all", len(packed.vertices), len(packed.faces))
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = floats(mi, packed.vertices)
+    params["faces"] = integers(mi, packed.faces)
+    params.update()
+    return mesh
+
+
+class _Even:
+    """Random numbers that are evenly spread over the samples of a pixel at the first surface (a Kronecker sequence)."""
+
+    # Powers of the inverse of the positive root of x**7 = x + 1 (Roberts 2018, generalised golden ratios).
+    _STEPS = tuple((1 / 1.1127756842787055) ** (k + 1) % 1 for k in range(6))
+
+    def __init__(self, mi, pixel, sample, seed):
+        import drjit as dr
+
+        self.mi, self.dr, self.sample = mi, dr, sample
+        shift = mi.PCG32(initstate=mi.UInt64(seed) + 977, initseq=mi.UInt64(pixel))
+        self.shift = [shift.next_float32() for _ in self._STEPS]
+
+    def draw(self, rng, depth):
+        """The numbers that one surface needs; `rng` goes on."""
+        dr, mi = self.dr, self.mi
+        free = [rng.next_float32() for _ in range(8)]
+        index = mi.Float(self.sample)
+        even = [s + index * step for s, step in zip(self.shift, self._STEPS)]
+        u = [dr.select(depth == 0, e - dr.floor(e), f) for e, f in zip(even, free)]
+        u = [dr.minimum(x, 0.99999994) for x in u]
+        return Draws(u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7]))
+
+
+class Draws:
+    """Uniform random numbers for one surface of a path."""
+
+    def __init__(self, which, light, lobe, bsdf, texel):
+        self.which, self.light, self.lobe, self.bsdf = which, light, lobe, bsdf
+        self.texel = texel

@@ -1,0 +1,1 @@
+"""Closed bodies from one view: the visible front, its thickness, surfaces of revolution."""

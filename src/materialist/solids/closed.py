@@ -1,0 +1,224 @@
+"""A closed object from one view: the visible front, a back at the depth of its thickness, and the wall between.
+
+The paper bends a camera ray twice at front normals and needs no back side. A closed surface can be path-traced:
+reflections inside, total internal reflection, shadows and caustics then come by themselves. What light does at glass is
+decided by normals, hardly by places: the front has those of the map, the back those that are known of it, else those
+of planes fitted to its depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.geometry.contour import region, silhouette_field
+from materialist.geometry.membrane import membrane
+from materialist.geometry.ridges import at_edges, blurred_normals
+from materialist.geometry.tangents import SHARP, back_normals, continued, sampled
+from materialist.solids.front import smooth_front
+from materialist.solids.sheets import COLLAR, Sheets, closed
+from materialist.solids.shell import Shell, joined, turned
+from materialist.solids.symmetry import border_distance, spacing, surface_in
+from materialist.types import Array, Camera
+
+MARGIN = 3
+"""Pixels by which an object that the frame cuts goes on beyond it: the wall that closes it stays out of view."""
+GRID = 300
+"""Grid points along a small object; larger ones have one a pixel."""
+FINEST = 6
+"""Grid points along a pixel, at most."""
+NEAREST = 0.995
+"""The back keeps before this part of the depth of what stands behind the object."""
+NOTHING = 1e9
+"""Room behind an object with nothing there."""
+LEAST = 1e-4
+"""Least way between front and back, as a part of the depth."""
+THIN = 0.004
+"""Least thickness, as a part of the object's size: front and back never touch."""
+
+
+def closed_proxy(
+    depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *, smooth: float = 0.01,
+    wall: Array | float | None = None, behind: Array | None = None, back: Array | None = None,
+) -> Shell:  # fmt: skip
+    """The closed object behind a mask.
+
+    Args:
+        depth: [H, W] planar depth of the front, scene units, 0 = none.
+        normal: [H, W, 3] unit; the front follows them (see `front.smooth_front`).
+        mask: [H, W] bool or weights. Its parts become bodies of their own, its holes stay open (unless a pixel wide).
+        thickness: [H, W] length of the camera ray inside the solid object, scene units >= 0.
+        smooth: blur of the normals of front and back, as a part of the object's size (the root of its area); 0: none.
+        wall: the object is hollow: thickness of its wall, scene units, or [H, W]. A second surface is added inside.
+        behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
+        back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
+
+    Returns:
+        A watertight surface: every edge has two faces that run through it in opposite directions.
+
+    Raises:
+        InputError: shapes that differ, a thickness that is negative or not finite, or a mask without a surface or too
+            thin for one.
+    """
+    inside = surface_in(mask, depth, camera)
+    _check(normal, thickness, inside)
+    if back is not None and back.shape != normal.shape:
+        raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
+    view = _window(depth, normal, inside, thickness, behind, back, camera)
+    front = smooth_front(view.depth, view.normal, view.inside, view.rays, smooth=smooth)
+    thick = _thickness(view, front)  # [h, w]
+    shell = _closed(view, front, thick, smooth, camera)
+    if wall is None:
+        return shell
+    inner = _cavity(view, front, thick, wall, smooth, camera)
+    return shell if inner is None else joined([shell, turned(inner)])
+
+
+@dataclass(frozen=True)
+class _View:
+    """The part of the picture around the object, a few pixels beyond the frame included."""
+
+    depth: Array
+    normal: Array
+    inside: Array
+    thickness: Array
+    behind: Array
+    back: Array | None
+    rays: Array
+    """[h, w, 3] through the pixels at z = -1."""
+    left: int
+    top: int
+    """Column and row of its first pixel in the picture (may be negative)."""
+
+    @property
+    def size(self) -> float:
+        """Root of the object's area, pixels."""
+        return float(np.sqrt(self.inside.sum()))
+
+
+def _check(normal: Array, thickness: Array, inside: Array) -> None:
+    if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
+        raise InputError(
+            f"The normals are {normal.shape} and the thickness {np.shape(thickness)}; the mask is {inside.shape}."
+        )
+    own = np.asarray(thickness)[inside]
+    if not (np.isfinite(own).all() and own.min() >= 0 and own.max() > 0):
+        raise InputError(f"The thickness goes from {own.min():g} to {own.max():g}; it must be finite, >= 0, not all 0.")
+
+
+def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
+    edge = MARGIN + 1
+    rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
+    top, left = rows[0] - edge, columns[0] - edge
+    bottom, right = rows[-1] + edge + 1, columns[-1] + edge + 1
+    y, x = np.arange(top, bottom), np.arange(left, right)
+    # Beyond the frame everything goes on as at its edge, for MARGIN pixels.
+    i, j = np.clip(y, 0, camera.height - 1)[:, None], np.clip(x, 0, camera.width - 1)[None]
+    near = ((y >= -MARGIN) & (y < camera.height + MARGIN))[:, None] & ((x >= -MARGIN) & (x < camera.width + MARGIN))
+    rays = np.stack(
+        np.broadcast_arrays(
+            ((x + 0.5 - camera.width / 2) / camera.focal)[None],
+            ((camera.height / 2 - y - 0.5) / camera.focal)[:, None], np.array(-1.0),
+        ), -1,
+    )  # fmt: skip
+    beyond = np.zeros(inside.shape) if behind is None else np.asarray(behind)
+    return _View(
+        np.asarray(depth)[i, j], np.asarray(normal)[i, j], inside[i, j] & near, np.asarray(thickness)[i, j],
+        beyond[i, j], None if back is None else np.asarray(back)[i, j], rays, int(left), int(top),
+    )  # fmt: skip
+
+
+def _thickness(view: _View, front: Array) -> Array:
+    """[h, w] along the ray, scene units: never behind what stands there, and never none."""
+    pixel = front * spacing(view.rays)  # scene units
+    least = THIN * view.size * np.median(pixel[view.inside])
+    thick = np.minimum(view.thickness.astype(np.float64), _room(view, front))
+    return np.where(view.inside, np.maximum(thick, least), 0)
+
+
+def _cavity(view: _View, front: Array, thick: Array, wall, smooth: float, camera: Camera) -> Shell | None:
+    """The surface `wall` below that of the object; None where the object has no room for it."""
+    length = np.linalg.norm(view.rays, axis=-1)
+    facing = np.abs((view.normal * view.rays).sum(-1)) / length
+    if np.ndim(wall):
+        rows, columns = np.arange(front.shape[0]) + view.top, np.arange(front.shape[1]) + view.left
+        wall = np.asarray(wall)[
+            np.clip(rows, 0, camera.height - 1)[:, None], np.clip(columns, 0, camera.width - 1)[None]
+        ]
+    through = wall / np.clip(facing, 0.35, 1)  # [h, w] along the ray, of one wall
+    left = thick - 2 * through
+    pixel = front * spacing(view.rays)
+    room = view.inside & (left > THIN * view.size * pixel) & (border_distance(view.inside) * pixel > wall)
+    if room.sum() < 16:
+        return None
+    inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
+    return _closed(inner, front + through / length, np.where(room, left, 0), smooth, camera)
+
+
+def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Camera) -> Shell:
+    """Front and back, [h, w] planar depth and the way between them along the rays, over one triangulated region."""
+    import cv2
+
+    known, length = view.inside, np.linalg.norm(view.rays, axis=-1)
+    edge = silhouette_field(known)  # [h, w] pixels
+    factor = int(np.clip(round(GRID / max(known.shape)), 1, FINEST))
+    size = (known.shape[1] * factor, known.shape[0] * factor)
+    found = region(_ended(cv2.resize((edge - COLLAR).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)))
+    if not len(found.faces):
+        raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
+    place = (found.points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
+    at = lambda values: sampled(values, place, order=1)  # noqa: E731
+    # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
+    # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
+    middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
+    through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
+    own = np.exp(at(middle)) - through / (2 * at(length))
+    room = at(_room(view, front))
+    through = np.maximum(np.minimum(through, room), LEAST * own)
+    sigma = smooth * view.size
+    if view.back is None:
+        back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
+    else:
+        back = blurred_normals(view.back, known, sigma)
+    facing = blurred_normals(view.normal, known, sigma)
+    front_normal, back_normal = _between(facing, known, place), _between(back, known, place)
+    depth = own + through / at(length)
+    k, z, n = at_edges(front, facing, known, view.rays, place)
+    own[k], front_normal[k] = z, n
+    if view.back is not None:  # those fitted to its depth are no face's next to an edge
+        k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
+        depth[k], back_normal[k] = z, n
+        depth = np.minimum(depth, own + room / at(length))
+    through = np.maximum((depth - own) * at(length), LEAST * own)
+    down, right = np.gradient(edge)
+    outward = np.stack([-at(right), -at(down)], -1)
+    place = place + np.array([view.left, view.top])
+    sheets = Sheets(place, own, through, front_normal, back_normal, outward)
+    return closed(found, sheets, camera)
+
+
+def _between(normal: Array, known: Array, place: Array) -> Array:
+    """[V, 3] unit normals at places [V, 2] of a map [h, w, 3], the nearest known ones beyond the mask."""
+    from scipy.ndimage import distance_transform_edt
+
+    i, j = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    found = sampled(normal[i, j], place)
+    return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+
+
+def _room(view: _View, front: Array) -> Array:
+    """[h, w] length of the ray between the front and what stands behind, scene units."""
+    length = np.linalg.norm(view.rays, axis=-1)
+    known = view.inside & (view.behind > 0)
+    room = np.where(known, np.maximum(NEAREST * view.behind - front, 0) * length, NOTHING)
+    # Next to the mask the values are those of the last pixels in it.
+    return membrane(room, view.inside)
+
+
+def _ended(field: Array) -> Array:
+    """The field with its outermost points negative."""
+    field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
+    # No crossing exactly on a grid point.
+    return np.where(np.abs(field) < 1e-4, 1e-4, field)

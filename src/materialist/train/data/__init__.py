@@ -1,1 +1,0 @@
-"""The procedural data set: scenes, labels, storage."""

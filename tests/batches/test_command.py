@@ -1,0 +1,118 @@
+"""`materialist batch`: exit codes, what is printed, the page and the tables it leaves."""
+
+import csv
+import functools
+import json
+import re
+import shlex
+
+import pytest
+from made_batch import photos
+
+import materialist.batches.run as batch_run
+from materialist.batches.outcome import Outcome, Row, Status
+from materialist.batches.page import PER_PAGE, write_pages
+from materialist.cli import app
+from materialist.cli.batch import BatchProgress, _note, _span
+from materialist.cli.outcome import run_to_exit_code
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    """Run a command line with the stand-in for the inversion; returns (exit code, stdout, stderr)."""
+    monkeypatch.setattr(batch_run, "batch", functools.partial(batch_run.batch, function="made_batch:moody"))
+
+    def call(*arguments):
+        code = run_to_exit_code(app, [str(argument) for argument in arguments])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return call
+
+
+def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):
+    source, runs = photos(tmp_path / "in", "a", "b"), tmp_path / "runs"
+    options = ("--workers", 1, "--device", "cpu", "--json")
+    code, out, err = run("batch", source, "-o", runs, *options)
+    said = json.loads(out.splitlines()[-1])
+    assert code == 0 and said["ok"] and said["done"] == 2 and said["failed"] == 0 and not err
+    code, out, err = run("batch", source, "-o", runs, *options)
+    assert code == 2 and "--resume" in json.loads(out.splitlines()[-1])["message"]
+    photos(source, "impossible=<b>")
+    code, out, err = run("batch", source, "-o", runs, "--resume", *options[:-1])
+    assert code == 2 and "2 of 3 photos done (2 of them before)" in out and "There is no surface" in out
+    assert "[3/3] impossible" in err and str(runs / "index.html") in out
+    table = list(csv.DictReader((runs / "summary.csv").open()))
+    assert [row["status"] for row in table] == ["done", "done", "failed"]
+    assert table[0]["psnr"] == "31.25" and len(table[0]["scene_hash"]) == 64
+    assert table[2]["reason"] == "There is no surface in it."
+    page = (runs / "index.html").read_text()
+    assert page.count("<article") == 3 and page.count("data:image/jpeg;base64,") == 2
+    assert "impossible=&lt;b&gt;" in page and "impossible=<b>" not in page
+
+
+def _stopped(*_, **__):
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        ((), ()),
+        (("--apply", "my edits.yaml", "--size", "96", "--device", "cpu"), ()),
+        (("--fov", "auto", "--force"), ("--fov", "auto")),  # as given, though it is the default
+        (("--seed", "3", "--resume", "--force"), ("--seed", "3", "--force")),
+    ],
+)
+def test_ctrl_c_says_how_to_go_on_with_the_same_options(run, monkeypatch, options, kept):
+    monkeypatch.setattr(batch_run, "batch", _stopped)
+    code, out, err = run("batch", "my photos", "-o", "runs", *options)
+    assert code == 130 and not out and "nothing was written" not in err
+    words = shlex.split(err.split("Go on with: ")[1])
+    assert words == ["materialist", "batch", "my photos", "-o", "runs", *(kept or options), "--resume"]
+    code, out, err = run("batch", "my photos", "-o", "runs", *options, "--json")
+    assert code == 130 and len(out.splitlines()) == 1
+    said = json.loads(out)
+    assert not said["ok"] and said["exit_code"] == 130 and "--json --resume" in said["message"].replace(" --force", "")
+
+
+def test_the_page_asks_nobody_for_anything(run, tmp_path):
+    source, runs = photos(tmp_path / "in", "a"), tmp_path / "runs"
+    run("batch", source, "-o", runs, "--workers", 1, "--device", "cpu", "--json")
+    page = (runs / "index.html").read_text()
+    assert "default-src 'none'" in page and "<script" not in page and "http" not in page.replace("http-equiv", "")
+    links = set(re.findall(r'href="([^"]+)"', page))
+    assert links == {"summary.csv", "summary.json", "a.scene/overview.png", "a.scene/"}
+    assert all((runs / link).exists() for link in links)
+
+
+def test_many_photos_take_several_pages(tmp_path):
+    rows = tuple(Row({"id": f"{k}.png", "name": str(k), "status": "done", "seconds": 1.0}) for k in range(PER_PAGE + 1))
+    failed = Row({"id": "x.png", "name": "x", "status": "failed", "reason": "no"})
+    write_pages(Outcome(tmp_path, (*rows, failed), 0, 1.0))
+    first, second = ((tmp_path / name).read_text() for name in ("index.html", "index-2.html"))
+    assert first.count("<article") == PER_PAGE and second.count("<article") == 2
+    assert first.index("x.png") < first.index("0.png")  # what needs a look comes first
+    assert 'href="index-2.html"' in first and 'href="index.html"' in second
+
+
+def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
+    from materialist.batches.summary import write_summary
+
+    write_summary(Outcome(tmp_path, (Row({"id": "=1+1.png", "name": "@x", "status": "open"}),), 0, 1.0))
+    row = next(csv.DictReader((tmp_path / "summary.csv").open()))
+    assert row["id"] == "'=1+1.png" and row["name"] == "'@x"
+
+
+def test_what_went_wrong_is_said_above_the_bars(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with BatchProgress() as progress:
+        progress(Status(2, 0, 0, 0.0, None, news="b lacks a mask", urgent=True))
+        progress(Status(2, 1, 0, 0.0, None, news="failed.png: done"))
+    said = capsys.readouterr().err
+    assert "b lacks a mask" in said and "failed.png" not in said
+
+
+def test_progress_says_the_rate_and_the_time_left():
+    assert _note(Status(10, 3, 1, 0.05, 6000.0)) == "1 failed, 3.0 a minute, 100 min left"
+    assert (_span(40), _span(600), _span(36000)) == ("40 s", "10 min", "10.0 h")

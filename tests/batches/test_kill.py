@@ -1,0 +1,118 @@
+"""Batches that are killed: what is left can be gone on with, and nobody goes on without them."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from made_batch import driver, environment, photos
+
+from materialist.batches.ledger import LEDGER, read_events
+from materialist.batches.run import batch
+
+NAMES = ("slow1", "slow2", "slow3", "slow4", "quick")
+
+COMMAND = """
+import functools, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored
+import materialist.batches.run as run
+from materialist.cli import main
+run.batch = functools.partial(run.batch, function="made_batch:moody")
+sys.argv = ["materialist", *{arguments!r}]
+main()
+"""
+
+
+def done(runs):
+    path = runs / LEDGER
+    return [e for e in read_events(path) if e["event"] == "done"] if path.exists() else []
+
+
+def wait_for(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = condition()
+        if found:
+            return found
+        time.sleep(0.02)
+    raise AssertionError("it did not happen in time")
+
+
+def workers_of(process):
+    return [c for c in psutil.Process(process.pid).children() if "materialist.batches.worker" in c.cmdline()]
+
+
+def undisturbed(source, runs):
+    return batch(source, runs, function="made_batch:moody", workers=2, device="cpu")
+
+
+def command(*arguments):
+    code = COMMAND.format(arguments=[str(a) for a in arguments])
+    return subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment(),
+        start_new_session=True, text=True,
+    )  # fmt: skip
+
+
+def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_result(tmp_path, monkeypatch):
+    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+    monkeypatch.setenv("MADE_SLOW", "30")  # the second batch of photos is at work when it is killed
+    process = driver(source, runs, workers=2)
+    wait_for(lambda: len(done(runs)) >= 1)
+    workers = wait_for(lambda: workers_of(process))
+    process.kill()
+    process.wait()
+    gone, alive = psutil.wait_procs(workers, timeout=20)
+    assert not alive and gone
+    before = len(done(runs))
+    assert before < len(NAMES)
+    monkeypatch.setenv("MADE_SLOW", "0.1")
+    outcome = batch(source, runs, function="made_batch:moody", workers=2, device="cpu", resume=True)
+    assert outcome.kept == before and outcome.exit_code == 0
+    assert outcome.hash == undisturbed(source, tmp_path / "fresh").hash
+    assert not [p.name for p in runs.iterdir() if "partial" in p.name]
+
+
+def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
+    monkeypatch.setenv("MADE_SLOW", "1")
+    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+    process = driver(source, runs, workers=2)
+    wait_for(lambda: len(done(runs)) >= 1)
+    wait_for(lambda: workers_of(process))[0].kill()
+    assert process.wait(60) == 0, process.stderr.read().decode()
+    attempts = [entry["attempts"] for entry in done(runs)]
+    assert sorted(attempts) in ([1, 1, 1, 1, 2], [1] * 5)  # killed between two photos, it costs nothing
+    monkeypatch.setenv("MADE_SLOW", "0")
+    assert json.loads((runs / "summary.json").read_text())["hash"] == undisturbed(source, tmp_path / "fresh").hash
+
+
+@pytest.mark.parametrize("whole_group", [True, False])
+def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, whole_group):
+    monkeypatch.setenv("MADE_SLOW", "30")
+    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+    process = command("batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json")
+    wait_for(lambda: len(done(runs)) >= 1)
+    workers = wait_for(lambda: workers_of(process))
+    (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and "Traceback" not in err and "--resume" in err
+    assert json.loads(out.splitlines()[-1])["error"] == "Interrupted"
+    assert not psutil.wait_procs(workers, timeout=5)[1]
+    assert json.loads((runs / "summary.json").read_text())["open"] == len(NAMES) - len(done(runs))
+
+
+def test_a_terminated_group_dies_silently(tmp_path, monkeypatch):
+    monkeypatch.setenv("MADE_SLOW", "30")
+    source, runs = photos(tmp_path / "in", "slow1", "slow2"), tmp_path / "runs"
+    process = command("batch", source, "-o", runs, "--workers", 2, "--device", "cpu")
+    workers = wait_for(lambda: len(workers_of(process)) == 2 and workers_of(process))
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGTERM and "bug" not in err and "Traceback" not in err
+    assert not psutil.wait_procs(workers, timeout=20)[1]
+    assert not done(runs)

@@ -1,0 +1,80 @@
+"""The ledger: whole lines, one batch at a time, no one else's folder."""
+
+import json
+
+import pytest
+
+from materialist.batches.ledger import LEDGER, open_ledger, read_events
+from materialist.errors import InputError, OutputError
+
+OPTIONS = {"size": 64}
+
+
+def write(runs, *entries, **how):
+    ledger = open_ledger(runs, OPTIONS, **how)
+    for kind, id in entries:
+        ledger.append(kind, id=id, name=id[0])
+    ledger.close()
+    return ledger
+
+
+def test_what_was_written_is_read_again(tmp_path):
+    write(tmp_path, ("begin", "a.png"), ("done", "a.png"), ("begin", "b.png"))
+    ledger = write(tmp_path, resume=True)
+    assert {id: entry["event"] for id, entry in ledger.last.items()} == {"a.png": "done", "b.png": "begin"}
+    assert ledger.names == {"a.png": "a", "b.png": "b"}
+
+
+def test_a_line_that_was_cut_off_is_passed_over_and_spoils_no_other(tmp_path):
+    write(tmp_path, ("done", "a.png"), ("done", "b.png"))
+    path = tmp_path / LEDGER
+    path.write_bytes(path.read_bytes()[:-9])
+    ledger = write(tmp_path, ("done", "c.png"), resume=True)
+    assert set(ledger.last) == {"a.png", "c.png"}
+    assert [e["id"] for e in read_events(path) if "id" in e] == ["a.png", "c.png"]
+
+
+def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(tmp_path):
+    write(tmp_path, ("done", "a.png"))
+    with pytest.raises(InputError, match="--resume to go on"):
+        open_ledger(tmp_path, OPTIONS)
+    assert write(tmp_path, force=True).last["a.png"]["event"] == "begin"
+    assert write(tmp_path, resume=True).last["a.png"]["event"] == "begin"  # also after the next stop
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "thesis.txt").touch()
+    for how in ({}, {"resume": True}, {"force": True}):
+        with pytest.raises(InputError, match="holds no batch"):
+            open_ledger(mine, OPTIONS, **how)
+    assert [file.name for file in mine.iterdir()] == ["thesis.txt"]
+
+
+def test_other_options_are_refused_by_name(tmp_path):
+    write(tmp_path, ("done", "a.png"))
+    with pytest.raises(InputError, match="size 64, not 96"):
+        open_ledger(tmp_path, {"size": 96}, resume=True)
+    ledger = open_ledger(tmp_path, {"size": 96}, resume=True, force=True)
+    assert ledger.last["a.png"]["key"] != ledger.key
+    ledger.close()
+
+
+def test_two_batches_do_not_share_a_folder(tmp_path):
+    first = open_ledger(tmp_path, OPTIONS)
+    with pytest.raises(OutputError, match="Another batch is at work"):
+        open_ledger(tmp_path, OPTIONS, resume=True)
+    first.close()
+    open_ledger(tmp_path, OPTIONS, resume=True).close()
+
+
+def test_a_ledger_of_another_version_is_not_read(tmp_path):
+    (tmp_path / LEDGER).write_text(json.dumps({"event": "start", "format": 99}) + "\n")
+    with pytest.raises(InputError, match="another version"):
+        open_ledger(tmp_path, OPTIONS, resume=True)
+
+
+def test_tuples_are_the_lists_that_they_come_back_as(tmp_path):
+    options = {"envmap_size": (16, 8)}
+    open_ledger(tmp_path / "runs", options).close()
+    again = open_ledger(tmp_path / "runs", options, resume=True)
+    again.close()
+    assert again.key

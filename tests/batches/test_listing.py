@@ -1,0 +1,133 @@
+"""Which photos a batch finds, and what their results are called."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_batch import photos
+
+from materialist.batches.listing import list_photos
+from materialist.batches.names import LONGEST, unique_names
+from materialist.batches.remote import is_url, local_copy, shown, version
+from materialist.errors import InputError
+
+
+def ids(source, runs="elsewhere"):
+    return [photo.id for photo in list_photos(source, runs=runs)]
+
+
+def test_a_folder_is_searched_with_its_subfolders_and_nothing_of_ours_is_a_photo(tmp_path):
+    photos(tmp_path, "b", "a.JPG", "sub/c", ".hidden", ".cache/d", "k.scene/photo", "old/e", "runs/a")
+    (tmp_path / "k.scene/scene.json").touch()
+    (tmp_path / "old/batch.jsonl").touch()
+    (tmp_path / "notes.txt").touch()
+    assert ids(tmp_path, tmp_path / "runs") == ["a.JPG", "b.png", "sub/c.png"]
+
+
+def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
+    photos(tmp_path, "a", "b")
+    listing = tmp_path / "list.txt"
+    listing.write_text(
+        "# mine\n b.png\n\na.png\nb.png\nexample:cat\nhttps://me:secret@host/x.jpg?signature=1\nnone.png\n"
+    )
+    found = {photo.id: photo.location for photo in list_photos(listing, runs="r")}
+    assert found["a.png"] == str(tmp_path / "a.png") and found["none.png"] == str(tmp_path / "none.png")
+    assert found["example:cat"] == "example:cat" and len(found) == 5
+    assert found["https://host/x.jpg"] == "https://me:secret@host/x.jpg?signature=1"
+
+
+def test_a_comment_may_stand_behind_a_name(tmp_path):
+    photos(tmp_path, "a", "c#1", "d #2")
+    listing = tmp_path / "list.txt"
+    listing.write_text(
+        "a.png # the kitchen\nb.png\t#none\nc#1.png  ## twice\nd #2.png\n # alone\n#\nhttps://h/x.jpg#y\n"
+    )
+    assert ids(listing) == ["a.png", "b.png", "c#1.png", "d #2.png", "https://h/x.jpg#y"]
+
+
+@pytest.mark.parametrize("runs", ["in", "in/", "link"])
+def test_results_have_a_folder_of_their_own(tmp_path, monkeypatch, runs):
+    photos(tmp_path / "in", "a")
+    (tmp_path / "link").symlink_to(tmp_path / "in")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"RUNS cannot be (in|link), the folder of the photos; .* (in|link)/runs"):
+        list_photos("in", runs=runs)
+    assert ids("in", "in/runs") == ["a.png"]
+
+
+@pytest.mark.parametrize(
+    ("make", "said"), [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")]
+)
+def test_what_holds_no_photo_is_refused(tmp_path, make, said):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "bytes").write_bytes(b"\xff\xfe\xfd")
+    with pytest.raises(InputError, match=said):
+        list_photos(tmp_path / make, runs="r")
+
+
+def test_urls_are_listed_versioned_and_fetched(tmp_path):
+    fsspec = pytest.importorskip("fsspec")
+    photos(tmp_path, "x", "deep/y.jpg")
+    store = fsspec.filesystem("memory")
+    for name in ("x.png", "deep/y.jpg"):
+        store.pipe(f"/bucket/{name}", (tmp_path / name).read_bytes())
+    store.pipe("/bucket/readme.txt", b"no")
+    assert ids("memory://bucket") == ["memory:///bucket/deep/y.jpg", "memory:///bucket/x.png"]
+    assert ids("memory://bucket/*.png") == ["memory:///bucket/x.png"]
+    url = "memory://bucket/x.png"
+    assert ids(url) == [url]
+    with local_copy(url) as file:
+        assert file.read_bytes() == (tmp_path / "x.png").read_bytes() and file.suffix == ".png"
+    assert not file.exists()
+    before = version(url)
+    assert version(url) == before
+    store.pipe("/bucket/x.png", b"other")
+    assert version(url) != before
+    with (
+        pytest.raises(InputError, match=r"nothing at memory://bucket/none\.png"),
+        local_copy("memory://bucket/none.png"),
+    ):
+        pass
+    with pytest.raises(InputError, match=r"cannot be read|nothing at"):
+        list_photos("nosuchstore://bucket", runs="r")
+
+
+def test_secrets_of_a_url_are_not_shown():
+    assert shown("https://u:p@h/a.jpg?X-Signature=s") == "https://h/a.jpg"
+    assert is_url("s3://b/a") and not is_url("C:\\a") and not is_url("a/b.png") and not is_url("example:cat")
+
+
+def test_names_are_stems_as_long_as_those_are_unique():
+    names = unique_names(["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"])
+    assert names == {
+        "a/k.png": "a_k", "b/k.jpg": "b_k", "c.png": "c", "d.png": "d.png", "d.jpg": "d.jpg", "x y/é.png": "é",
+        "http://h/p/z.jpg": "z",
+    }  # fmt: skip
+
+
+def test_a_name_once_given_stays_and_is_nobody_elses():
+    assert unique_names(["a/k.png", "b/k.png"], {"a/k.png": "k"}) == {"a/k.png": "k", "b/k.png": "b_k"}
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=150), min_size=1, unique=True),
+    st.randoms(),
+)
+def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
+    names = unique_names(texts)
+    assert len({name.casefold() for name in names.values()}) == len(texts)
+    for name in names.values():
+        assert name and not set(name) & set('/\\\0:*?"<>|{}') and name[0] not in "._" and len(name.encode()) <= LONGEST
+    shuffled = list(texts)
+    random.shuffle(shuffled)
+    assert unique_names(shuffled) == names
+
+
+def test_linked_folders_are_followed_once(tmp_path):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "a.png").touch()
+    (tmp_path / "other" / "b.png").touch()
+    (tmp_path / "photos" / "more").symlink_to(tmp_path / "other")
+    (tmp_path / "other" / "back").symlink_to(tmp_path / "photos")
+    assert ids(tmp_path / "photos") == ["a.png", "more/b.png"]

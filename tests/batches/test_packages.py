@@ -1,0 +1,56 @@
+"""Is a package whole, and are two the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_scene import make_scene
+
+from materialist.batches.packages import NEEDED, package_hash, together, whole_size
+from materialist.errors import SceneError
+from materialist.io.package import save_scene
+from materialist.types import FitReport
+
+
+def test_the_hash_is_of_the_arrays_and_not_of_the_time(tmp_path):
+    scene = make_scene()
+    slower = replace(scene, report=FitReport((), {"total_seconds": 9.0}), photo=replace(scene.photo, path="other.png"))
+    for name, one in (("a", scene), ("b", slower)):
+        save_scene(one, tmp_path / name)
+    assert package_hash(tmp_path / "a") == package_hash(tmp_path / "b")
+
+
+@pytest.mark.parametrize("what", ["roughness", "envmap", "depth", "fov"])
+def test_any_array_and_the_camera_change_it(tmp_path, what):
+    scene = make_scene()
+    value = np.nextafter(scene.materials.roughness, np.float32(2))
+    other = {
+        "roughness": lambda: replace(scene, materials=replace(scene.materials, roughness=value)),
+        "envmap": lambda: replace(scene, envmap=scene.envmap * np.float32(2)),
+        "depth": lambda: replace(scene, depth=scene.depth + np.float32(1)),
+        "fov": lambda: replace(scene, camera=replace(scene.camera, fov=40.0)),
+    }[what]()
+    save_scene(scene, tmp_path / "a")
+    save_scene(other, tmp_path / "b")
+    assert package_hash(tmp_path / "a") != package_hash(tmp_path / "b")
+
+
+def test_a_package_is_whole_or_it_is_not(tmp_path):
+    save_scene(make_scene(), tmp_path / "a")
+    assert whole_size(tmp_path / "a") == sum(f.stat().st_size for f in (tmp_path / "a").rglob("*") if f.is_file())
+    for name in NEEDED:
+        file = tmp_path / "a" / name
+        content = file.read_bytes()
+        file.write_bytes(b"")
+        assert whole_size(tmp_path / "a") is None, name
+        file.write_bytes(content)
+    assert whole_size(tmp_path / "none") is None
+    (tmp_path / "a/scene.json").unlink()
+    with pytest.raises(SceneError, match="no whole scene package"):
+        package_hash(tmp_path / "a")
+
+
+def test_a_batch_hash_does_not_depend_on_the_order():
+    assert (
+        together([("a", "1"), ("b", "2")]) == together([("b", "2"), ("a", "1")]) != together([("a", "2"), ("b", "1")])
+    )

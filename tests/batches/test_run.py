@@ -1,0 +1,231 @@
+"""Batches with a stand-in for the inversion: what is done, what is recorded, what is done again."""
+
+import json
+import os
+import time
+
+import numpy as np
+import pytest
+from made_batch import photos
+from PIL import Image
+
+from materialist.batches.ledger import LEDGER, read_events
+from materialist.batches.packages import package_hash
+from materialist.batches.run import batch
+from materialist.errors import InputError, SetupError
+from materialist.io.package import load_scene
+
+RECIPE = "- edit:\n    mask: masks/{name}.png\n    hue: 90\n"
+
+
+def run(source, runs, **options):
+    return batch(source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options})
+
+
+def reasons(outcome):
+    return {row["name"]: row["reason"] for row in outcome.rows if row["status"] == "failed"}
+
+
+def test_every_photo_ends_as_done_or_with_a_reason(tmp_path):
+    source = photos(tmp_path / "in", "a", "sub/b", "sub/a.jpg", "bug", "impossible", "deadly", "deadly-once")
+    (source / "cut.png").write_bytes((source / "a.png").read_bytes()[:60])
+    seen = []
+    outcome = run(source, tmp_path / "runs", progress=seen.append)
+    why = reasons(outcome)
+    done = {row["name"] for row in outcome.rows if row["status"] == "done"}
+    assert done == {"a", "b", "sub_a", "deadly-once"}
+    assert why["bug"] == "three is not four" and why["impossible"] == "There is no surface in it."
+    assert "SIGKILL" in why["deadly"] and "begun 3 times" in why["deadly"]
+    assert "damaged or truncated" in why["cut"] or "not an image" in why["cut"]
+    attempts = {row["name"]: row["attempts"] for row in outcome.rows}
+    assert attempts["deadly-once"] == 2 and attempts["deadly"] == 3 and attempts["impossible"] == 1
+    assert outcome.exit_code == 1  # a bug of ours is among them
+    last = seen[-1]
+    assert (last.total, last.done, last.failed) == (8, 4, 4) and last.rate > 0 and last.left == 0 and not last.running
+    traces = [e["trace"] for e in read_events(tmp_path / "runs" / LEDGER) if e.get("trace")]
+    assert len(traces) == 1 and "RuntimeError" in traces[0]
+
+
+def test_results_do_not_depend_on_the_number_of_workers_or_what_ran_before(tmp_path):
+    source = photos(tmp_path / "in", "a", "b", "c")
+    one = run(source, tmp_path / "one", workers=1)
+    three = run(source, tmp_path / "three", workers=3)
+    run(source / "c.png", tmp_path / "alone")
+    other = run(source, tmp_path / "other", seed=1)
+    assert one.hash == three.hash != other.hash and one.exit_code == 0
+    assert package_hash(tmp_path / "alone/c.scene") == package_hash(tmp_path / "one/c.scene")
+    assert json.loads((tmp_path / "one/summary.json").read_text())["hash"] == one.hash
+
+
+def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
+    source = photos(tmp_path / "in", "a", "b", "c", "d")
+    first = run(source, tmp_path / "runs")
+    written = (tmp_path / "runs/a.scene/scene.json").stat().st_mtime_ns
+    (tmp_path / "runs/b.scene/maps/albedo.exr").unlink()
+    Image.fromarray(np.random.default_rng(9).integers(0, 256, (16, 24, 3)).astype(np.uint8)).save(source / "c.png")
+    (source / "d.png").unlink()
+    photos(source, "x", "new")  # the first is only there to make the second another picture
+    (source / "x.png").unlink()
+    with pytest.raises(InputError, match="--resume"):
+        run(source, tmp_path / "runs")
+    again = run(source, tmp_path / "runs", resume=True)
+    assert again.kept == 1 and again.exit_code == 0 and again.count("done") == 4
+    assert (tmp_path / "runs/a.scene/scene.json").stat().st_mtime_ns == written
+    assert again.hash != first.hash and again.hash == run(source, tmp_path / "fresh").hash
+
+
+def test_other_options_redo_everything_even_in_two_goes(tmp_path):
+    source = photos(tmp_path / "in", "a", "b")
+    run(source, tmp_path / "runs")
+    with pytest.raises(InputError, match="seed 0, not 1"):
+        run(source, tmp_path / "runs", resume=True, seed=1)
+    (source / "b.png").rename(tmp_path / "b.png")
+    assert run(source, tmp_path / "runs", resume=True, force=True, seed=1).kept == 0
+    (tmp_path / "b.png").rename(source / "b.png")
+    assert run(source, tmp_path / "runs", resume=True, seed=1).kept == 1
+
+
+def test_a_scene_of_somebody_else_is_not_replaced(tmp_path):
+    source = photos(tmp_path / "in", "a")
+    run(source, tmp_path / "runs")
+    photos(source, "x", "b")
+    (tmp_path / "runs/b.scene").mkdir()
+    (tmp_path / "runs/b.scene/mine.txt").write_text("keep")
+    outcome = run(source, tmp_path / "runs", resume=True)
+    assert "is not of this batch" in reasons(outcome)["b"] and (tmp_path / "runs/b.scene/mine.txt").exists()
+    assert outcome.exit_code == 2
+    for force in (False, True):
+        again = run(source, tmp_path / "runs", resume=True, force=force)
+        assert "is not of this batch" in reasons(again)["b"], "it has not become the batch's by being refused"
+        assert (tmp_path / "runs/b.scene/mine.txt").exists()
+
+
+def test_a_picture_of_somebody_else_is_not_replaced(tmp_path):
+    pytest.importorskip("mitsuba")
+    source = photos(tmp_path / "in", "a", "b")
+    run(source, tmp_path / "runs")
+    (tmp_path / "runs/a.png").write_bytes(b"mine")
+    recipe = masks(tmp_path, "a", "b")
+    outcome = run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2)
+    assert "a.png exists and is not of this batch" in reasons(outcome)["a"] and outcome.count("done") == 1
+    assert (tmp_path / "runs/a.png").read_bytes() == b"mine"
+    own = (tmp_path / "runs/b.png").stat().st_mtime_ns
+    recipe.write_text(RECIPE.replace("90", "200"))
+    assert run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2).count("done") == 1
+    assert (tmp_path / "runs/b.png").stat().st_mtime_ns != own, "its own it may replace"
+    (tmp_path / "runs/a.png").unlink()
+    assert run(source, tmp_path / "runs", resume=True, apply=recipe, spp=2).count("done") == 2
+
+
+def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
+    source = photos(tmp_path / "in", *(f"lacking{k}" for k in range(30)))
+    start = time.monotonic()
+    with pytest.raises(SetupError, match="No LLVM found"):
+        run(source, tmp_path / "runs")
+    assert time.monotonic() - start < 20
+    summary = json.loads((tmp_path / "runs/summary.json").read_text())
+    assert summary["open"] == 30 and summary["failed"] == 0
+
+
+def test_workers_that_cannot_start_are_told_as_such(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    with pytest.raises(SetupError, match="does not start"):
+        run(photos(tmp_path / "in", "a"), tmp_path / "runs")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "Seed is -1"),
+        ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "at least 1"),
+        ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
+    ],
+)  # fmt: skip
+def test_options_that_fit_no_photo_are_refused_before_anything_is_written(tmp_path, options, said):
+    source = photos(tmp_path / "in", "a")
+    with pytest.raises(InputError, match=said):
+        run(source, tmp_path / "runs", **options)
+    assert not (tmp_path / "runs").exists()
+
+
+def masks(folder, *names):
+    (folder / "masks").mkdir(exist_ok=True)
+    for name in names:
+        Image.fromarray(np.pad(np.full((8, 8), 255, np.uint8), ((4, 4), (8, 8)))).save(folder / f"masks/{name}.png")
+    (folder / "edits.yaml").write_text(RECIPE)
+    return folder / "edits.yaml"
+
+
+def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(tmp_path):
+    pytest.importorskip("mitsuba")
+    source = photos(tmp_path / "in", "a", "b")
+    recipe, runs = masks(tmp_path, "a"), tmp_path / "runs"
+    options = {"apply": recipe, "spp": 2, "workers": 1}
+    first = run(source, runs, **options)
+    assert "masks/b.png" in reasons(first)["b"] and reasons(first)["b"].startswith("The scene is there")
+    assert (runs / "b.scene").is_dir() and not (runs / "b.png").exists() and first.exit_code == 2
+    assert Image.open(runs / "a.png").size == Image.open(source / "a.png").size
+    written = (runs / "b.scene/scene.json").stat().st_mtime_ns
+    masks(tmp_path, "b")
+    again = run(source, runs, resume=True, **options)
+    assert again.exit_code == 0 and again.kept == 1 and (runs / "b.png").exists()
+    assert (runs / "b.scene/scene.json").stat().st_mtime_ns == written
+    assert run(source, runs, resume=True, **options).kept == 2
+    recipe.write_text(RECIPE.replace("90", "200"))
+    other = run(source, runs, resume=True, **options)
+    assert other.kept == 0 and other.exit_code == 0 and other.rows[0]["edits"] != again.rows[0]["edits"]
+    assert (runs / "b.scene/scene.json").stat().st_mtime_ns == written
+
+
+def test_predictors_by_name_reach_the_inversion(tmp_path):
+    from materialist.batches.job import Job
+
+    job = Job("a.png", "kitchen", "/a.png", "/r", {"predictor": "maps:priors/{name}", "size": 64})
+    assert job.named_options() == {"predictor": "maps:priors/kitchen", "size": 64}
+    assert Job.from_text(job.to_text()) == job
+
+
+def test_the_scene_says_where_the_photo_lay(tmp_path):
+    source = photos(tmp_path / "in", "a")
+    run(source, tmp_path / "runs")
+    assert load_scene(tmp_path / "runs/a.scene").photo.path == str(source / "a.png")
+
+
+def test_photos_behind_urls_are_fetched_kept_and_redone_when_they_change(tmp_path):
+    pytest.importorskip("fsspec")
+    source, runs = photos(tmp_path / "in", "a", "sub/b"), tmp_path / "runs"
+    url = f"file://{source}"
+    first = run(url, runs)
+    assert first.exit_code == 0 and [row["name"] for row in first.rows] == ["a", "b"]
+    assert load_scene(runs / "a.scene").photo.path == f"file://{source}/a.png"
+    assert first.hash == run(source, tmp_path / "paths").hash
+    photos(source, "x", "a")
+    (source / "x.png").unlink()
+    again = run(url, runs, resume=True)
+    assert again.kept == 1 and again.exit_code == 0 and again.hash != first.hash
+
+
+def test_a_file_name_that_is_no_utf8_is_a_photo_like_any_other(tmp_path):
+    source = photos(tmp_path / "in", "a")
+    try:
+        os.rename(source / "a.png", os.fsencode(source) + b"/caf\xe9.png")
+    except OSError:
+        pytest.skip("this file system takes only UTF-8")
+    outcome = run(source, tmp_path / "runs", workers=1)
+    assert outcome.exit_code == 0, reasons(outcome)
+    assert outcome.rows[0]["id"] == "caf\\udce9.png" and "caf" in (tmp_path / "runs/index.html").read_text()
+
+
+def test_a_scene_that_came_after_a_failure_is_not_the_batch_s(tmp_path):
+    """The photo could not be read; what its owner then puts there is left alone, as often as the batch is resumed."""
+    source = photos(tmp_path / "in", "a")
+    good = (source / "a.png").read_bytes()
+    (source / "a.png").write_bytes(good[:60])
+    assert run(source, tmp_path / "runs").exit_code == 2
+    (tmp_path / "runs" / "a.scene").mkdir()
+    (tmp_path / "runs" / "a.scene" / "mine.txt").write_text("mine")
+    (source / "a.png").write_bytes(good)
+    for _ in range(2):
+        outcome = run(source, tmp_path / "runs", resume=True)
+        assert "exists" in reasons(outcome)["a"] or "not replaced" in reasons(outcome)["a"]
+        assert (tmp_path / "runs" / "a.scene" / "mine.txt").read_text() == "mine"

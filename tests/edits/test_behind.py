@@ -1,0 +1,136 @@
+"""Surfaces behind an object: planes exactly, the sky as sky, never before what hid them."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import pixel_rays
+from materialist.edits.remove.behind import LOOSE, SKY, THING, behind
+from materialist.types import Camera
+
+CAMERA = Camera(80, 60, 45.0)
+
+
+def room():
+    """Depth, normal and plane of a floor 0.4 below the camera and a wall at depth 4, which meet in a straight line."""
+    rays = pixel_rays(CAMERA).astype(float)
+    floor = np.where(rays[..., 1] < 0, -0.4 / np.minimum(rays[..., 1], -1e-9), np.inf)
+    depth = np.minimum(floor, 4.0)
+    plane = (floor >= 4).astype(int)
+    normal = np.where(plane[..., None] == 1, [0.0, 0, 1], [0.0, 1, 0])
+    return depth, normal, plane
+
+
+def disc(row=38, column=40, radius=13):
+    y, x = np.mgrid[:60, :80]
+    return np.hypot(y - row, x - column) < radius
+
+
+def test_floor_and_wall_go_on_and_meet_in_a_line():
+    depth, normal, plane = room()
+    hole = disc()
+    assert (plane[hole] == 0).any() and (plane[hole] == 1).any()
+    spoiled = np.where(hole, 1.5, depth)
+    found = behind(spoiled, normal, np.where(hole, 0, plane), hole, np.where(hole, 1.5, 0), CAMERA)
+    np.testing.assert_array_equal(found.depth[~hole], depth[~hole].astype(np.float32))
+    wrong = hole & (found.label != plane)
+    assert wrong.sum() < 0.04 * hole.sum()
+    right = hole & ~wrong
+    assert np.abs(found.depth / depth - 1)[right].max() < 0.01
+    assert np.abs(found.normal - normal)[right].max() < 0.02
+
+
+def test_it_never_comes_before_what_hid_it():
+    depth, normal, plane = room()
+    hole = disc()
+    front = np.where(hole, 5.0, 0)
+    found = behind(np.where(hole, 5.0, depth), normal, plane, hole, front, CAMERA)
+    assert (found.depth[hole] > 5.0).all()
+
+
+def test_sky_and_things_that_are_no_planes():
+    depth, normal, plane = np.full((60, 80), 3.0), np.tile([0.0, 0, 1], (60, 80, 1)), np.full((60, 80), LOOSE)
+    depth[:30] = 0
+    hole = disc(30, 40, 9)
+    found = behind(np.where(hole, 1.0, depth), normal, plane, hole, np.where(hole, 1.0, 0), CAMERA)
+    upper, lower = hole & (np.arange(60)[:, None] < 27), hole & (np.arange(60)[:, None] > 33)
+    assert (found.depth[upper] == 0).mean() > 0.9 and (found.label[upper] == SKY).mean() > 0.9
+    np.testing.assert_allclose(found.depth[lower], 3.0, rtol=0.01)
+
+
+def table():
+    """Depth, normal and plane of a table that ends at depth 2 before a wavy background farther away, of no plane."""
+    depth, normal, _ = room()
+    rows, columns = np.indices(depth.shape)
+    end = depth > 2.0
+    depth = np.where(end, 3.5 + 0.3 * np.sin(columns / 7) * np.cos(rows / 5), depth)
+    return depth, np.where(end[..., None], [0.0, 0, 1], normal), np.where(end, LOOSE, 0)
+
+
+def test_a_table_ends_where_it_is_seen_to_end():
+    """Nothing but the table is a plane: it does not go on to the horizon behind what stands on it."""
+    depth, normal, plane = table()
+    hole = disc(36, 40, 13)
+    found = behind(np.where(hole, 1.2, depth), normal, np.where(hole, 0, plane), hole, np.where(hole, 1.2, 0), CAMERA)
+    assert (plane[hole] == LOOSE).sum() > 100
+    assert (found.label != plane)[hole].mean() < 0.06
+    behind_it = hole & (plane == LOOSE) & (found.label == LOOSE)
+    assert np.abs(found.depth / depth - 1)[behind_it].max() < 0.15
+
+
+def test_a_table_goes_on_behind_things_that_stand_on_it():
+    depth, normal, plane = room()
+    plane = np.where(plane == 1, 0, plane)
+    hole = disc(46, 40, 8)
+    cup = disc(46, 55, 9) & ~hole
+    depth, plane = np.where(cup, 0.9, depth), np.where(cup, LOOSE, plane)
+    depth[:40] = np.minimum(depth[:40], 3.0)
+    found = behind(np.where(hole, 0.8, depth), normal, plane, hole, np.where(hole, 0.8, 0), CAMERA)
+    assert (found.label[hole] == 0).all()
+
+
+@pytest.mark.parametrize("beside", [True, False])
+def test_the_face_of_a_box_beside_the_hole_ends_there_a_picture_around_it_goes_on(beside):
+    """A small plane is a thing; unless it is seen around the hole."""
+    plane = np.zeros((80, 100), int)
+    if beside:
+        plane[24:56, 12:48] = 1
+    else:
+        plane[12:68, 32:68] = 1
+    hole = np.zeros_like(plane, bool)
+    hole[20:60, 40:60] = True
+    depth, normal = np.full(plane.shape, 4.0), np.tile([0.0, 0, 1], (80, 100, 1))
+    depth[plane == 1] = 3.5
+    found = behind(depth, normal, np.where(hole, -1, plane), hole, np.where(hole, 2.0, 0), Camera(100, 80, 40.0))
+    assert (found.label[hole] == (0 if beside else 1)).mean() > 0.9
+    np.testing.assert_allclose(np.median(found.depth[hole]), 4.0 if beside else 3.5, rtol=1e-3)
+
+
+def test_a_thing_that_was_hidden_in_part_goes_on():
+    """In its own depth, before the planes, as a surface of its own; and not where no plane is the background."""
+    depth, normal, plane = room()
+    y, x = np.mgrid[:60, :80]
+    thing, hole = np.hypot(y - 36, x - 30) < 10, disc(36, 44, 11)
+    depth, plane = np.where(thing, 1.7, depth), np.where(thing, LOOSE, plane)
+    hidden = thing & hole
+    given = np.where(hole, 1.2, depth), normal, np.where(hole, LOOSE, plane), hole, np.where(hole, 1.2, 0), CAMERA
+    without = behind(*given)
+    found = behind(*given, [(thing & ~hole, hidden)])
+    assert hidden.sum() > 40 and (found.label[thing] == THING).all()
+    np.testing.assert_allclose(found.depth[hidden], 1.7, rtol=0.01)
+    rest = hole & ~hidden
+    np.testing.assert_array_equal(found.label[rest], without.label[rest])
+    np.testing.assert_allclose(found.depth[rest], without.depth[rest], rtol=0.02)
+    nothing = behind(given[0], normal, np.full_like(plane, LOOSE), *given[3:], [(thing & ~hole, hidden)])
+    assert (nothing.label[hole] == LOOSE).all()
+
+
+def test_planes_part_where_they_are_seen_to_meet_far_from_the_hole():
+    """Things beside a hole hide where floor and wall meet near it: the line is taken from beyond them."""
+    depth, normal, plane = room()
+    y, x = np.mgrid[:60, :80]
+    hole = disc(40, 40, 10)
+    beside = ((np.abs(x - 28) < 5) & (y > 36) & (y < 50) | (np.abs(x - 52) < 5) & (y > 26) & (y < 43)) & ~hole
+    shown = np.where(beside, LOOSE, plane)
+    found = behind(depth, normal, np.where(hole, LOOSE, shown), hole, np.zeros_like(depth), CAMERA)
+    assert (plane[hole] == 1).sum() > 40
+    assert (found.label != plane)[hole].mean() < 0.05

@@ -1,0 +1,340 @@
+"""What the composite keeps, to the bit, and what it shows, against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.camera import project
+from materialist.edits.composite.composite import FLOOR, _calmed, composite, developed, into_photo, pictures
+from materialist.edits.composite.layers import Layers, difference, significance, texture_held
+from materialist.edits.light.lights import Studio
+from materialist.edits.light.relight import lamp, relight
+from materialist.edits.material.material import edit
+from materialist.errors import InputError
+from materialist.types import Body, Camera, Photo, Surface
+
+MASK = block_mask(36, 48)
+
+
+def layers_of(base, edited, changed, relit=False):
+    reached = (base != edited).any(-1)
+    return Layers(base, edited, reached, changed & reached, edited, relit)
+
+
+@pytest.mark.parametrize("native", [1, 2])
+def test_an_edit_that_changes_nothing_gives_the_photo(native):
+    scene = rendered_scene(native)
+    same = edit(scene, MASK, roughness="+0")
+    np.testing.assert_array_equal(composite(scene, same, spp=6), scene.photo.original)
+    np.testing.assert_array_equal(composite(scene, relight(scene, rotate=0), spp=6), scene.photo.original)
+
+
+@pytest.mark.parametrize("native", [1, 2])
+def test_pixels_out_of_reach_keep_their_bits(native):
+    scene = rendered_scene(native, block=3.0)  # one flat wall, whose parts do not see each other
+    edited = edit(scene, MASK, albedo=(0.05, 0.3, 0.6))
+    out = composite(scene, edited, spp=12)
+    assert out.shape == scene.photo.original.shape
+    # At the border the photo's pixels are mixed.
+    far = np.ones((36, 48), bool)
+    rows, columns = np.nonzero(MASK)
+    far[rows.min() - 3 : rows.max() + 4, columns.min() - 3 : columns.max() + 4] = False
+    far = np.kron(far, np.ones((native, native), bool))
+    np.testing.assert_array_equal(out[far], scene.photo.original[far])
+    inner = np.kron(MASK, np.ones((native, native), bool))
+    assert (out[inner] != scene.photo.original[inner]).any(-1).all()
+
+
+def test_the_edit_is_the_rendering_where_the_fit_is_the_photo():
+    scene = rendered_scene()
+    edited = edit(scene, MASK, albedo=(0.1, 0.2, 0.05))
+    out = composite(scene, edited, spp=96, seed=4, denoise=False)
+    expected = Studio(edited).twins(edited)[0](384, 9)
+    inner = MASK.copy()
+    inner[:-1] &= MASK[1:]
+    inner[1:] &= MASK[:-1]
+    inner[:, :-1] &= MASK[:, 1:]
+    inner[:, 1:] &= MASK[:, :-1]
+    assert np.abs(out - expected)[inner].mean() < 0.01
+
+
+def test_texture_beyond_the_fit_dims_with_the_surface():
+    scene = flat_scene()
+    base = np.full((36, 48, 3), 0.5, np.float32)
+    grain = 1 + 0.2 * np.sin(np.arange(36 * 48).reshape(36, 48, 1)).astype(np.float32)
+    photo = replace(scene.photo, linear=base * grain, original=base * grain)
+    edited = np.where(MASK[..., None], 0.2, base).astype(np.float32)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    factor = (0.2 + FLOOR) / (0.5 + FLOOR)
+    np.testing.assert_allclose(out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02)
+    np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
+
+
+def test_clipped_photo_is_a_lower_bound():
+    scene = flat_scene()
+    base = np.full((36, 48, 3), 3.0, np.float32)
+    white = np.ones_like(base)
+    photo = replace(scene.photo, linear=white, original=white)
+    edited = np.where(MASK[..., None], 2.0, base).astype(np.float32)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    assert out[MASK].min() > 1.9
+
+
+def test_hdr_stays_hdr():
+    scene = rendered_scene()
+    bright = scene.photo.original * 20
+    photo = replace(scene.photo, original=bright, linear=bright, hdr=True)
+    base = bright.copy()
+    edited = np.where(MASK[..., None], base * 0.5, base)
+    out = into_photo(photo, layers_of(base, edited, MASK))
+    assert out[~MASK].max() > 5
+    np.testing.assert_allclose(out[14:20, 15:21], 0.5 * bright[14:20, 15:21], rtol=0.05)
+
+
+def test_noise_alone_is_no_edit():
+    rng = np.random.default_rng(0)
+    quiet = rng.normal(0, 0.05, (2, 40, 50, 3))
+    assert (significance(*quiet) > 0).mean() < 0.02
+    signal = quiet + 0.1
+    assert (significance(*signal) > 0.5).mean() > 0.99
+
+
+def test_a_change_of_hue_is_seen_though_its_channels_cancel():
+    """Light that an orange thing lent a table and a blue one lends it now."""
+    noise = np.random.default_rng(1).normal(0, 0.05, (2, 40, 50, 1))
+    hue = noise + np.array([-0.1, 0.0, 0.1])
+    assert (significance(*hue) > 0.5).mean() > 0.99
+
+
+def test_difference_is_zero_where_no_path_differs():
+    shape = (20, 30, 3)
+    changed = np.zeros(shape[:2], bool)
+    changed[5:10, 5:10] = True
+    base = lambda spp, seed: np.random.default_rng(seed).random(shape, np.float32)  # noqa: E731
+    edited = lambda spp, seed: base(spp, seed) + changed[..., None]  # noqa: E731
+    guides = (np.zeros(shape, np.float32),) * 3
+    layers = difference(base, edited, changed, guides, spp=8, seed=1, clean=False)
+    np.testing.assert_array_equal(layers.reached, changed)
+    np.testing.assert_array_equal(layers.edited[~changed], layers.base[~changed])
+    np.testing.assert_allclose((layers.edited - layers.base)[changed], 1, atol=1e-6)
+
+
+def test_a_lamp_in_the_picture_is_a_disc_at_native_size():
+    """However bright it is: no pixel around it holds a share of its radiance."""
+    scene = rendered_scene(native=4)
+    lit = relight(scene, lamps=[lamp(scene, 36, 18, 2.0, 6500, 0.3)])
+    (one,) = lit.lamps
+    out = composite(scene, lit, spp=8)
+    place, _ = project(np.array([one.position]), scene.camera)
+    radius = 4 * one.radius / 2.0 * scene.camera.focal  # pixels; it is small, and 2 away
+    y, x = np.mgrid[: out.shape[0], : out.shape[1]] + 0.5
+    away = np.hypot(x - 4 * place[0, 0], y - 4 * place[0, 1])
+    assert radius > 3 and one.radiance[1] > 20
+    assert (out[away < radius - 1] > 1).all() and (out[(away > radius + 1.5)] < 1.5).all()
+    assert ((out[..., 1] > 0.99) & (away < 3 * radius)).sum() < 1.4 * np.pi * radius**2
+    ring = (away > radius) & (away < radius + 8)
+    assert (out[ring] > 1.05 * scene.photo.original[ring]).all(), "it is lit up to the lamp's rim"
+
+
+@pytest.mark.parametrize("other", ["less light", "the same lamp again"])
+def test_the_rim_of_a_lamp_that_the_photo_shows_takes_no_colour_under_another_light(other):
+    scene = rendered_scene(native=4)
+    one = lamp(scene, 36, 18, 2.0, 2500, 0.3)
+    lit = relight(scene, lamps=[one])
+    saved = developed(scene, lit, composite(scene, lit, spp=16))
+    out = composite(saved, relight(saved, **({"lamps": [one]} if "again" in other else {"ambient": 0.2})), spp=16)
+    place, _ = project(np.array([one.position]), scene.camera)
+    radius = 4 * one.radius / 2.0 * scene.camera.focal
+    y, x = np.mgrid[: out.shape[0], : out.shape[1]] + 0.5
+    away = np.hypot(x - 4 * place[0, 0], y - 4 * place[0, 1]) - radius
+    near, wall = out[(away > 1) & (away < 4)], out[(away > 8) & (away < 11)]
+    np.testing.assert_allclose(near.mean(0), wall.mean(0), rtol=0.1)
+    assert near.max() < 1.5 * wall.max()
+
+
+def test_both_sides_use_the_same_tracer_under_a_lamp():
+    scene = rendered_scene()
+    lit = relight(scene, lamps=[lamp(scene, 30, 10, 2.5, 3000, 1e-6)])
+    base, edited = Studio(scene).twins(lit)
+    # A lamp of no power leaves the light alone; only its little sphere is new.
+    same = np.isclose(base(16, 2), edited(16, 2), rtol=0.2, atol=0.02).all(-1)
+    assert same.mean() > 0.6
+
+
+def test_full_render_is_the_plain_picture():
+    scene = rendered_scene()
+    edited = edit(scene, MASK, roughness=0.2)
+    plain = composite(scene, edited, spp=12, seed=3, full_render=True, denoise=False)
+    np.testing.assert_array_equal(plain, Studio(scene).twins(edited)[1](12, 3))
+
+
+def test_many_edits_render_the_base_once():
+    scene = rendered_scene()
+    edits = [edit(scene, MASK, roughness=r) for r in (0.2, 0.8)]
+    for edited, out in zip(edits, pictures(scene, edits, spp=6), strict=True):
+        np.testing.assert_array_equal(out, composite(scene, edited, spp=6))
+
+
+def test_developed_scenes_start_from_the_composite(tmp_path):
+    from materialist.io.package import load_scene, save_scene
+
+    scene = rendered_scene(2)
+    edited = relight(edit(scene, MASK, roughness=0.2), lamps=[lamp(scene, 30, 10, 2.5, 3000, 1.0)])
+    picture = scene.photo.original * 0.5
+    save_scene(developed(scene, edited, picture), tmp_path / "b.scene")
+    back = load_scene(tmp_path / "b.scene")
+    np.testing.assert_array_equal(back.photo.original, picture)
+    assert back.photo.linear.shape == scene.photo.linear.shape
+    assert back.lamps == edited.lamps and back.materials.roughness[MASK].max() < 0.21
+    assert [e["kind"] for e in back.provenance["edits"]] == ["material", "light"]
+    assert back.report.stages[-1]["edits"] == back.provenance["edits"]
+
+
+def test_too_few_samples():
+    scene = rendered_scene()
+    with pytest.raises(InputError, match="spp is 1"):
+        composite(scene, edit(scene, MASK, roughness=0.2), spp=1)
+
+
+def test_a_body_that_is_put_in_is_seen_and_nothing_far_from_it_changes():
+    scene = rendered_scene(1)
+    body = tetrahedron()
+    out = composite(scene, replace(scene, bodies=(body,)), spp=12)
+    seen = Studio(scene).covered(replace(scene, bodies=(body,)))
+    assert 10 < seen.sum() < 400
+    assert (out[seen] != scene.photo.original[seen]).any(-1).all()
+    np.testing.assert_array_equal(composite(scene, replace(scene, bodies=()), spp=6), scene.photo.original)
+
+
+def tetrahedron() -> Body:
+    """A red one, right of the block, half a unit before the wall."""
+    corners = np.float32([[0.2, -0.3, -2.4], [0.7, -0.3, -2.4], [0.45, -0.3, -2.0], [0.45, 0.3, -2.3]])
+    faces = np.int32([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+    middle = corners.mean(0)
+    normals = (corners - middle) / np.linalg.norm(corners - middle, axis=-1, keepdims=True)
+    grey = np.full((1, 1), 0.5, np.float32)
+    red = np.float32([[[0.7, 0.05, 0.05]]])
+    return Body(corners, faces, normals, np.zeros((4, 2), np.float32), Surface(red, grey, 0 * grey))
+
+
+def test_light_on_what_the_fit_has_far_too_dark_is_not_believed():
+    from types import SimpleNamespace
+
+    from materialist.edits.composite.composite import _same_light
+
+    photo = SimpleNamespace(linear=np.full((1, 3, 3), 0.9, np.float32))
+    base = np.array([0.9, 0.1, 0.1], np.float32)[None, :, None].repeat(3, 2)
+    changed = np.array([[False, False, True]])
+    more = SimpleNamespace(held=None, base=base, edited=base + 1, changed=changed)
+    np.testing.assert_allclose(_same_light(photo, more)[0][0, :, 0], [1, (0.12 * 2 / 0.92) ** 2, 1], rtol=1e-4)
+    less = SimpleNamespace(held=None, base=base, edited=base * 0.5, changed=changed)
+    np.testing.assert_allclose(_same_light(photo, less)[0], -0.5 * base, rtol=1e-6)
+
+
+def test_the_rim_of_a_pattern_goes_with_the_pattern():
+    """Dots on a white thing that becomes blue leave no rings; other detail, and what is not edited, stays."""
+    rows, columns = np.mgrid[:40, :60]
+    dot = np.hypot(rows - 20, columns - 20) < 5
+    own = (np.abs(rows - 20) < 15) & (np.abs(columns - 22) < 18)
+    albedo = np.where(dot, 0.05, np.where(own, 0.8, 0.3))[..., None] * np.ones(3)
+    uniform = np.where(own[..., None], [0.1, 0.2, 0.6], albedo)
+    darker = np.where(own[..., None], 0.5 * albedo, albedo)
+    rim = np.abs(np.hypot(rows - 20, columns - 20) - 5) < 1.5
+    held = texture_held(albedo, uniform)
+    assert held[rim].max() < 0.01
+    away = own & (np.hypot(rows - 20, columns - 20) > 9)
+    assert (held[~own] == 1).all() and (held[away] == 1).all()
+    assert texture_held(albedo, darker)[rim].min() > 0.9
+    assert (texture_held(albedo, albedo) == 1).all()
+    base = albedo.astype(np.float32)
+    photo = np.where(rim[..., None], base + 0.1, base).astype(np.float32)  # the fit misses the rim
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = replace(layers_of(base, uniform.astype(np.float32), own), held=held)
+    out = into_photo(scene, layers)
+    np.testing.assert_allclose(out[rim], uniform[rim], atol=1e-5)
+    assert np.abs(into_photo(scene, replace(layers, held=None)) - uniform)[rim].min() > 0.005
+
+
+def test_where_the_fit_is_rougher_than_the_photo_another_light_does_what_it_does_around():
+    """Steps of a depth that should be smooth do not come out under another light."""
+    rows, columns = np.mgrid[:60, :80]
+    photo = np.repeat((0.4 + 0.1 * np.sin(columns / 15))[..., None], 3, -1).astype(np.float32)
+    patch = np.hypot(rows - 30, columns - 40) < 9
+    stripes = np.where(columns % 4 < 2, 1.8, 0.3)
+    base = np.where(patch[..., None], photo * stripes[..., None], photo).astype(np.float32)
+    new = (0.5 * base).astype(np.float32)
+    new[patch] *= (np.where(rows % 4 < 2, 3.0, 0.1)[patch])[:, None]
+    everywhere = np.ones(patch.shape, bool)
+    layers = layers_of(base, new, everywhere, relit=True)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    out = into_photo(scene, layers)
+    core = np.hypot(rows - 30, columns - 40) < 7
+    np.testing.assert_allclose(out[core], 0.5 * photo[core], rtol=0.1)
+    sound = layers_of(photo, 0.5 * photo, everywhere, relit=True)
+    for given, kept in zip(_calmed(scene, sound), (sound.base, sound.edited)):
+        assert given is kept
+    textured = photo * np.where(columns % 4 < 2, 1.5, 0.6)[..., None].astype(np.float32)
+    scene = replace(scene, linear=textured, original=textured)
+    layers = layers_of(textured, 0.5 * textured, everywhere, relit=True)
+    assert _calmed(scene, layers)[1] is layers.edited, "what the photo has itself is no fault of the fit"
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_another_light_replaces_a_white_sky(known):
+    """Clipped, it is flat where the fit's light is not: that is no fault of the fit."""
+    rows, columns = np.mgrid[:60, :80]
+    sky = (rows < 25)[..., None]
+    stripes = np.where(columns % 4 < 2, 1.2, 6.0)[..., None]
+    photo = np.where(sky, 1.0, 0.3 * np.ones((60, 80, 3))).astype(np.float32)
+    base = np.where(sky, stripes, photo).astype(np.float32)
+    new = np.where(sky, 0.05 + 0.2 * (columns > 40)[..., None], 0.2 * photo).astype(np.float32)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = layers_of(base, new, np.ones((60, 80), bool), relit=True)
+    if known:  # as `render_layers` says it: whatever the photo shows there
+        layers, photo[:25, ::2] = replace(layers, replaced=sky[..., 0]), 0.8
+    out = into_photo(replace(scene, linear=photo, original=photo), layers)
+    core = (rows < 18) & (np.abs(columns - 40) > 8)
+    np.testing.assert_allclose(out[core], new[core], atol=0.03)
+
+
+def test_a_rough_fit_does_not_undo_what_is_edited_there():
+    rows, columns = np.mgrid[:60, :80]
+    photo = np.full((60, 80, 3), 0.4, np.float32)
+    patch = np.hypot(rows - 30, columns - 40) < 9
+    base = np.where(patch[..., None], photo * np.where(columns % 4 < 2, 1.8, 0.3)[..., None], photo).astype(np.float32)
+    blue = np.where(patch[..., None], 0.5 * base * np.float32([0.1, 0.1, 1]), 0.5 * base).astype(np.float32)
+    scene = replace(flat_scene().photo, linear=photo, original=photo)
+    layers = replace(layers_of(base, blue, np.ones(patch.shape, bool), relit=True), replaced=patch)
+    core = np.hypot(rows - 30, columns - 40) < 7
+    out = into_photo(scene, layers)[core].mean(0)
+    assert out[2] > 3 * out[0]
+
+
+def test_a_pattern_that_is_darker_is_one_all_the_same():
+    columns = np.arange(60)[None, :, None].repeat(40, 0).repeat(3, 2)
+    albedo = np.where(columns % 6 < 3, 0.05, 0.8)
+    for factor in (0.5, 0.1, 0.02):
+        assert texture_held(albedo, factor * albedo).min() > 0.9
+
+
+@pytest.mark.parametrize("hdr", [False, True])
+def test_the_rim_of_what_is_brighter_than_white_is_as_soft_as_the_photo_s(hdr):
+    """A highlight of radiance 20 fills no pixel of which it has a tenth, but in an HDR photo."""
+    left, right = np.array([0.6, 0.3, 0.1]), np.array([0.05, 0.1, 0.3])
+    share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)[None, :, None]  # a border six native pixels wide
+    original = (share * left + (1 - share) * right).repeat(60, 0).astype(np.float32)
+    small = original.reshape(15, 4, 15, 4, 3).mean((1, 3))
+    changed = np.zeros((15, 15), bool)
+    changed[:, :8] = True
+    edited = np.where(changed[..., None], 20, small).astype(np.float32)
+    photo = Photo(small, Camera(15, 15, 40.0), original, hdr=hdr)
+    out = into_photo(photo, Layers(small, edited, changed, changed, edited))
+    rim = np.s_[20:40, 31:34]
+    if hdr:
+        assert out[rim].min() > 2
+    else:
+        expected = share * 1 + (1 - share) * right
+        assert np.abs(out[20:40] - expected)[:, 31:34].max() < 0.25 and (out[20:40, :26] > 1).all()
+    np.testing.assert_array_equal(out[:, 44:], original[:, 44:])

@@ -1,0 +1,271 @@
+"""Falling things: they come to rest on the ground, lose energy, and never go through it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from made_meshes import box_file, floor_scene
+
+from materialist.edits.drop.convex import convex_pieces, thinned
+from materialist.edits.drop.drop import METRES, down, drop, upright
+from materialist.edits.drop.drop_ground import Surroundings
+from materialist.edits.drop.ground import Field, blocks
+from materialist.edits.drop.physics import GRAVITY, Thing, fall
+from materialist.edits.insert.insert import extent, insert
+from materialist.edits.insert.mesh_shape import volume
+from materialist.edits.insert.meshes import read_model
+from materialist.edits.insert.support import support_at
+from materialist.edits.light import film
+from materialist.errors import InputError
+
+pytest.importorskip("mujoco")
+
+UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
+BOX = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.1, 0.1)])
+FLAT = Field(np.array([-1.0, -1.0]), 2 / 64, np.zeros((65, 65)))
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory):
+    return read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
+
+
+@pytest.fixture(scope="module")
+def filmed_box(box):
+    return drop(floor_scene(96, 72), [box], (48.0, 50.0), frames=40, seed=3)
+
+
+def test_it_starts_above_the_click_and_rests_on_the_floor(filmed_box):
+    heights = [float((frame.bodies[0].vertices @ UP + 2).min()) for frame in filmed_box]
+    size = extent(filmed_box[0].bodies)
+    np.testing.assert_allclose(heights[0], 1.5 * size, rtol=0.1)  # the extent is that of the box in the camera frame
+    assert abs(heights[-1]) < 0.01 * size  # a hundredth of its size
+    assert min(heights) > -0.03 * size  # and not deeper at the moment it lands
+    last = filmed_box[-1].bodies[0].vertices @ UP
+    lying = [edge for edge in (0.5, 1, 2) if np.isclose(np.ptp(last) / size, edge / 2, atol=0.1)]
+    assert lying  # on one of its sides
+    assert filmed_box[-1] is filmed_box[-2]  # what does not move is one scene
+
+
+def test_the_shape_stays(filmed_box):
+    first, last = (frame.bodies[0].vertices.astype(np.float64) for frame in (filmed_box[0], filmed_box[-1]))
+    sides = lambda v: np.linalg.norm(v[None, ::5] - v[::5, None], axis=-1)  # noqa: E731
+    np.testing.assert_allclose(sides(first), sides(last), atol=1e-4)
+
+
+def test_the_same_seed_gives_the_same_film(box, filmed_box):
+    scene = floor_scene(96, 72)
+    again = drop(scene, [box], (48.0, 50.0), frames=12, seed=3)
+    other = drop(scene, [box], (48.0, 50.0), frames=12, seed=4)
+    for frame, same in zip(filmed_box, again):
+        np.testing.assert_array_equal(frame.bodies[0].vertices, same.bodies[0].vertices)
+    assert not np.array_equal(again[-1].bodies[0].vertices, other[-1].bodies[0].vertices)
+
+
+def test_free_fall_is_newtons():
+    poses = list(fall([Thing((BOX,), np.array([0, 0, 2.0]), np.zeros(3))], [], frames=10, fps=25))
+    for k, (pose,) in enumerate(poses):
+        np.testing.assert_allclose(pose.centre[2], 2 - GRAVITY / 2 * (k / 25) ** 2, atol=2e-3)
+
+
+def test_energy_is_only_lost():
+    things = [Thing((BOX,), np.array([0, 0, 0.5]), np.array([1.0, 3.0, 0.5]))]
+    energy = np.array(
+        [poses[0].energy for poses in fall(things, blocks(FLAT, flat=1e-4, depth=0.4), frames=60, fps=60)]
+    )
+    assert (np.diff(energy) < 0.01 * energy[0]).all() and energy[-1] < 0.5 * energy[0]
+
+
+@pytest.mark.parametrize("height", [1.0, 8.0])
+def test_nothing_tunnels(height):
+    rough = np.random.default_rng(0).normal(0, 0.003, (65, 65))
+    ground = blocks(Field(FLAT.corner, FLAT.cell, rough), flat=1e-3, depth=0.4)
+    poses = list(fall([Thing((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=60, fps=20))
+    z = np.array([pose[0].centre[2] for pose in poses])
+    assert z.min() > 0.04 and abs(z[-1] - z[-10]) < 1e-3
+
+
+def test_over_an_edge_it_falls_to_the_lower_floor():
+    height = np.where(np.arange(65)[None, :] < 32, 0.3, 0.0) * np.ones((65, 1))
+    ground = blocks(Field(FLAT.corner, FLAT.cell, height), flat=1e-4, depth=0.4)
+    start = np.array([0.06, 0, 0.6])  # more of it beyond the edge than on the table
+    poses = list(fall([Thing((BOX,), start, np.zeros(3))], ground, frames=50, fps=20))
+    assert poses[-1][0].centre[2] < 0.2
+
+
+def test_blocks_follow_the_ground_and_are_large_where_it_is_plane():
+    x, y = np.meshgrid(np.arange(65), np.arange(65))
+    slope = Field(np.zeros(2), 0.1, 0.02 * x - 0.01 * y)
+    (one,) = blocks(slope, flat=1e-6, depth=1)
+    np.testing.assert_allclose(sorted(one[:4, 2]), sorted([0, 1.28, -0.64, 0.64]), atol=1e-9)
+    bumpy = Field(np.zeros(2), 0.1, np.where((x == 10) & (y == 10), 1.0, 0.0))
+    many = blocks(bumpy, flat=1e-3, depth=1)
+    assert 10 < len(many) < 60 and max(b[:4, 2].max() for b in many) == 1
+    hole = Field(np.zeros(2), 0.1, np.where(x > 32, np.nan, 0.0))
+    assert max(b[:, 0].max() for b in blocks(hole, flat=1e-3, depth=1)) == pytest.approx(3.2)
+
+
+def test_gravity(box):
+    scene = floor_scene(96, 72)
+    support = support_at(scene, (48.0, 50.0))
+    assert down(scene, support, None) @ UP < -0.999
+    np.testing.assert_allclose(down(scene, support, (0, -2, 0)), [0, -1, 0])
+    frame = upright(down(scene, support, None))
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(frame @ UP, [0, 0, 1], atol=1e-3)
+    from edit_scenes import flat_scene
+
+    wall = flat_scene()
+    np.testing.assert_allclose(down(wall, support_at(wall, (40.0, 20.0)), None), [0, -1, 0])
+
+
+def test_things_rest_on_bodies_that_are_there(box):
+    scene = insert(floor_scene(96, 72), box, (48.0, 50.0), scale=2, turn=20)
+    size = extent(scene.bodies)
+    last = drop(scene, [box], (48.0, 50.0), frames=40, spin=0, height=3, scale=0.8)[-1]
+    assert len(last.bodies) == 2
+    low = float((last.bodies[1].vertices @ UP + 2).min())
+    assert low > 0.9 * size or low < 0.02 * size  # on top of it, or it has slid off onto the floor
+
+
+def floating(scene, box, height, **options):
+    """The scene with a box whose lowest point is `height` over the floor."""
+    (body,) = insert(scene, box, (48.0, 50.0), **options).bodies
+    return replace(scene, bodies=(replace(body, vertices=(body.vertices + height * UP).astype(np.float32)),))
+
+
+def test_under_a_table_it_starts_under_the_table(box):
+    scene = floor_scene(96, 72)
+    size = extent(insert(scene, box, (48.0, 50.0)).bodies)
+    film = drop(floating(scene, box, 1.5 * size, scale=3), [box], (48.0, 50.0), frames=24, spin=0)
+    first, last = (frame.bodies[-1].vertices @ UP + 2 for frame in (film[0], film[-1]))
+    assert 0.05 * size < first.min() and first.max() < 1.5 * size
+    assert abs(last.min()) < 0.02 * size
+
+
+def test_what_stands_in_its_way_is_beside_its_start(box):
+    """A place at the foot of something tall: the thing starts next to it, and does not jump out of it."""
+    scene = insert(floor_scene(96, 72), box, (42.0, 50.0), scale=3)
+    tall = extent(scene.bodies)
+    at = (50.0, 50.0)
+    film = drop(scene, [box], at, frames=16, spin=0, height=0.5)
+    moved = [note for note in film[0].report.warnings if "to the side" in note]
+    assert len(moved) == 1 and "box at 50,50" in moved[0]
+    middle = np.array([frame.bodies[-1].vertices.mean(0) for frame in film])
+    assert np.abs(np.diff(middle, axis=0)).max() < 0.1 * tall, "nothing pushes it out"
+    with pytest.raises(InputError, match="no room for box at 48,50"):
+        drop(floating(floor_scene(96, 72), box, 0.01, scale=8), [box], (48.0, 50.0), frames=2)
+
+
+def test_two_that_make_way_do_not_start_in_each_other(box):
+    scene = insert(floor_scene(96, 72), box, (42.0, 50.0), scale=3)
+    for x in (50.0, 52.0, 54.0):
+        first = drop(scene, [box, box], [(50.0, 50.0), (x, 50.0)], frames=2, spin=0, height=0.5)[0]
+        up = upright(np.array(first.provenance["edits"][-1]["gravity"]))
+        (low, high), (other_low, other_high) = (
+            ((body.vertices @ up.T).min(0), (body.vertices @ up.T).max(0)) for body in first.bodies[1:]
+        )
+        assert (low >= other_high - 1e-4).any() or (other_low >= high - 1e-4).any()
+
+
+def test_a_card_whose_faces_look_down_is_no_solid(box):
+    """A ray that begins over it comes onto its back; one that begins in a box stays where it begins."""
+    scene, to_up = floor_scene(96, 72), upright(-UP)
+    (solid,) = floating(scene, box, 0.1).bodies
+    points = solid.vertices @ to_up.T
+    low, high = points.min(0), points.max(0)
+    place = (low + high) / 2
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    vertices = (np.c_[corners, np.full(4, low[2] + 0.1)] @ to_up).astype(np.float32)
+    card = replace(
+        solid, vertices=vertices, normals=np.tile(np.float32(-UP), (4, 1)), uv=np.zeros((4, 2), np.float32),
+        faces=np.int32([[0, 2, 1], [0, 3, 2]]),
+    )  # fmt: skip
+    for body, expected in ((card, low[2] + 0.1), (solid, place[2])):
+        around = Surroundings.of(replace(scene, bodies=(body,)), to_up, 1.0)
+        assert around.meets(*(np.array([v]) for v in place))[0] == pytest.approx(expected, abs=1e-3)
+
+
+def test_it_spins_about_its_centre_of_mass():
+    """Which falls straight down, wherever the middle of the box around the thing is."""
+    off = np.array([0.15, 0.0, 0.05])
+    (spun,) = zip(*fall([Thing((BOX + off,), np.array([0, 0, 2.0]), np.array([1.0, 5.0, 3.0]))], [], frames=10, fps=25))
+    mass = np.array([pose.centre + pose.turn @ off for pose in spun])
+    np.testing.assert_allclose(mass[:, :2], np.tile(off[:2], (10, 1)), atol=2e-3)
+    np.testing.assert_allclose(mass[:, 2], 2.05 - GRAVITY / 2 * (np.arange(10) / 25) ** 2, atol=2e-3)
+
+
+def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ground = blocks(FLAT, flat=1e-4, depth=0.4)
+    rod = BOX * np.array([1, 0.2, 0.1])
+    spun = lambda turns: fall(  # noqa: E731
+        [Thing((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))], ground, frames=48, fps=24
+    )
+    energy = [poses[0].energy for poses in spun(20)]
+    assert np.isfinite(energy).all() and max(energy) < 1.02 * energy[0]
+    with pytest.raises(InputError, match="smaller spin"):
+        list(spun(1e12))
+    assert not list(tmp_path.iterdir()), "no log of the simulation's"
+
+
+def test_small_things_move_smoothly_too(box):
+    """A frame stands still for less than a thousandth of the thing's size, whatever that is taken for."""
+    film = drop(floor_scene(96, 72), [box], (48.0, 50.0), frames=8, fps=240, spin=0, metres=0.002)
+    height = np.array([float((frame.bodies[0].vertices @ UP).min()) for frame in film])
+    assert (np.diff(height[1:]) < 0).all()
+
+
+def test_several_start_clear_of_each_other(box):
+    film = drop(floor_scene(96, 72), [box, box], (48.0, 50.0), frames=2, spin=0)
+    a, b = (body.vertices @ UP for body in film[0].bodies)
+    assert b.min() > a.max()
+    told = film[0].provenance["edits"][-1]
+    assert told["kind"] == "drop" and told["metres"] == METRES and told["up"] == "auto"
+    assert np.linalg.norm(told["gravity"]) == pytest.approx(1, abs=1e-5)  # the one that was found
+
+
+def test_one_mesh_needs_no_list(box, tmp_path):
+    alone, listed = (drop(floor_scene(), meshes, (24.0, 26.0), frames=2) for meshes in (box, [box]))
+    np.testing.assert_array_equal(alone[-1].bodies[0].vertices, listed[-1].bodies[0].vertices)
+    path = box_file(tmp_path / "box.ply")
+    assert drop(floor_scene(), str(path), (24.0, 26.0), frames=2)[-1].bodies[0].name == listed[-1].bodies[0].name
+
+
+def test_bad_input(box):
+    scene = floor_scene(96, 72)
+    for options, sentence in [
+        ({"frames": 1}, "frames"), ({"height": -1}, "height"), ({"spin": np.inf}, "spin"), ({"metres": 0}, "metres"),
+        ({"fps": 0}, "frame rate"), ({"gravity": (0, 0, 0)}, "gravity"), ({"at": [(1, 1), (2, 2)]}, "places"),
+        ({"at": (400, 3)}, "outside"), ({"meshes": []}, "Nothing falls"),
+    ]:  # fmt: skip
+        given = {"meshes": [box], "at": (48.0, 50.0), **options}
+        with pytest.raises(InputError, match=sentence):
+            drop(scene, **given)
+
+
+def test_convex_shapes_are_one_piece_and_concave_ones_several():
+    ball = trimesh.creation.icosphere(2)
+    assert len(convex_pieces(ball.vertices, ball.faces)) == 1
+    pytest.importorskip("coacd")
+    parts = [trimesh.creation.box((3, 1, 1)), trimesh.creation.box((1, 3, 1)).apply_translation([-1, 2, 0])]
+    corner = trimesh.util.concatenate(parts)
+    pieces = convex_pieces(np.asarray(corner.vertices), np.asarray(corner.faces))
+    total = sum(trimesh.convex.convex_hull(piece).volume for piece in pieces)
+    assert len(pieces) > 1 and 6 <= total < 7.3  # the hull alone has 8; the pieces come from a coarse grid
+
+
+def test_thinning_keeps_the_shape():
+    ball = trimesh.creation.icosphere(5)
+    v, f = thinned(np.asarray(ball.vertices), np.asarray(ball.faces))
+    assert len(f) < len(ball.faces)
+    np.testing.assert_allclose(volume(v, f), 4 / 3 * np.pi, rtol=0.02)
+
+
+def test_frames_that_are_alike_are_rendered_once(monkeypatch):
+    asked = []
+    monkeypatch.setattr(film, "pictures", lambda scene, edits, **_: (asked.append(e) or e for e in edits))
+    last = [None]
+    assert list(film.filmed(None, ["a", "a", "b", "b", "b", "c"], last=last)) == ["a", "a", "b", "b", "b", "c"]
+    assert asked == ["a", "b", "c"] and last == ["c"]

@@ -1,0 +1,91 @@
+"""Glass while a slider moves: the picture of the long way inside the object; and lone bright pixels brought down."""
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edits.composite.composite import composite
+from materialist.edits.glass.fireflies import without_fireflies
+from materialist.edits.glass.glass import glass
+from materialist.edits.glass.preview import GlassPreview
+from materialist.errors import InputError
+
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture(scope="module")
+def preview():
+    return GlassPreview(rendered_scene(), MASK, thickness="symmetry")
+
+
+def test_inside_it_is_the_final_picture_and_outside_the_photo(preview):
+    scene = preview.scene
+    quick = preview.picture(ior=1.3, tint=(1, 0.5, 0.5), spp=64)
+    final = composite(scene, glass(scene, MASK, ior=1.3, tint=(1, 0.5, 0.5), thickness="symmetry"), spp=128)
+    inner = np.zeros_like(MASK)
+    inner[14:22, 14:24] = MASK[14:22, 14:24]
+    assert np.abs(quick - final)[inner].mean() < 0.1 * final[inner].mean()
+    np.testing.assert_array_equal(quick[:6], scene.photo.linear[:6])
+    assert quick.dtype == np.float32 and (quick >= 0).all()
+
+
+def test_the_glass_is_exchanged_and_comes_back(preview):
+    clear = preview.picture(spp=16)
+    red = preview.picture(tint=(1, 0.2, 0.2), spp=16)
+    frosted = preview.picture(roughness=0.5, spp=16)
+    coated = preview.picture(transmission=0.5, spp=16)
+    ratio = (red[MASK].mean(0) + 0.01) / (clear[MASK].mean(0) + 0.01)
+    assert ratio[1] < 0.75 and ratio[0] > 0.9
+    for other in (frosted, coated):
+        assert np.abs(other - clear)[MASK].max() > 0.01
+    np.testing.assert_array_equal(preview.picture(spp=16), clear)
+
+
+def test_large_objects_are_traced_at_fewer_pixels(preview, monkeypatch):
+    from materialist.edits.glass import preview as glass_preview
+
+    monkeypatch.setattr(glass_preview, "PATHS", 500)
+    small = preview.picture(ior=1.0, spp=64)
+    monkeypatch.undo()
+    size, box = preview._size(64)
+    assert size == MASK.shape and (box[1] - box[0]) * (box[3] - box[2]) * 4 > 500
+    full = preview.picture(ior=1.0, spp=64)
+    assert small.shape == full.shape
+    assert small[MASK].mean() == pytest.approx(full[MASK].mean(), rel=0.15)
+
+
+def test_bad_values_are_refused(preview):
+    with pytest.raises(InputError, match="index of refraction"):
+        preview.picture(ior=0.5)
+    with pytest.raises(InputError, match="at least 1 path"):
+        preview.picture(spp=0)
+    with pytest.raises(InputError, match="leave it 'closed'"):
+        GlassPreview(flat_scene(), MASK, model="two-interface")
+
+
+def test_a_lone_bright_pixel_is_brought_down_and_a_highlight_stays():
+    picture = np.full((9, 9, 3), 0.5, np.float32)
+    picture[2, 2] = (40, 20, 10)
+    picture[6, 5:7] = 30
+    clean = without_fireflies(picture)
+    assert clean[2, 2].max() < 3 and clean[2, 2, 0] / clean[2, 2, 2] == pytest.approx(4, rel=1e-5)
+    assert (clean[6, 5:7] > 1.4).all() and (clean <= picture + 1e-6).all()
+    highlight = np.full((9, 9, 3), 0.5, np.float32)
+    highlight[5:7, 5:7] = 30
+    np.testing.assert_array_equal(without_fireflies(highlight), highlight)
+    where = np.zeros((9, 9), bool)
+    np.testing.assert_array_equal(without_fireflies(picture, where), picture)
+
+
+def test_light_that_must_not_be_lost_is_spread():
+    """Beside glass that lamps stand by, lone paths are all the light there is: none of it goes, and none leaves."""
+    rng = np.random.default_rng(0)
+    picture = np.full((60, 80, 3), 0.02, np.float32)
+    picture[rng.random((60, 80)) < 0.03] = [30, 20, 10]
+    where = np.zeros((60, 80), bool)
+    where[5:55, 10:70] = True
+    found = without_fireflies(picture, where, spread=True)
+    assert np.allclose(found[where].sum(0), picture[where].sum(0), rtol=1e-3)
+    np.testing.assert_array_equal(found[~where], picture[~where])
+    assert found[where].std() < 0.3 * picture[where].std()
+    assert without_fireflies(picture, where)[where].sum() < 0.2 * picture[where].sum(), "else it is lost"

@@ -1,0 +1,326 @@
+"""Lights that the photo shows: found, estimated, dimmed, and what the room then looks like."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist.camera import pixel_rays
+from materialist.edits.composite.composite import composite, pictures
+from materialist.edits.light import glows
+from materialist.edits.light.frames import moving_light
+from materialist.edits.light.glows import _explained, _patch, dimmed, visible_lights
+from materialist.edits.light.relight import relight, rotated
+from materialist.errors import InputError
+from materialist.geometry.build import build_geometry
+from materialist.io.package import load_scene, save_scene
+from materialist.render.scene import RenderScene
+from materialist.types import Camera, Materials, Photo, Prediction, Scene
+
+LIGHT = np.zeros((30, 40), bool)
+LIGHT[3:12, 8:32] = True
+RADIANCE = 8.0
+
+
+def picture(scene: Scene, seed: int = 0, spp: int = 256) -> np.ndarray:
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    return target.render_path(spp=spp, seed=seed)
+
+
+@cache
+def rooms() -> tuple[Scene, Scene]:
+    """(the room with a window in its back wall, truly lit; a fit of its photo that has no light but the map's)."""
+    camera = Camera(40, 30, 60.0)
+    rays = pixel_rays(camera)
+    floor = np.where(rays[..., 1] < -0.02, 1.0 / np.maximum(-rays[..., 1], 1e-3), 1e6)
+    depth = np.minimum(floor, 3.5).astype(np.float32)
+    normal = np.where((floor < 3.5)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
+    albedo = np.full((30, 40, 3), 0.5, np.float32)
+    materials = Materials(albedo, np.full((30, 40), 0.8, np.float32), np.zeros((30, 40), np.float32))
+    geometry = build_geometry(depth, normal, camera, completion="none")
+    envmap = np.full((8, 16, 3), 0.15, np.float32)
+    dark = Photo(albedo, camera, albedo, fov_source="option")
+    prior = Prediction(materials, normal, depth, "made")
+    bare = Scene(camera, dark, prior, materials, normal, depth, geometry, envmap, albedo)
+    true = replace(bare, bodies=(_patch(bare, LIGHT, (RADIANCE,) * 3, "window"),))
+    linear = np.clip(picture(true), 0, 1)
+    photo = Photo(linear, camera, linear, fov_source="option")
+    rendered = picture(bare)
+    factor = float((linear * rendered)[~LIGHT].sum() / (rendered**2)[~LIGHT].sum())  # what a fit of the map would do
+    brighter = replace(bare, photo=photo, envmap=envmap * np.float32(factor), rerender=rendered * np.float32(factor))
+    return replace(true, photo=photo), brighter
+
+
+def test_the_window_is_found_and_a_speck_is_not():
+    _, fit = rooms()
+    (mask,) = visible_lights(fit)
+    assert (mask & LIGHT).sum() / (mask | LIGHT).sum() > 0.95
+    assert not visible_lights(replace(fit, depth=np.where(LIGHT, 0, fit.depth)))  # the sky is in the map
+    large = np.zeros((60, 80, 3), np.float32)
+    large[3, 3:6] = 1  # a highlight: less than a thousandth
+    depth = np.ones((60, 80), np.float32)
+    assert not visible_lights(replace(fit, photo=replace(fit.photo, linear=large), depth=depth))
+
+
+def test_its_radiance_is_found():
+    _, fit = rooms()
+    ambient, radiance, share = _explained(fit, visible_lights(fit), [(1.0, 1.0, 1.0)], 0, "auto")
+    assert 6 <= radiance <= 12
+    np.testing.assert_allclose(ambient * fit.envmap.mean(), 0.15, rtol=0.25)
+    assert ambient + share == pytest.approx(1, abs=0.25)  # the two together are the photo
+
+
+@pytest.mark.parametrize("dim", [0.0, 0.5])
+def test_dimming_is_the_true_room_with_a_dimmer_window(dim):
+    true, fit = rooms()
+    lights = (_patch(true, LIGHT, (dim * RADIANCE,) * 3, "window"),)
+    expected = picture(replace(true, bodies=lights), seed=5)
+    out = composite(fit, relight(fit, dim=dim), spp=64)
+    away = ~LIGHT
+    before = metrics.psnr(fit.photo.linear, expected, mask=away)
+    assert metrics.psnr(out, expected, mask=away) > max(28, before + 3)
+    if dim == 0:
+        assert out[LIGHT].mean() < 0.3
+
+
+def test_as_it_is_stays_nearly_so():
+    _, fit = rooms()
+    assert metrics.psnr(composite(fit, relight(fit, dim=1.0), spp=64), fit.photo.linear) > 26
+
+
+def test_the_window_stays_while_the_rest_turns():
+    _, fit = rooms()
+    turned = relight(fit, dim=0.5, rotate=90)
+    still = relight(fit, dim=0.5)
+    np.testing.assert_array_equal(turned.envmap, rotated(still.envmap, 90))
+    assert turned.bodies[0].surface.emission == still.bodies[0].surface.emission
+    alone = relight(fit, dim=0.5, ambient=0)
+    assert not alone.envmap.any() and alone.bodies
+
+
+def test_frames_share_the_dimmed_lights_and_the_picture_that_they_are_compared_with(monkeypatch):
+    _, fit = rooms()
+    asked = []
+    monkeypatch.setattr(glows, "_explained", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
+    film = list(moving_light(fit, 3, dim=0.25))
+    assert len(asked) == 1 and film[0].bodies is film[2].bodies and len(film[0].bodies) == 1
+    np.testing.assert_allclose(film[0].bodies[0].surface.emission, 1.5)
+    np.testing.assert_array_equal(film[1].envmap, rotated(film[0].envmap, 120))
+    together = list(pictures(fit, film, spp=4, denoise=False))
+    for frame, picture in zip(film[::2], together[::2]):
+        np.testing.assert_array_equal(picture, composite(fit, frame, spp=4, denoise=False))
+    assert np.abs(together[1] - together[0]).mean() > 1e-3
+    (same,) = pictures(fit, [fit], spp=4)
+    np.testing.assert_array_equal(same, fit.photo.original)
+
+
+def test_bad_input_and_files(tmp_path):
+    _, fit = rooms()
+    for scene, options, sentence in [
+        (fit, {"dim": -1.0}, "dimming"), (fit, {"dim": np.nan}, "dimming"),
+        (fit, {"dim": 0.2, "ambient": -1}, "ambient"), (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
+        (replace(fit, photo=replace(fit.photo, linear=fit.photo.linear * 0.5)), {"dim": 0.2}, "no light"),
+    ]:  # fmt: skip
+        with pytest.raises(InputError, match=sentence):
+            relight(scene, **options)
+    edited = dimmed(fit, 0.5)
+    assert any("clipped regions around 20,7" in note for note in edited.report.warnings)
+    save_scene(edited, tmp_path / "a.scene")
+    assert load_scene(tmp_path / "a.scene").bodies[0].surface.emission == edited.bodies[0].surface.emission
+    assert min(edited.bodies[0].surface.emission) > 0
+
+
+def test_edits_before_do_not_change_what_is_found():
+    """The lights are those of the photo, whatever has been done to the floor."""
+    from materialist.edits.light.glows import KEY
+    from materialist.edits.material.material import edit
+
+    _, fit = rooms()
+    floor = fit.normal[..., 1] > 0.5
+    after = relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5, fitted=fit)
+    before = edit(relight(fit, dim=0.5), floor, albedo=(0.05, 0.05, 0.05))
+    # Threads add up paths in another order each time.
+    one, other = ({**scene.provenance[KEY]} for scene in (after, before))
+    np.testing.assert_allclose(one.pop("emission"), other.pop("emission"), rtol=1e-6)
+    assert one == pytest.approx(other, rel=1e-6)
+    np.testing.assert_allclose(after.envmap, before.envmap, rtol=1e-5)
+    assert after.bodies[0].surface.emission == before.bodies[0].surface.emission
+    with pytest.raises(InputError, match="fitted="):
+        relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5)
+
+
+def test_off_is_as_good_as_off():
+    from materialist.edits.insert.portrait import free_bodies
+
+    _, fit = rooms()
+    off = dimmed(fit, 0.0)
+    assert max(off.bodies[0].surface.emission) <= 1e-6
+    assert free_bodies(fit, off) == [], "it keeps the outline that the photo has"
+
+
+def test_an_hdr_photo_tells_how_bright_its_lights_are():
+    _, fit = rooms()
+    even = replace(fit.photo, hdr=True, linear=np.full((30, 40, 3), 1.2, np.float32))
+    assert visible_lights(replace(fit, photo=even)) == [], "a wall lit evenly is no light"
+    shown = np.where(LIGHT[..., None], np.float32(RADIANCE), np.minimum(fit.photo.linear, 0.9))
+    scene = replace(fit, photo=replace(fit.photo, hdr=True, linear=shown))
+    (mask,) = visible_lights(scene)
+    np.testing.assert_array_equal(mask, LIGHT)
+    assert dimmed(scene, 1.0).provenance["photo_lights"]["radiance"] == pytest.approx(RADIANCE)
+
+
+def test_the_preview_of_dimmed_lights_has_their_share():
+    from materialist.edits.preview import Preview
+
+    _, fit = rooms()
+    preview = Preview(fit, diffuse_samples=16, specular_samples=4)
+    base = preview.render(fit)[~LIGHT].mean()
+    as_it_is, less = (preview.render(dimmed(fit, dim))[~LIGHT].mean() for dim in (1.0, 0.3))
+    assert as_it_is == pytest.approx(base, rel=0.03) and less < 0.95 * base
+
+
+def test_a_light_has_its_bright_rim_and_no_narrow_gaps_and_reflections_are_none():
+    _, fit = rooms()
+    large = np.zeros((120, 160, 3), np.float32)
+    large[20:60, 40:100] = 1
+    large[20:60, 70] = 0.05  # a leaf
+    large[60:62, 40:100] = 0.7  # the rim
+    large[62:100, 40:100] = 0.65  # a wall beside it, bright as well
+    large[105:115, 20:60] = 1  # on the table
+    normal = np.broadcast_to(np.float32([0, 0, 1]), large.shape).copy()
+    normal[105:115] = [0, 1, 0]
+    scene = replace(
+        fit, photo=replace(fit.photo, linear=large), depth=np.ones((120, 160), np.float32), normal=normal
+    )  # fmt: skip
+    (mask,) = visible_lights(scene)
+    assert mask[22:60, 41:99].all(), "with the leaf"
+    assert mask[60:62, 41:68].all() and not mask[66:, :].any(), "as far as the rim may go"
+
+
+def test_the_lights_that_are_meant_need_not_be_clipped():
+    """Half of the window, in a photo so dark that it is grey: as bright as it is, and of its colour."""
+    _, fit = rooms()
+    tint = np.float32([1.0, 0.8, 0.5])
+    grey = np.where(LIGHT[..., None], 0.6 * tint, 0.1 * fit.photo.linear).astype(np.float32)
+    scene = replace(fit, photo=replace(fit.photo, linear=grey, original=grey), rerender=0.1 * fit.rerender)
+    meant = LIGHT & (np.arange(40) < 20)
+    with pytest.raises(InputError, match="no light"):
+        relight(scene, dim=0.5)
+    edited = relight(scene, dim=0.5, lights=meant)
+    np.testing.assert_allclose(edited.bodies[0].surface.emission, 0.5 * 0.6 * tint, rtol=1e-4)
+    out = composite(scene, edited, spp=16)
+    inner = meant & (np.arange(40) < 17) & (np.arange(40) > 9) & (np.arange(30) > 4)[:, None]
+    inner &= (np.arange(30) < 10)[:, None]
+    np.testing.assert_allclose(out[inner], 0.5 * grey[inner], rtol=0.02)
+    other = LIGHT & (np.arange(40) > 24)
+    assert out[other].mean() > 0.8 * grey[other].mean(), "the other half stays"
+    for mask, sentence in ((np.zeros((30, 40), bool), "mask"), (np.ones((9, 9), bool), "resize it")):
+        with pytest.raises(InputError, match=sentence):
+            relight(scene, dim=0.5, lights=mask)
+    with pytest.raises(InputError, match="give dim"):
+        relight(scene, lights=meant)
+
+
+def test_dimmed_lights_keep_what_is_seen_in_them():
+    """A tree in the window goes down with it; what is clipped is as bright as it was found to be."""
+    _, fit = rooms()
+    original = fit.photo.original.copy()
+    original[6:9, 12:16] = [0.1, 0.3, 0.05]
+    photo = replace(fit.photo, original=original)
+    found = {"radiance": 8.0, "dim": 0.1}
+    out = glows.in_photo(np.full_like(original, 9), photo, LIGHT, found)
+    np.testing.assert_allclose(out[7, 13:15], 0.1 * original[7, 13:15], rtol=1e-5)
+    np.testing.assert_allclose(out[7, 20:28], 0.8, rtol=0.05)
+    assert (out[20:] == 9).all()
+    before = np.zeros((30, 40), np.float32)
+    before[7, 20:28] = 1  # something that was inserted stands before it
+    np.testing.assert_array_equal(glows.in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
+
+
+def spot(rows=slice(22, 26), columns=slice(14, 20)):
+    """[H, W] bool: a part of the floor, far from the window."""
+    mask = np.zeros((30, 40), bool)
+    mask[rows, columns] = True
+    return mask
+
+
+@pytest.mark.parametrize("kind", ["ambient", "lamp", "dim", "recolour"])
+def test_a_removal_elsewhere_changes_nothing_else_of_an_edit(kind):
+    from materialist.edits.light.relight import lamp
+    from materialist.edits.material.material import edit
+    from materialist.edits.remove.background import without
+
+    _, fit = rooms()
+    floor = (fit.normal[..., 1] > 0.5) & ~spot(slice(18, 30), slice(8, 26))
+
+    def then(scene):
+        if kind == "recolour":
+            return edit(scene, floor, value=-0.9)
+        lamps = [lamp(fit, 10, 20, 2.0, 3000, 1.0)] if kind == "lamp" else ()
+        dim, ambient = 0.1 if kind == "dim" else None, 0.2 if kind == "ambient" else 1.0
+        return relight(scene, dim=dim, ambient=ambient, lamps=lamps, fitted=fit)
+
+    alone = composite(fit, then(fit), spp=32)
+    both = composite(fit, then(without(fit, spot(), shadow=0)), spp=32)
+    away = ~spot(slice(16, 30), slice(6, 28))
+    np.testing.assert_allclose(both[away].mean(), alone[away].mean(), rtol=0.04)
+    assert np.median(np.abs(both / np.maximum(alone, 0.01) - 1)[away]) < 0.06
+
+
+def test_lights_glass_and_removals_meet():
+    """Dimmed once, whatever stands in the photo; not over glass; not where the light was taken away."""
+    from materialist.edits.glass.glass import glass
+    from materialist.edits.remove.background import without
+
+    _, fit = rooms()
+    window, core = spot(slice(2, 14), slice(6, 34)), (slice(5, 10), slice(12, 28))
+    removed = without(fit, spot(), shadow=0)
+    plain = composite(fit, relight(fit, dim=0.1), spp=16)[core]
+    np.testing.assert_allclose(composite(fit, relight(removed, dim=0.1, fitted=fit), spp=16)[core], plain, rtol=0.02)
+    bare = without(fit, window, shadow=0)
+    with pytest.raises(InputError, match="taken away"):
+        relight(bare, dim=0.0, fitted=fit)
+    with pytest.raises(InputError, match="dim afterwards"):
+        without(relight(fit, dim=0.3), window, fitted=fit)
+    pane = spot(slice(5, 20), slice(10, 20))
+    before = glass(fit, pane, roughness=0.5, tint=(0.2, 0.9, 0.2), thickness="symmetry")
+    out = composite(fit, relight(before, dim=0.5, fitted=fit), spp=16)[7:9, 13:17]
+    assert out[..., 1].mean() > 2 * out[..., 0].mean(), "the glass stays green"
+
+
+def test_dimming_by_one_is_none_and_dimming_brightens_nothing():
+    _, fit = rooms()
+    original = fit.photo.original.copy()
+    original[4:11:2, 10:30:2] = 0.75  # twigs
+    photo = replace(fit.photo, original=original)
+    picture = np.full_like(original, 0.3)
+    same = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 1.0})
+    np.testing.assert_array_equal(same, picture)
+    half = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 0.5})
+    np.testing.assert_allclose(half[6, 14], 0.375, rtol=1e-5)
+    unclipped = LIGHT & (original.min(-1) < glows.CLIPPED)
+    assert (half <= np.maximum(original, picture) + 1e-6)[unclipped].all()
+
+
+def test_lights_of_known_radiance_keep_their_own():
+    _, fit = rooms()
+    shown = np.minimum(fit.photo.linear, 0.1)
+    left, right = LIGHT & (np.arange(40) < 18), LIGHT & (np.arange(40) > 22)
+    shown[left], shown[right] = 50.0, 5.0
+    scene = replace(fit, photo=replace(fit.photo, hdr=True, linear=shown, original=shown))
+    found = sorted(body.surface.emission[0] for body in dimmed(scene, 1.0, lights=left | right).bodies)
+    np.testing.assert_allclose(found, [5, 50], rtol=1e-3)
+    with pytest.raises(InputError, match="whole light"):
+        dimmed(fit, 0.5, lights=spot(slice(5, 6), slice(9, 11)))
+    with pytest.raises(InputError, match="give dim"):
+        list(moving_light(fit, 3, lights=left))
+    old = dimmed(fit, 0.5)
+    old = replace(old, provenance={**old.provenance, glows.KEY: {**old.provenance[glows.KEY]}})
+    del old.provenance[glows.KEY]["emission"]  # as an earlier version saved it
+    assert glows.explained(fit, old).bodies[0].surface.emission[0] == pytest.approx(
+        2 * old.bodies[0].surface.emission[0]
+    )

@@ -1,0 +1,186 @@
+"""Where a mesh stands, how large it is, and what the photo looks like around it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_meshes import box_file, floor_scene
+
+from materialist.camera import project
+from materialist.edits.composite.composite import composite
+from materialist.edits.insert.insert import insert, put
+from materialist.edits.insert.meshes import read_model
+from materialist.edits.insert.support import picture_width, support_at
+from materialist.edits.light.lights import Studio
+from materialist.errors import InputError
+from materialist.types import Materials
+
+UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory):
+    return read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_support_is_the_plane_through_a_bent_floor(noise):
+    support = support_at(floor_scene(96, 72, noise=noise), (40.0, 50.0))
+    assert support.normal @ UP > np.cos(np.radians(0.1 + 100 * noise))
+    np.testing.assert_allclose(support.point @ UP, -2, atol=0.001 + noise)
+    place, _ = project(support.point, floor_scene(96, 72).camera)
+    np.testing.assert_allclose(place, [40, 50], atol=0.01)
+
+
+def test_a_box_stands_upright_on_the_floor_at_the_click(box):
+    scene = floor_scene(96, 72)
+    edited = insert(scene, box, (40.0, 50.0))
+    (body,) = edited.bodies
+    above = body.vertices.astype(np.float64) @ UP + 2
+    longest = picture_width(scene, support_at(scene, (40.0, 50.0)).depth) / 6
+    np.testing.assert_allclose([above.min(), above.max()], [0, longest], atol=2e-3 * longest)
+    base = body.vertices[above < 0.1 * longest].astype(np.float64)
+    place, _ = project((base.min(0) + base.max(0)) / 2, scene.camera)
+    np.testing.assert_allclose(place, [40, 50], atol=0.3)
+    assert edited.provenance["edits"][-1]["kind"] == "insert" and scene.bodies == ()
+    assert edited.materials is scene.materials and edited.geometry is scene.geometry
+
+
+def test_scale_size_and_turn(box):
+    scene = floor_scene(96, 72)
+    (one,), support, _ = put(scene, box, (40.0, 50.0))
+    (two,), *_ = put(scene, box, (40.0, 50.0), scale=2)
+    (sized,), *_ = put(scene, box, (40.0, 50.0), size=0.5)
+    height = lambda b: np.ptp(b.vertices @ UP)  # noqa: E731
+    np.testing.assert_allclose(height(two) / height(one), 2, rtol=1e-3)
+    np.testing.assert_allclose(height(sized), 0.5, rtol=1e-3)
+    (one,), support, _ = put(scene, box, (48.0, 50.0))
+    (turned,), *_ = put(scene, box, (48.0, 50.0), turn=90)
+    wide = lambda b: np.ptp(b.vertices[:, 0])  # noqa: E731
+    np.testing.assert_allclose(wide(turned) / wide(one), 0.5, rtol=0.01)  # the box is 1 wide and 0.5 deep
+    front = one.normals[np.argmax(one.normals @ -support.point)]
+    assert front @ UP < 0.01 and front @ -support.point > 0
+
+
+def test_on_a_wall_it_stands_out_of_the_wall(box):
+    from edit_scenes import flat_scene
+
+    edited = insert(flat_scene(), box, (40.0, 20.0))
+    (body,) = edited.bodies
+    np.testing.assert_allclose(body.vertices[:, 2].min(), -3, atol=0.01)
+    assert np.ptp(body.vertices[:, 2]) > np.ptp(body.vertices[:, 0])  # its longest side points to the camera
+
+
+def test_several_stack_and_each_is_noted(box):
+    scene = floor_scene(96, 72)
+    edited = insert(insert(scene, box, (30.0, 50.0)), box, (60.0, 55.0), material="glass")
+    assert len(edited.bodies) == 2 and len(edited.provenance["edits"]) == 2
+    assert edited.bodies[1].surface.transmission == 1
+
+
+def test_bad_places_and_numbers(box):
+    scene = floor_scene(96, 72)
+    scene = replace(scene, depth=np.where(np.arange(72)[:, None] < 10, 0, scene.depth))
+    for place, options, sentence in [
+        ((40, 3), {}, "sky"), ((400, 30), {}, "outside the photo"), ((40, -1), {}, "outside the photo"),
+        ((40, 50), {"scale": 0.0}, "scale"), ((40, 50), {"scale": 100.0}, "behind the camera"),
+        ((40, 50), {"turn": np.nan}, "turn"), ((40, 50), {"size": -1.0}, "size"), ("here", {}, "two numbers"),
+    ]:  # fmt: skip
+        with pytest.raises(InputError, match=sentence):
+            insert(scene, box, place, **options)
+
+
+def test_running_into_the_photo_is_told(box):
+    from edit_scenes import flat_scene
+
+    scene = floor_scene(96, 72)
+    assert not insert(scene, box, (40.0, 50.0)).report.warnings
+    beside = insert(flat_scene(), box, (26.0, 18.0), scale=4)  # grows out of the wall, past the front of the block
+    assert any("runs into" in note for note in beside.report.warnings)
+    assert not insert(flat_scene(), box, (40.0, 20.0)).report.warnings
+
+
+@pytest.mark.parametrize("turn", [0, 30, 45])
+def test_the_longest_side_is_the_model_s_whichever_way_it_is_turned(box, turn):
+    edited = insert(floor_scene(96, 72), box, (40.0, 50.0), size=0.5, turn=turn)
+    assert edited.provenance["edits"][-1]["size"] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("native", [1, 4])
+def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
+    scene = floor_scene(native=native)
+    edited = insert(scene, box, (24.0, 26.0), material="0.1,0.1,0.6")
+    out = composite(scene, edited, spp=8)
+    assert out.shape == (36 * native, 48 * native, 3)
+    body = Studio(scene).portrait(edited, spp=8, seed=0, clean=False)
+    alone = body.share > 0.999
+    assert alone.any()
+    blue = out[alone]
+    assert (blue[:, 2] > 1.5 * blue[:, 0]).mean() > 0.95
+    np.testing.assert_array_equal(out[: 5 * native], scene.photo.original[: 5 * native])  # far up the floor
+    before = np.s_[26 * native : 28 * native, 20 * native : 28 * native]  # the floor around its base
+    shadow = out[before].mean(-1)[body.share[before] == 0]
+    assert shadow.size and shadow.mean() < 0.495
+
+
+def test_the_matte_is_the_bodys_outline_at_native_size(box):
+    scene = floor_scene(native=4)
+    edited = insert(scene, box, (24.0, 26.0))
+    share = Studio(scene).portrait(edited, spp=2, seed=0, clean=False).share
+    place, _ = project(edited.bodies[0].vertices.astype(np.float64), scene.camera)
+    from scipy.spatial import ConvexHull
+
+    area = ConvexHull(place * 4).volume  # native pixels; a box is convex
+    np.testing.assert_allclose(share.sum(), area, rtol=0.02)
+    soft = (share > 0) & (share < 1)
+    assert soft.sum() < 2.2 * ConvexHull(place * 4).area  # one native pixel wide
+
+
+def test_nothing_of_the_background_is_in_a_body(box):
+    scene = floor_scene(native=2)
+    bright = replace(scene.materials, albedo=np.ones_like(scene.materials.albedo))
+    scene = replace(scene, materials=Materials(bright.albedo, bright.roughness, bright.metallic))
+    edited = insert(scene, box, (24.0, 26.0), material="0,0,0")
+    body = Studio(scene).portrait(edited, spp=16, seed=0, clean=False)
+    rim = (body.share > 0.05) & (body.share < 0.95)
+    assert rim.any() and np.median(body.picture[rim]) < 0.2  # black but for its gloss; the floor is 1
+
+
+def test_a_native_picture_of_another_shape_is_no_obstacle(box):
+    scene = floor_scene()
+    wide = replace(scene, photo=replace(scene.photo, original=np.full((71, 96, 3), 0.5, np.float32)))
+    edited = insert(wide, box, (24.0, 26.0))
+    body = Studio(wide).portrait(edited, spp=4, seed=0, clean=False)
+    assert body.share.shape == (71, 96) and body.picture[body.share > 0.99].min() > 0
+
+
+def test_a_body_looks_as_in_the_plain_rendering(box):
+    """Its radiance at native size is that of the scene's own light and surfaces."""
+    scene = floor_scene()
+    red = np.broadcast_to(np.float32([2.0, 0.4, 0.1]), (8, 16, 3)).copy()
+    scene = replace(scene, envmap=red)
+    edited = insert(scene, box, (24.0, 26.0), material="0.5,0.5,0.5")
+    studio = Studio(scene)
+    body = studio.portrait(edited, spp=64, seed=0, clean=False)  # before anything else is rendered
+    plain = studio.twins(edited)[1](256, 3)
+    inside = body.share > 0.999
+    np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)
+
+
+def test_what_stands_where_something_was_removed_or_glows_has_its_own_outline(box):
+    """Only what the photo shows has the photo's outline: its lights, and its glass."""
+    from edit_scenes import block_mask, rendered_scene
+
+    from materialist.edits.glass.glass import glass
+    from materialist.edits.insert.portrait import free_bodies
+    from materialist.edits.remove.background import without
+
+    scene = rendered_scene()
+    mask = block_mask(36, 48)
+    assert free_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
+    gone = without(scene, mask)
+    there = insert(gone, box, (18.0, 20.0), scale=2)
+    assert free_bodies(scene, there) == ["body0"]
+    (body,) = there.bodies
+    lamp = replace(body, surface=replace(body.surface, emission=(5.0, 5.0, 5.0)))
+    assert free_bodies(scene, replace(there, bodies=(lamp,))) == ["body0"]

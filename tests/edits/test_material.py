@@ -1,0 +1,150 @@
+"""Material edits against closed forms, and what they refuse."""
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edits.material.material import edit, parse_colour, shifted_hsv
+from materialist.errors import InputError
+
+SCENE = flat_scene()
+MASK = block_mask(36, 48)
+
+
+def test_hue_by_a_third_of_a_turn_exchanges_the_channels():
+    albedo = np.random.default_rng(0).random((5, 7, 3), np.float32)
+    turned = shifted_hsv(albedo, 120, 0, 0)
+    np.testing.assert_allclose(turned, albedo[..., [2, 0, 1]], atol=2e-6)
+    np.testing.assert_allclose(shifted_hsv(turned, 240, 0, 0), albedo, atol=2e-6)
+
+
+def test_ends_of_saturation_and_value():
+    albedo = np.random.default_rng(1).random((5, 7, 3), np.float32)
+    grey = shifted_hsv(albedo, 0, -1, 0)
+    np.testing.assert_allclose(grey, np.repeat(albedo.max(-1, keepdims=True), 3, -1), atol=2e-6)
+    assert (shifted_hsv(albedo, 0, 0, -1) == 0).all()
+    np.testing.assert_allclose(shifted_hsv(albedo, 0, 0, 1).max(-1), 1, atol=2e-6)
+
+
+@pytest.mark.parametrize("value", [-0.6, 0.6])
+def test_value_keeps_the_order_of_a_texture(value):
+    ramp = np.repeat(np.linspace(0.02, 0.98, 40, dtype=np.float32)[:, None, None], 3, -1)
+    moved = linear_to_srgb(shifted_hsv(ramp, 0, 0, value))[:, 0, 0]
+    old = linear_to_srgb(ramp)[:, 0, 0]
+    expected = old + value * (1 - old) if value > 0 else old * (1 + value)
+    np.testing.assert_allclose(moved, expected, atol=1e-5)
+    assert (np.diff(moved) > 0).all()
+
+
+def test_only_the_mask_changes_and_the_rest_is_shared():
+    edited = edit(SCENE, MASK, hue=90, roughness=0.1, metallic="+0.25")
+    new, old = edited.materials, SCENE.materials
+    for name in ("albedo", "roughness", "metallic"):
+        np.testing.assert_array_equal(getattr(new, name)[~MASK], getattr(old, name)[~MASK])
+    assert (new.roughness[MASK] == np.float32(0.1)).all() and (new.metallic[MASK] == 0.25).all()
+    assert edited.geometry is SCENE.geometry and edited.photo is SCENE.photo
+    assert (SCENE.materials.roughness == 0.5).all()
+    assert edited.provenance["edits"] == [
+        {"kind": "material", "hue": 90, "roughness": 0.1, "metallic": "+0.25", "pixels": int(MASK.sum())}
+    ]
+
+
+def test_shift_and_set_differ_by_the_sign():
+    for wanted, expected in (("+0.3", 0.8), ("-0.3", 0.2), ("0.3", 0.3), ("+0.9", 1.0), ("-0.9", 0.0)):
+        got = edit(SCENE, MASK, roughness=wanted).materials.roughness[MASK]
+        np.testing.assert_allclose(got, expected, atol=1e-6)
+
+
+def test_soft_masks_mix():
+    soft = MASK * np.float32(0.25)
+    np.testing.assert_allclose(edit(SCENE, soft, roughness=0.1).materials.roughness[MASK], 0.4, atol=1e-6)
+
+
+def test_set_albedo_in_linear_and_in_srgb():
+    np.testing.assert_allclose(
+        edit(SCENE, MASK, albedo=(0.2, 0.4, 0.6)).materials.albedo[MASK], [[0.2, 0.4, 0.6]] * MASK.sum()
+    )
+    np.testing.assert_allclose(parse_colour("#ff8000"), srgb_to_linear(np.array([1, 128 / 255, 0])), atol=1e-6)
+    np.testing.assert_allclose(parse_colour("0.1,0.2,0.3"), [0.1, 0.2, 0.3], atol=1e-7)
+
+
+def test_an_albedo_may_be_an_array():
+    colour = np.array([0.1, 0.2, 0.3])
+    changed = edit(SCENE, MASK, albedo=colour)
+    assert np.array_equal(changed.materials.albedo, edit(SCENE, MASK, albedo=(0.1, 0.2, 0.3)).materials.albedo)
+    assert changed.provenance["edits"][-1]["albedo"] == (0.1, 0.2, 0.3)
+
+
+@pytest.mark.parametrize(("lean", "wanted"), [(1.0, [0, 0, -1]), (-1.0, [0, 0, 1]), (0.0, [0, 1, 0])])
+def test_textures_are_upright_as_the_camera_sees_them(lean, wanted):
+    """On a floor up is away from the camera, on a ceiling towards it; right is right on all."""
+    from materialist.edits.material.texture import _tangents
+
+    right, up = _tangents(np.array([0.0, lean, 1.0 - abs(lean)]))
+    np.testing.assert_allclose(up, wanted, atol=1e-9)
+    np.testing.assert_allclose(right, [1, 0, 0], atol=1e-9)
+
+
+def test_texture_lies_upright_on_a_wall():
+    scene = flat_scene()
+    wall = np.zeros((36, 48), bool)
+    wall[4:10, 8:40] = True  # above the block: one flat wall of 6 x 32 pixels
+    picture = np.zeros((6, 32, 3), np.float32)
+    picture[..., 0] = np.linspace(0.1, 0.9, 32)
+    picture[..., 1] = np.linspace(0.2, 0.8, 6)[:, None]
+    albedo = edit(scene, wall, texture=picture).materials.albedo[4:10, 8:40]
+    np.testing.assert_allclose(albedo[..., 0][:, 2:-2], picture[..., 0][:, 2:-2], atol=0.03)
+    np.testing.assert_allclose(albedo[..., 1][1:-1], picture[..., 1][1:-1], atol=0.11)
+    assert (np.diff(albedo[..., 1][1:-1], axis=0) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"roughness": 3}, "roughness is 3"),
+        ({"roughness": -0.1}, "roughness is -0.1"),
+        ({"roughness": "+2"}, "roughness shift is 2"),
+        ({"roughness": "shiny"}, "shiny"),
+        ({"roughness": float("nan")}, "nan"),
+        ({"metallic": 1.5}, "metallic is 1.5"),
+        ({"saturation": 2}, "saturation is 2"),
+        ({"value": -1.1}, "value is -1.1"),
+        ({"hue": float("inf")}, "hue"),
+        ({"albedo": (0.1, 0.2)}, "R,G,B"),
+        ({"albedo": (0.1, 0.2, 3)}, "R,G,B"),
+        ({"albedo": "#12345"}, "#ff8800"),
+        ({"albedo": "red"}, "red"),
+        ({"texture": np.zeros((4, 4))}, "texture is (4, 4)"),
+        ({"texture": np.full((4, 4, 3), 2.0)}, "0 to 1"),
+        ({"texture": np.zeros((4, 4, 3)), "albedo": (0, 0, 0)}, "not both"),
+        ({"texture": np.zeros((4, 4, 3)), "texture_scale": 0}, "scale is 0"),
+    ],
+)
+def test_impossible_values_are_named(options, words):
+    with pytest.raises(InputError) as error:
+        edit(SCENE, MASK, **options)
+    assert words in str(error.value) and str(error.value).endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("mask", "words"),
+    [
+        (np.zeros((36, 48), bool), "empty"),
+        (np.ones((36, 47), bool), "(36, 47)"),
+        (np.full((36, 48), 2.0), "0 to 1"),
+        (np.full((36, 48), np.nan), "0 to 1"),
+    ],
+)
+def test_masks_that_cannot_be_used(mask, words):
+    with pytest.raises(InputError) as error:
+        edit(SCENE, mask, roughness=0.2)
+    assert words in str(error.value)
+
+
+def test_a_mask_of_sky_alone():
+    scene = flat_scene(sky=5)
+    mask = np.zeros((36, 48), bool)
+    mask[:5] = True
+    with pytest.raises(InputError, match="sky"):
+        edit(scene, mask, roughness=0.2)

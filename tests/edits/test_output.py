@@ -1,0 +1,75 @@
+"""Files of composites: the photo's own bits come back."""
+
+import io
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from edit_scenes import flat_scene
+from PIL import Image
+
+from materialist.color import srgb_to_linear
+from materialist.edits.composite.output import is_deep, write_composite
+from materialist.errors import OutputError
+from materialist.io.decode import decode
+from materialist.io.exr import read_exr
+
+SCENE = flat_scene()
+
+
+def photo_from(path):
+    linear = decode(path).linear
+    return replace(SCENE.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes())
+
+
+def test_every_8_bit_value_comes_back(tmp_path):
+    pixels = np.arange(256, dtype=np.uint8).reshape(16, 16)[..., None].repeat(3, -1)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    photo = photo_from(tmp_path / "a.png")
+    write_composite(tmp_path / "b.png", photo.original, photo)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "b.png")), pixels)
+    assert not is_deep(photo)
+
+
+def test_every_16_bit_value_comes_back(tmp_path):
+    pixels = np.arange(65536, dtype=np.uint16).reshape(256, 256)[..., None].repeat(3, -1)
+    cv2.imwrite(str(tmp_path / "a.png"), pixels)
+    photo = photo_from(tmp_path / "a.png")
+    write_composite(tmp_path / "b.png", photo.original, photo)
+    back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(back, pixels)
+    assert is_deep(photo) and sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+def test_exr_keeps_hdr(tmp_path):
+    bright = SCENE.photo.original * 50
+    write_composite(tmp_path / "b.exr", bright, SCENE.photo)
+    np.testing.assert_array_equal(read_exr(tmp_path / "b.exr"), bright)
+
+
+def test_existing_files_need_force(tmp_path):
+    write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo)
+    with pytest.raises(OutputError, match="force"):
+        write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo)
+    write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo, force=True)
+
+
+def test_photos_from_memory_are_not_deep():
+    buffer = io.BytesIO()
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(buffer, "JPEG")
+    assert not is_deep(SCENE.photo) and not is_deep(replace(SCENE.photo, source=buffer.getvalue()))
+    assert srgb_to_linear(np.array([1.0]))[0] == 1
+
+
+def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
+    from materialist.edits.composite.composite import developed
+    from materialist.io.package import load_scene, save_scene
+
+    data = cv2.imencode(".png", np.full((36, 48, 3), 30000, np.uint16))[1].tobytes()
+    scene = replace(SCENE, photo=replace(SCENE.photo, source=data, path="a.png"))
+    save_scene(developed(scene, scene, scene.photo.original), tmp_path / "b.scene")
+    again = load_scene(tmp_path / "b.scene")
+    assert again.photo.source is None and is_deep(again.photo)
+    save_scene(developed(SCENE, SCENE, SCENE.photo.original), tmp_path / "c.scene")
+    assert not is_deep(load_scene(tmp_path / "c.scene").photo)

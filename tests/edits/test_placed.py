@@ -1,0 +1,70 @@
+"""What was put into a scene: it is rendered, denoised by its own maps, and not edited as if it were the photo."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_meshes import box_file, floor_scene
+
+from materialist.edits.composite.composite import developed
+from materialist.edits.insert.insert import insert
+from materialist.edits.insert.meshes import read_model
+from materialist.edits.light.lights import Studio, rendered
+from materialist.edits.material.material import edit
+from materialist.edits.select.region import placed
+from materialist.edits.select.select import select
+from materialist.errors import InputError
+from materialist.pipeline import render_scene
+from materialist.types import Lamp
+
+PLACE = (40.0, 50.0)
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory):
+    """A floor, and the same with a box on it."""
+    model = read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
+    scene = floor_scene(96, 72)
+    return scene, insert(scene, model, PLACE, scale=2, material="#ffffff")
+
+
+def test_a_scene_is_rendered_with_what_was_put_into_it(scenes):
+    scene, with_box = scenes
+    share = placed(with_box)
+    assert share.max() == 1 and placed(scene).max() == 0
+    before, after = (render_scene(s, spp=16) for s in scenes)
+    changed = np.abs(after - before).mean(-1)
+    assert changed[share == 1].mean() > 5 * changed[:20].mean()
+    lit = replace(scene, lamps=(Lamp((0.0, 0.5, -3.0), (40.0, 40.0, 40.0), 0.05),))
+    assert render_scene(lit, spp=16).mean() > 1.2 * before.mean()
+
+
+def test_its_own_maps_guide_the_denoiser(scenes):
+    _, with_box = scenes
+    pattern = (np.indices(with_box.depth.shape).sum(0) % 2)[..., None] * np.ones(3, np.float32)
+    striped = replace(with_box, materials=replace(with_box.materials, albedo=pattern.astype(np.float32)))
+    albedo, _ = Studio(striped).guides(striped)
+    inside = placed(striped) == 1
+    assert np.ptp(albedo[inside]) < 0.01 < np.ptp(pattern[inside])
+    np.testing.assert_array_equal(albedo[placed(striped) == 0], pattern[placed(striped) == 0])
+
+
+def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
+    _, with_box = scenes
+    share = placed(with_box)
+    row, column = np.argwhere(share == 1)[len(np.argwhere(share == 1)) // 2]
+    with pytest.raises(InputError, match=r"is on a thing that was put into the scene"):
+        select(with_box, click=(column, row))
+    with pytest.raises(InputError, match=r"What is marked is a thing that was put"):
+        edit(with_box, share > 0.5, hue=90)
+    wide = np.ones(share.shape, bool)  # the floor around it, of which it hides a little
+    assert edit(with_box, wide, hue=90) is not with_box
+
+
+def test_a_developed_scene_keeps_a_rendering_of_itself(scenes):
+    scene, _ = scenes
+    dark = replace(scene, envmap=0.25 * scene.envmap)
+    picture = rendered(dark, spp=16, seed=3)
+    found = developed(scene, dark, picture)
+    assert found.rerender.mean() == pytest.approx(0.25 * rendered(scene, spp=16).mean(), rel=0.02)
+    assert found.report.metrics["rerender_psnr_path"] > 25

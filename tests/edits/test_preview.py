@@ -1,0 +1,96 @@
+"""Previews from cached transport against the path tracer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edits.light.lights import Studio
+from materialist.edits.light.relight import relight
+from materialist.edits.material.material import edit
+from materialist.edits.preview import Preview
+from materialist.errors import InputError
+from materialist.metrics import psnr
+
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture(scope="module")
+def preview():
+    return Preview(rendered_scene())
+
+
+def traced(edited):
+    return Studio(edited).twins(edited)[0](192, 7)
+
+
+def test_material_change_agrees_with_the_path_tracer(preview):
+    edited = edit(preview.scene, MASK, roughness=0.2, albedo=(0.1, 0.4, 0.2), metallic=0.5)
+    assert psnr(preview.render(edited), traced(edited)) > 30
+
+
+def test_light_change_agrees_with_the_path_tracer(preview):
+    light = np.full((8, 16, 3), 0.2, np.float32)
+    light[:, 3:8] = [1.5, 1.0, 0.5]
+    edited = relight(preview.scene, envmap=light)
+    assert psnr(preview.render(edited), traced(edited)) > 30
+    # And back again: the first light's tables are not mixed up with the second's.
+    assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
+
+
+def test_a_light_is_filtered_for_its_roughness_and_for_another_only_when_that_is_asked_for(preview):
+    from materialist.transport.filter import filter_tables
+    from materialist.transport.shading import shade
+
+    sky = np.random.default_rng(2).uniform(0.2, 2, (8, 16, 3)).astype(np.float32)
+    turned = relight(preview.scene, envmap=sky)
+    first = preview.render(turned)
+    light = preview._other[1]
+    assert light._tables is None
+    engine = preview._engine
+    tables = filter_tables(engine.cache, light._raw, engine.guide)
+    slow = preview._image(shade(tables, *preview._maps(turned.materials)), preview._sky(turned.envmap))
+    # With one roughness everywhere it does not matter what comes first, filter or shading.
+    np.testing.assert_allclose(first, slow, atol=2e-4, rtol=1e-3)
+    red = relight(edit(preview.scene, MASK, albedo=(0.5, 0.1, 0.1)), envmap=sky)
+    slow = preview._image(shade(tables, *preview._maps(red.materials)), preview._sky(red.envmap))
+    np.testing.assert_allclose(preview.render(red), slow, atol=2e-4, rtol=1e-3)
+    assert light._tables is None
+    smooth = relight(edit(preview.scene, MASK, roughness=0.1), envmap=sky)
+    slow = preview._image(shade(tables, *preview._maps(smooth.materials)), preview._sky(smooth.envmap))
+    np.testing.assert_array_equal(preview.render(smooth), slow)
+    assert light._tables is not None and preview._other[1] is light
+
+
+def test_nothing_changed_is_the_photo(preview):
+    same = edit(preview.scene, MASK, hue=0.0)
+    np.testing.assert_array_equal(preview.picture(same), preview.scene.photo.linear)
+    changed = preview.picture(edit(preview.scene, MASK, hue=120))
+    far = np.s_[:8]
+    np.testing.assert_array_equal(changed[far], preview.scene.photo.linear[far])
+    assert (changed[MASK] != preview.scene.photo.linear[MASK]).any(-1).all()
+
+
+def test_another_geometry_is_refused(preview):
+    with pytest.raises(InputError, match="another geometry"):
+        preview.render(flat_scene())
+
+
+@pytest.mark.parametrize("ambient, share", [(0.3, 0.7), (1.0, 0.1), (1.5, 0.2), (0.0, 1.0)])
+def test_dimmed_lights_of_the_photo_take_their_share_of_the_light_along(ambient, share):
+    from materialist.edits.light.glows import KEY
+
+    preview = Preview.__new__(Preview)
+    preview.scene = rendered_scene()
+    light = {
+        dim: preview._seen(
+            replace(
+                preview.scene, envmap=preview.scene.envmap * np.float32(ambient),
+                provenance={KEY: {"ambient": ambient, "radiance": 4.0, "dim": dim, "share": share}},
+            )
+        ).envmap.mean() / preview.scene.envmap.mean() for dim in (0.0, 1.0, 2.0)
+    }  # fmt: skip
+    assert light[1.0] == pytest.approx(1, rel=1e-5)  # as the photo is
+    assert light[0.0] == pytest.approx(ambient / (ambient + share), abs=1e-5)
+    assert light[2.0] == pytest.approx(1 + share / (ambient + share), rel=1e-5)

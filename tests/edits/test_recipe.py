@@ -1,0 +1,168 @@
+"""Lists of edits: what they mean, and what is wrong with them."""
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene
+from PIL import Image
+
+from materialist.edits.light.relight import lamp, relight
+from materialist.edits.material.material import edit
+from materialist.edits.recipe import apply, glass_arguments, read_recipe
+from materialist.errors import InputError
+from materialist.io.exr import write_exr
+
+SCENE = flat_scene()
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    Image.fromarray((MASK * 255).astype(np.uint8)).save(tmp_path / "block.png")
+    write_exr(tmp_path / "sky.exr", np.full((16, 32, 3), 2.0, np.float32))
+    return tmp_path
+
+
+def replay(folder, text):
+    (folder / "edits.yaml").write_text(text)
+    return apply(SCENE, read_recipe(folder / "edits.yaml"))
+
+
+def test_steps_are_the_functions_in_order(folder):
+    got = replay(
+        folder,
+        "edits:\n- edit: {mask: block.png, hue: 120, roughness: +0.25}\n- edit: {mask: block.png, metallic: 0.5}\n"
+        "- relight: {envmap: sky.exr, gain: 0.5, rotate: 45, ambient: 0.5,\n"
+        "            lamps: [[5, 6, 2, 3000, 1], [9, 9, 2, 4000, 2]]}\n",
+    )
+    expected = edit(edit(SCENE, MASK, hue=120, roughness="+0.25"), MASK, metallic=0.5)
+    lamps = [lamp(SCENE, 5, 6, 2, 3000, 1), lamp(SCENE, 9, 9, 2, 4000, 2)]
+    expected = relight(expected, envmap=np.full((16, 32, 3), 2.0), gain=0.5, rotate=45, ambient=0.5, lamps=lamps)
+    for name in ("albedo", "roughness", "metallic"):
+        np.testing.assert_array_equal(getattr(got.materials, name), getattr(expected.materials, name))
+    np.testing.assert_array_equal(got.envmap, expected.envmap)
+    assert got.lamps == expected.lamps and len(got.provenance["edits"]) == 3
+
+
+def test_an_insert_may_have_several_places(folder):
+    from made_meshes import box_file
+
+    box_file(folder / "box.ply", (0.1, 0.1, 0.1))
+    for places in ("[[8, 30], [40, 30]]", "['8,30', '40,30']"):
+        bodies = replay(folder, f"- insert: {{mesh: box.ply, at: {places}}}").bodies
+        assert len(bodies) == 2 and bodies[0].vertices[:, 0].max() < bodies[1].vertices[:, 0].min()
+    assert len(replay(folder, "- insert: {mesh: box.ply, at: '8,30'}").bodies) == 1
+
+
+def test_a_plus_sign_is_a_shift_in_yaml_too(folder):
+    shifted = replay(folder, "- edit: {mask: block.png, roughness: +0.25}")
+    level = replay(folder, "- edit: {mask: block.png, roughness: 0.25}")
+    assert (shifted.materials.roughness[MASK] == 0.75).all() and (level.materials.roughness[MASK] == 0.25).all()
+
+
+def test_click_box_and_sun(folder):
+    got = replay(folder, "- edit: {click: [17, 17], albedo: [0.1, 0.2, 0.3]}\n- relight: {sun: '30,40', sun_power: 2}")
+    assert (got.materials.albedo[17, 17] == np.float32([0.1, 0.2, 0.3])).all()
+    np.testing.assert_array_equal(got.envmap, relight(SCENE, sun=(30, 40), sun_power=2).envmap)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no list of edits"),
+        ("edits: []", "no list of edits"),
+        ("- [", "not valid YAML"),
+        ("- paint: {}", "is 'paint'; it must be one of edit,"),
+        ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, or open, not 'maybe'"),
+        ("- glass: {mask: block.png, tint: '#88ccf'}", "The tint '#88ccf' must look like"),
+        ("- glass: {mask: block.png, thickness: gone.exr}", "There is no file"),
+        ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
+        ("- edit: {mask: block.png, shininess: 1}", "shininess"),
+        ("- edit: {mask: block.png, hue: blue}", "hue"),
+        ("- edit: {mask: block.png, roughness: 3}", "Step 1 (edit): The roughness is 3"),
+        ("- edit: {mask: none.png, roughness: 0.3}", "none.png"),
+        ("- edit: {click: [1], roughness: 0.3}", "click"),
+        ("- edit: {roughness: 0.3}", "exactly one"),
+        ("- relight: {envmap: none.exr}", "none.exr"),
+        ("- relight: {sun: [1, 2, 3]}", "sun"),
+        ("- relight: {lamps: [[1, 2, 3]]}", "lamp"),
+        ("- relight: now", "no options"),
+        ("- edit: {mask: block.png, hue: 3, hue: 90}", "'hue' is given twice"),
+        ("edits: [{edit: {mask: block.png, hue: 3}}]\nlights: 3", "says 'lights' beside its edits"),
+        ("- edit: {mask: block.png, hue: 3, skip: ture}", "The skip must be true or false, not 'ture'"),
+        ("- remove: {mask: block.png, seed: -2}", "The seed is -2"),
+        ("- relight: {}", "changes nothing"),
+        ("- relight: {gain: 3, ambient: 0.5}", "gain says nothing without envmap"),
+        ("- relight: {rotate: 3, sun_power: 2}", "sun_power says nothing without sun"),
+    ],
+)
+def test_what_is_wrong_is_named(folder, text, words):
+    with pytest.raises(InputError) as error:
+        replay(folder, text)
+    assert words in str(error.value)
+
+
+def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
+    """That of the step, else that of all steps."""
+    import materialist.edits.recipe as recipe
+
+    asked = []
+    monkeypatch.setattr(recipe, "without", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "glass", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "settle", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    (folder / "edits.yaml").write_text(
+        "- remove: {mask: block.png}\n- remove: {mask: block.png, seed: 4}\n- glass: {mask: block.png}\n"
+        "- drop: {mesh: a.ply, at: [1, 2]}\n- drop: {mesh: a.ply, at: [1, 2], seed: 0}\n"
+    )
+    apply(SCENE, read_recipe(folder / "edits.yaml"), seed=9)
+    assert asked == [9, 4, 9, 9, 0]
+
+
+def test_tints_are_spelled_as_on_the_command_line(folder):
+    one, other = (
+        glass_arguments(SCENE, read_step(folder, f"- glass: {{mask: block.png, hollow: yes, tint: {tint}}}"))[1]
+        for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
+    )
+    assert one["hollow"] is True and other == {"hollow": True, "seed": 0, "tint": pytest.approx(one["tint"], abs=1e-6)}
+    assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1]["hollow"] == "open"
+
+
+def read_step(folder, text):
+    (folder / "one.yaml").write_text(text)
+    return read_recipe(folder / "one.yaml")[0]
+
+
+def test_missing_list(folder):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_recipe(folder / "none.yaml")
+
+
+def test_a_given_background_is_seen_in_the_light_of_the_photo(tmp_path):
+    """Dimmed first or removed first, the wall behind is the same wall."""
+    from edit_scenes import rendered_scene
+
+    scene = rendered_scene(block=2.0)
+    background = np.full((36, 48, 3), 90, np.uint8)
+    Image.fromarray(background).save(tmp_path / "behind.png")
+    Image.fromarray((block_mask(36, 48) * 255).astype(np.uint8)).save(tmp_path / "block.png")
+    light, remove = "- relight: {ambient: 0.4}\n", "- remove: {mask: block.png, background: behind.png}\n"
+    found = []
+    for k, text in enumerate((light + remove, remove + light, remove)):
+        (tmp_path / f"{k}.yaml").write_text(text)
+        found.append(apply(scene, read_recipe(tmp_path / f"{k}.yaml")).materials.albedo[block_mask(36, 48)].mean())
+    assert found[0] == pytest.approx(found[1], rel=0.02) and found[1] == pytest.approx(found[2], rel=0.02)
+
+
+@pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",
+                                    "glass: {mask: block.png, model: two-interface}"])  # fmt: skip
+def test_what_was_taken_away_is_in_no_later_region(folder, second):
+    with pytest.raises(InputError, match=r"Step 2 .*took away what is there"):
+        replay(folder, f"- remove: {{mask: block.png}}\n- {second}\n")
+    wide = np.zeros(MASK.shape, bool)
+    rows = np.nonzero(MASK)[0]
+    wide[rows.min() :, :] = True
+    Image.fromarray((wide * 255).astype(np.uint8)).save(folder / "wide.png")
+    removed = replay(folder, "- remove: {mask: block.png}\n")
+    got = replay(folder, "- remove: {mask: block.png}\n- edit: {mask: wide.png, albedo: [0, 0, 1]}\n")
+    gone = removed.depth != SCENE.depth
+    assert gone.any() and np.array_equal(got.materials.albedo[gone], removed.materials.albedo[gone])
+    assert np.allclose(got.materials.albedo[wide & ~gone], [0, 0, 1])

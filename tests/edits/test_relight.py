@@ -1,0 +1,211 @@
+"""Other light, against closed forms; a lamp against the inverse square law, path traced."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import flat_scene
+
+from materialist.edits.light.frames import moving_light, write_frames
+from materialist.edits.light.lights import Studio, kelvin_colour
+from materialist.edits.light.relight import lamp, read_envmap, relight, rotated, with_sun
+from materialist.errors import InputError, OutputError, SetupError
+from materialist.io.exr import write_exr
+from materialist.types import Materials
+
+SCENE = flat_scene()
+
+
+def spot(h=16, column=16):
+    envmap = np.full((h, 2 * h, 3), 0.1, np.float32)
+    envmap[5, column] = 5
+    return envmap
+
+
+def test_a_positive_turn_moves_what_is_ahead_to_the_right():
+    turned = rotated(spot(), 90)
+    assert turned[5, 24].max() == 5  # a quarter of 32 columns to the right of the centre
+    np.testing.assert_allclose(rotated(turned, -90), spot(), atol=1e-6)
+    np.testing.assert_allclose(rotated(rotated(spot(), 5), -5).sum(), spot().sum(), rtol=1e-5)
+    np.testing.assert_array_equal(relight(SCENE, rotate=360).envmap, SCENE.envmap)
+
+
+def test_sun_stands_where_it_was_asked_for_and_has_its_irradiance():
+    h = 64
+    envmap = np.ones((h, 2 * h, 3), np.float32)
+    calm, sun = with_sun(envmap, 90, 30, power=2)
+    rows, columns = np.nonzero(sun.sum(-1))
+    row, column = rows.mean() + 0.5, columns.mean() + 0.5
+    assert abs(row - (90 - 30) / 180 * h) <= 1 and abs(column - 0.75 * 2 * h) <= 1
+    edges = np.cos(np.pi * np.arange(h + 1) / h)
+    solid = ((edges[:-1] - edges[1:]) * np.pi / h)[:, None, None]
+    irradiance = (sun * solid).sum((0, 1)) @ [0.2126, 0.7152, 0.0722]
+    np.testing.assert_allclose(irradiance, 2 * np.pi, rtol=1e-3)  # twice pi, that of a sky of radiance 1
+    np.testing.assert_array_equal(calm, envmap)
+
+
+def test_sun_replaces_the_brightest_spot():
+    calm, _ = with_sun(spot(), 0, 45)
+    assert calm.max() < 0.2
+
+
+def test_gain_auto_keeps_the_mean_light():
+    other = spot() * 37
+    lit = relight(SCENE, envmap=other, gain="auto")
+    weight = np.sin(np.pi * (np.arange(16) + 0.5) / 16)[:, None, None]
+    weight8 = np.sin(np.pi * (np.arange(8) + 0.5) / 8)[:, None, None]
+    mean = (lit.envmap * weight).sum() / weight.sum() / 32
+    np.testing.assert_allclose(mean, (SCENE.envmap * weight8).sum() / weight8.sum() / 16, rtol=0.01)
+    np.testing.assert_array_equal(relight(SCENE, envmap=other).envmap, other)
+
+
+@pytest.mark.parametrize(("kelvin", "ratio"), [(6504, 1.0), (2856, 2.6)])
+def test_kelvin_is_white_at_daylight_and_orange_below(kelvin, ratio):
+    rgb = kelvin_colour(kelvin)
+    np.testing.assert_allclose(rgb @ [0.2126, 0.7152, 0.0722], 1, rtol=1e-5)
+    assert abs(rgb[0] / rgb[1] - ratio) < 0.35 * ratio and (ratio < 1.1 or rgb[2] < 0.35 * rgb[0])
+    if ratio == 1.0:
+        np.testing.assert_allclose(rgb, 1, atol=0.06)
+
+
+def test_a_lamp_of_power_one_shows_a_white_wall_as_white():
+    scene = flat_scene(24, 32, block=3.0)
+    flat = np.ones((24, 32), np.float32)
+    white = replace(
+        scene,
+        materials=Materials(np.ones((24, 32, 3), np.float32), flat, 0 * flat),
+        envmap=np.full((8, 16, 3), 1e-6, np.float32),
+    )
+    distance = 0.25 * 3.0
+    lit = replace(white, lamps=(lamp(white, 16, 12, 3.0 - distance, 6504, 1.0),))
+    # From the camera the lamp hides what it lights best; its foot on the wall is seen beside it.
+    hidden = replace(lit.lamps[0], position=(0.4, 0.0, -(3.0 - distance)))
+    picture = Studio(lit).twins(replace(lit, lamps=(hidden,)))[1](256, 1)
+    column = round(0.4 / 3 * lit.camera.focal + 16 - 0.5)
+    np.testing.assert_allclose(picture[11:13, column].mean(), 1.0, rtol=0.2)  # R = 1: the lobes add up to 1.02-1.05
+
+
+def test_lamps_are_where_the_pixel_and_depth_say():
+    one = lamp(SCENE, 24, 18, 2.5, 4000, 1)
+    x, y, z = one.position
+    assert z == -2.5 and 0 < x < 0.1 and -0.1 < y < 0
+
+
+def test_edited_light_is_noted_and_warned_about():
+    sunny = replace(SCENE, envmap=spot(16) * 0 + 0.01)
+    sunny.envmap[5, 16] = 1000
+    lit = relight(sunny, rotate=40)
+    assert any("double shadows" in note for note in lit.report.warnings)
+    assert lit.provenance["edits"] == [{"kind": "light", "rotate": 40}]
+    assert relight(SCENE, rotate=40).report.warnings == SCENE.report.warnings
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"envmap": np.ones((8, 8, 3))}, "twice as wide"),
+        ({"envmap": np.ones((8, 16))}, "twice as wide"),
+        ({"envmap": np.full((8, 16, 3), np.nan)}, "NaN"),
+        ({"envmap": -np.ones((8, 16, 3))}, "negative"),
+        ({"envmap": np.zeros((8, 16, 3))}, "black"),
+        ({"envmap": np.ones((8, 16, 3)), "gain": -1}, "gain"),
+        ({"envmap": np.ones((8, 16, 3)), "gain": "lots"}, "lots"),
+        ({"rotate": float("nan")}, "rotation"),
+        ({"sun": (0, 91)}, "elevation is 91"),
+        ({"sun": (500, 10)}, "azimuth is 500"),
+        ({"sun": (0, 10), "sun_power": -1}, "sun power"),
+        ({"ambient": -1}, "ambient"),
+        ({"ambient": 0}, "black"),
+    ],
+)
+def test_impossible_light_is_named(options, words):
+    with pytest.raises(InputError) as error:
+        relight(SCENE, **options)
+    assert words in str(error.value) and str(error.value).endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((100, 10, 2, 3000, 1), "outside"),
+        ((10, 10, -2, 3000, 1), "depth is -2"),
+        ((10, 10, 2, 100, 1), "100 K"),
+        ((10, 10, 2, 3000, 0), "power is 0"),
+    ],
+)
+def test_impossible_lamps_are_named(values, words):
+    with pytest.raises(InputError) as error:
+        lamp(SCENE, *values)
+    assert words in str(error.value)
+
+
+def test_envmap_files(tmp_path):
+    write_exr(tmp_path / "sky.exr", spot(32))
+    np.testing.assert_array_equal(read_envmap(tmp_path / "sky.exr"), spot(32))
+    assert read_envmap(tmp_path / "sky.exr", rows=16).shape == (16, 32, 3)
+    film = np.concatenate([spot(32), np.zeros((32, 64, 1), np.float32)], -1)  # as renderers write a world's picture
+    write_exr(tmp_path / "film.exr", film)
+    np.testing.assert_array_equal(read_envmap(tmp_path / "film.exr"), spot(32))
+    write_exr(tmp_path / "square.exr", np.ones((32, 32, 3), np.float32))
+    with pytest.raises(InputError, match="twice as wide"):
+        read_envmap(tmp_path / "square.exr")
+
+
+def test_a_full_turn_is_closed_and_paths_reach_their_ends():
+    turns = [s.envmap for s in moving_light(SCENE, 4)]
+    for k, envmap in enumerate(turns):
+        np.testing.assert_allclose(envmap, rotated(SCENE.envmap, 90 * k), atol=1e-6)
+    ends = [lamp(SCENE, x, 10, 2, k, 1) for x, k in ((5, 2000), (40, 6000))]
+    path = [s.lamps[0] for s in moving_light(SCENE, 3, lamps=tuple(ends))]
+    np.testing.assert_allclose([path[0].position, path[2].position], [e.position for e in ends])
+    np.testing.assert_allclose(path[1].power, np.mean([e.power for e in ends], 0))
+    more = [s.envmap for s in moving_light(SCENE, 4, turn=450)]
+    np.testing.assert_allclose(more[3], rotated(SCENE.envmap, 450), atol=1e-6)  # by as much as was asked
+    np.testing.assert_allclose(more[1], rotated(SCENE.envmap, 150), atol=1e-6)
+    suns = list(moving_light(SCENE, 2, suns=((0, 20), (90, 40))))
+    np.testing.assert_allclose(suns[1].envmap, relight(SCENE, sun=(90, 40)).envmap, atol=1e-6)
+    with pytest.raises(InputError, match="frames is 1"):
+        next(moving_light(SCENE, 1))
+
+
+def test_frames_become_a_folder_or_a_video(tmp_path):
+    frames = [np.full((21, 31, 3), v, np.float32) for v in (0.1, 0.5, 0.9)]
+    assert write_frames(tmp_path / "turn", iter(frames)) == 3
+    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == ["0000.png", "0001.png", "0002.png"]
+    with pytest.raises(OutputError, match="force"):
+        write_frames(tmp_path / "turn", iter(frames))
+    with pytest.raises(InputError, match=r"\.mp4"):
+        write_frames(tmp_path / "turn.gif", iter(frames))
+    (tmp_path / "link").symlink_to(tmp_path / "turn")
+    with pytest.raises(OutputError, match="is a link"):  # before anything is rendered
+        write_frames(tmp_path / "link", iter(frames), force=True)
+    (tmp_path / "link").unlink()
+    video = pytest.importorskip("imageio_ffmpeg", reason="needs the optional extra 'video'")
+    assert write_frames(tmp_path / "turn.mp4", iter(frames), fps=10) == 3
+    count, seconds = video.count_frames_and_secs(str(tmp_path / "turn.mp4"))
+    assert count == 3 and abs(seconds - 0.3) < 0.02
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["turn", "turn.mp4"]
+
+
+def test_films_have_the_colours_that_players_take_them_for(tmp_path):
+    """Those of BT.709, which the file says as well."""
+    import subprocess
+
+    from materialist.color import srgb_to_linear
+
+    video = pytest.importorskip("imageio_ffmpeg", reason="needs the optional extra 'video'")
+    colour = np.array([39, 203, 63])
+    frame = np.broadcast_to(srgb_to_linear(colour / 255), (64, 64, 3)).astype(np.float32)
+    write_frames(tmp_path / "a.mp4", iter([frame, frame]))
+    options = ["-vf", "scale=in_color_matrix=bt709", "-f", "rawvideo", "-pix_fmt", "rgb24", "-frames:v", "1", "-"]
+    command = [video.get_ffmpeg_exe(), "-i", str(tmp_path / "a.mp4"), *options]
+    done = subprocess.run(command, capture_output=True, check=True)
+    pixel = np.frombuffer(done.stdout, np.uint8).reshape(64, 64, 3)[32, 32]
+    assert np.abs(pixel.astype(int) - colour).max() <= 3 and b"bt709" in done.stderr
+
+
+def test_video_without_its_package_says_how_to_get_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
+    with pytest.raises(SetupError, match="pip install imageio-ffmpeg"):
+        write_frames(tmp_path / "turn.mp4", iter([]))
+    assert not list(tmp_path.iterdir())

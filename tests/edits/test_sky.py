@@ -1,0 +1,116 @@
+"""The photo's sky in glass: light is linear, so what the fitted map lacks is added."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene
+from made_meshes import box_file
+
+from materialist.edits.composite.composite import composite
+from materialist.edits.glass import preview as glass_preview
+from materialist.edits.glass.glass import glass
+from materialist.edits.glass.preview import GlassPreview
+from materialist.edits.glass.sky import LEAST, sky_maps, traced
+from materialist.edits.insert.insert import insert
+from materialist.edits.light.relight import relight
+from materialist.geometry.build import build_geometry
+
+MASK = block_mask(36, 48)
+INNER = np.zeros_like(MASK)
+INNER[15:21, 15:21] = True
+
+
+def before_sky():
+    """A block on a strip of ground, before a sky that the fitted light (1.5) does not have."""
+    scene = flat_scene()
+    depth = np.where(MASK, 2, 0).astype(np.float32)
+    depth[-10:] = 3
+    sky = np.stack(np.broadcast_arrays(np.linspace(0.9, 0.1, 48), 0.3, np.linspace(0.2, 0.9, 48)), -1)
+    photo = np.where((depth == 0)[..., None], sky[None], scene.photo.linear).astype(np.float32)
+    geometry = build_geometry(depth, scene.normal, scene.camera, completion="none")
+    return replace(
+        scene, depth=depth, geometry=geometry, photo=replace(scene.photo, linear=photo, original=photo), rerender=photo
+    )
+
+
+SCENE = before_sky()
+
+
+def test_maps_have_the_photo_and_the_fit_in_the_same_directions():
+    photo, fitted = sky_maps(SCENE)
+    assert photo.shape == fitted.shape and photo.shape[1] == 2 * photo.shape[0]
+    seen = fitted[..., 0] > 2 * LEAST
+    np.testing.assert_allclose(fitted[seen], SCENE.envmap[:4].mean(), rtol=0.35)  # the upper half, and its lower rim
+    assert 0 < seen.mean() < 0.1 and ((photo > 2 * LEAST).any(-1) == seen).all()
+    middle = photo[photo.shape[0] // 2 - 3]
+    assert np.diff(middle[seen[photo.shape[0] // 2 - 3]][:, 2]).min() >= 0  # bluer to the right, as the photo
+    full = replace(SCENE, depth=np.full_like(SCENE.depth, 2))
+    assert sky_maps(full) is None
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_glass_that_bends_nothing_shows_the_sky_behind_it(given):
+    background = SCENE.photo.linear[4:5, :, ::-1].repeat(36, 0) if given else None
+    edited = glass(SCENE, MASK, ior=1.0, thickness="symmetry", background=background)
+    picture = composite(SCENE, edited, spp=16, denoise=False)
+    assert (edited.depth[INNER] == 0).all()
+    np.testing.assert_allclose(picture[INNER], edited.photo.linear[INNER], atol=0.03)
+    assert given == (picture[INNER][:, 0].mean() < picture[INNER][:, 2].mean())
+
+
+def test_under_another_light_the_sky_is_that_light():
+    edited = relight(glass(SCENE, MASK, ior=1.0, thickness="symmetry"), ambient=0.5)
+    picture = composite(SCENE, edited, spp=16, denoise=False)
+    assert picture[INNER].min() > 0.5 and picture[INNER].max() < 0.76  # half of 1 to 1.5, the fitted light
+    assert np.ptp(picture[INNER], axis=-1).max() < 0.01
+
+
+def test_the_preview_and_inserted_glass_show_it_too(tmp_path):
+    picture = GlassPreview(SCENE, MASK, thickness="symmetry").picture(ior=1.0, spp=16)
+    np.testing.assert_allclose(picture[15:21, 15:21].mean(0), SCENE.photo.linear[4, 15:21], atol=0.03)
+    body = insert(SCENE, box_file(tmp_path / "box.ply"), (36, 30), material="glass")
+    alone = replace(body, bodies=tuple(replace(b, surface=replace(b.surface, ior=1.0)) for b in body.bodies))
+    shown = composite(SCENE, alone, spp=16, denoise=False)
+    high = np.s_[14:20, 33:39]
+    assert (SCENE.depth[high] == 0).all()
+    np.testing.assert_allclose(shown[high], SCENE.photo.linear[high], atol=0.1)
+
+
+class Target:
+    """A scene that shows the mean of its map, and its albedo's."""
+
+    def set_materials(self, materials):
+        self.albedo = float(materials.albedo.mean())
+
+    def set_envmap(self, envmap):
+        self.light = float(envmap.mean())
+
+
+def test_both_maps_have_their_share_of_the_paths_and_the_scene_is_as_it_was():
+    scene, target, asked = before_sky(), Target(), []
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    before = target.albedo, target.light
+
+    def trace(share):
+        asked.append((share, target.albedo == 0))
+        return np.full((2, 2, 3), target.light)
+
+    maps = np.full((4, 8, 3), 0.7), np.full((4, 8, 3), 0.2)
+    found = traced(trace, target, scene, maps, share=0.25)
+    np.testing.assert_allclose(found, before[1] + 0.7 - 0.2)
+    assert asked == [(1.0, False), (0.25, True), (0.25, True)]
+    assert (target.albedo, target.light) == before
+    assert traced(trace, target, scene, None, share=0.25).shape == (2, 2, 3) and asked[3:] == [(1.0, False)]
+
+
+def test_a_quarter_of_the_paths_shows_the_preview_the_same_sky(monkeypatch):
+    preview = GlassPreview(before_sky(), MASK, thickness="symmetry")
+    few = preview.picture(ior=1.3, spp=64, seed=3)
+    monkeypatch.setattr(glass_preview, "SKY", 1.0)
+    many = preview.picture(ior=1.3, spp=64, seed=3)
+    monkeypatch.setattr(preview, "_sky", None)
+    none = preview.picture(ior=1.3, spp=64, seed=3)
+    inside = preview.share > 0.9
+    assert np.abs(few - many)[inside].mean() < 0.1 * np.abs(none - many)[inside].mean()

@@ -1,0 +1,166 @@
+"""Enlarged layers follow the photo's edges; mixed pixels are told apart by their colour."""
+
+import numpy as np
+import pytest
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edits.composite import upsample
+from materialist.edits.composite.upsample import GuidedUpsample, matte, strips, window
+
+
+def photo_of(mask, inside, outside):
+    return np.where(mask[..., None], inside, outside).astype(np.float32)
+
+
+def test_equal_sizes_change_nothing():
+    layer = np.random.default_rng(0).random((7, 9, 2), np.float32)
+    photo = np.random.default_rng(1).random((7, 9, 3), np.float32)
+    np.testing.assert_array_equal(GuidedUpsample(photo, photo)(layer, np.ones((7, 9), bool), slice(0, 7)), layer)
+
+
+def test_constant_layers_stay_constant():
+    small, large = (np.random.default_rng(k).random((h, 2 * h, 3), np.float32) for k, h in ((0, 10), (1, 33)))
+    out = GuidedUpsample(small, large)(np.full((10, 20, 1), 0.3, np.float32), np.ones((10, 20), bool), slice(5, 20))
+    np.testing.assert_allclose(out, 0.3, rtol=1e-5)
+    assert out.shape == (15, 66, 1)
+
+
+def test_values_stay_on_their_side_of_an_edge_that_only_the_large_photo_resolves():
+    # The true edge runs at native column 21, inside a working pixel (4 native ones each).
+    native = np.zeros((40, 40), bool)
+    native[:, :21] = True
+    large = photo_of(native, (0.8, 0.2, 0.1), (0.1, 0.3, 0.7))
+    small = large.reshape(10, 4, 10, 4, 3).mean((1, 3))
+    layer = (np.arange(10) < 5).astype(np.float32)[None, :, None].repeat(10, 0)
+    out = GuidedUpsample(small, large)(layer, np.ones((10, 10), bool), slice(0, 40))[..., 0]
+    assert out[:, :20].min() > 0.9 and out[:, 22:].max() < 0.1
+
+
+def test_only_members_count():
+    members = np.zeros((10, 10), bool)
+    members[:, :5] = True
+    layer = np.where(members, 1.0, 99.0)[..., None].astype(np.float32)
+    grey = np.full((40, 40, 3), 0.5, np.float32)
+    out = GuidedUpsample(grey[::4, ::4], grey)(layer, members, slice(0, 40))[..., 0]
+    np.testing.assert_allclose(out[:, :22], 1, atol=1e-6)
+    assert (out[:, 32:] == 0).all()
+
+
+def test_matte_finds_the_share_of_mixed_pixels():
+    front, back = np.array([0.9, 0.4, 0.1]), np.array([0.1, 0.3, 0.6])
+    share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)  # a border six native pixels wide
+    encoded = share[:, None] * linear_to_srgb(front) + (1 - share[:, None]) * linear_to_srgb(back)
+    large = np.repeat(srgb_to_linear(encoded)[None], 60, 0).astype(np.float32)
+    mask = np.zeros((15, 15), bool)
+    mask[:, :8] = True
+    alpha = matte(mask, large)
+    np.testing.assert_allclose(alpha[30], share, atol=0.06)
+    assert (alpha[:, :20] == 1).all() and (alpha[:, 44:] == 0).all()
+
+
+def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
+    """And where what is behind is even, what cannot be of it belongs to the pattern: two native pixels here."""
+    rows, columns = np.mgrid[:80, :80]
+    dark = (rows // 5 + columns // 5) % 2 == 1
+    large = np.where(dark & (columns < 46), 0.1, 0.7)[..., None] * np.ones(3, np.float32)
+    mask = np.zeros((20, 20), bool)
+    mask[:, :11] = True  # up to native column 44
+    alpha = matte(mask, large.astype(np.float32))
+    assert (alpha[:, :42] > 0.99).all() and (alpha[:, 46:] < 0.5).all()
+    assert (alpha[:, 40:46][dark[:, 40:46]] > 0.95).all()
+
+
+def test_the_halos_of_a_sharpened_edge_keep_it_sharp():
+    encoded = np.full(80, 0.30)
+    encoded[40:] = 0.55
+    encoded[38:40] -= 0.15
+    encoded[40:42] += 0.15
+    large = srgb_to_linear(np.broadcast_to(encoded[None, :, None], (80, 80, 3))).astype(np.float32)
+    mask = np.zeros((20, 20), bool)
+    mask[:, 10:] = True
+    np.testing.assert_array_equal(matte(mask, large)[40], np.arange(80) >= 40)
+
+
+def test_a_bright_rim_is_no_mixture():
+    """The lip of a vase, brighter than vase and wall, is the vase's where the mask says so, and a lit edge behind its
+    outline is not."""
+    body, wall, lip = np.array([0.6, 0.25, 0.08]), np.array([0.25, 0.25, 0.25]), np.array([0.95, 0.8, 0.6])
+    rows = np.arange(80)[:, None, None]
+    large = np.where(rows < 32, wall, np.where(rows < 40, lip, body)) + np.zeros((80, 80, 3))
+    mask = np.zeros((20, 20), bool)
+    mask[8:] = True  # from native row 32 on
+    alpha = matte(mask, large.astype(np.float32))[:, 40]
+    assert (alpha[34:] > 0.95).all() and (alpha[:30] < 0.05).all()
+    mask[8:10] = False  # the lip belongs to what is behind
+    alpha = matte(mask, large.astype(np.float32))[:, 40]
+    assert (alpha[42:] > 0.95).all() and (alpha[:38] < 0.05).all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.06])
+def test_thin_parts_and_gaps_keep_their_mask(noise):
+    """Where nothing is surely inside, or outside, nearby, colour tells nothing of that side."""
+    rng = np.random.default_rng(0)
+    large = np.clip(0.25 + noise * rng.standard_normal((160, 160, 1)), 0.02, 1).astype(np.float32).repeat(3, -1)
+    leg = np.zeros((40, 40), bool)
+    leg[:, 19:21] = True
+    assert matte(leg, large)[:, 77:83].mean() > 0.9
+    assert matte(~leg, large)[:, 77:83].mean() < 0.1
+
+
+def test_without_a_colour_edge_the_mask_decides():
+    mask = np.zeros((15, 15), bool)
+    mask[:, :8] = True
+    alpha = matte(mask, np.full((60, 60, 3), 0.4, np.float32))
+    assert (alpha[:, :26] == 1).all() and (alpha[:, 36:] == 0).all()
+    assert np.all(np.diff(alpha[30]) <= 0)
+
+
+def test_strips_cover_every_row_once():
+    assert np.concatenate([np.arange(1000)[rows] for rows in strips(1000)]).tolist() == list(range(1000))
+
+
+def disc(height, width, radius=15):
+    rows, columns = np.mgrid[:height, :width]
+    return np.hypot(rows - height / 2, columns - 1.5 * radius) < radius
+
+
+def test_a_matte_made_in_parts_is_the_matte_made_at_once():
+    small = disc(90, 120)
+    large = np.kron(small, np.ones((5, 5)))[..., None] * [0.5, 0.2, 0.1] + 0.1
+    large = (large * np.random.default_rng(0).uniform(0.8, 1, large.shape)).astype(np.float32)
+    soft = np.clip(upsample.matte(small, np.full_like(large, 0.5)), 0, 1)  # of one colour: the enlarged mask
+    whole = upsample._shares(soft, large, 5.0)
+    assert ((whole > 0.05) & (whole < 0.95)).sum() > 100
+    np.testing.assert_allclose(matte(small, large), whole, atol=0.05)
+    assert np.abs(matte(small, large) - whole).mean() < 1e-4
+
+
+def test_coarse_means_are_the_fine_ones(monkeypatch):
+    rng = np.random.default_rng(1)
+    picture = np.kron(rng.random((12, 16, 3)), np.ones((20, 20, 1))).astype(np.float32)
+    members = np.kron(rng.random((6, 8)) > 0.4, np.ones((40, 40))) > 0
+    coarse = upsample._mean_of(picture, members, 25.0)
+    monkeypatch.setattr(upsample, "COARSE", 0)
+    fine = upsample._mean_of(picture, members, 25.0)
+    near = fine[2] & coarse[2]
+    assert (fine[2] == coarse[2]).mean() > 0.99 and near.mean() > 0.5
+    assert np.abs(fine[0] - coarse[0])[near].max() < 0.02
+    assert np.abs(fine[1] - coarse[1])[near].max() < 0.01
+
+
+@pytest.mark.parametrize("factor", [1, 3])
+def test_a_window_is_a_part_of_the_whole(factor):
+    rng = np.random.default_rng(2)
+    large, layer = rng.random((20 * factor, 30 * factor, 3), np.float32), rng.random((20, 30, 2), np.float32)
+    small = large.reshape(20, factor, 30, factor, 3).mean((1, 3))
+    guided, members = GuidedUpsample(small, large), rng.random((20, 30)) > 0.5
+    rows, columns = slice(4, 9), slice(7, 20)
+    whole = guided(layer, members, slice(0, 20 * factor))
+    np.testing.assert_array_equal(guided(layer, members, rows, columns), whole[rows, columns])
+
+
+def test_windows_hold_the_pixels_and_their_margin():
+    mask = np.zeros((10, 10), bool)
+    mask[3:5, 8] = True
+    assert window(mask, (40, 35)) == (slice(12, 20), slice(28, 32))
+    assert window(mask, (40, 35), 2) == (slice(4, 28), slice(21, 35))

@@ -1,0 +1,154 @@
+"""What Blender is given, and how it is called. Blender itself: docs/export.md says how to check against it."""
+
+import ast
+import json
+import os
+import shutil
+import stat
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from export_scenes import room
+
+import materialist as mt
+from materialist.io.exr import read_exr
+
+BPY = os.environ.get("MATERIALIST_TEST_BPY", "")
+"""A Python that has bpy, to build and render with."""
+
+
+@pytest.fixture
+def no_blender(monkeypatch):
+    from materialist.exporters import blender
+
+    monkeypatch.setattr(blender.shutil, "which", lambda name: None)
+    monkeypatch.setattr(blender.importlib.util, "find_spec", lambda name: None)
+
+
+def fake(tmp_path, body):
+    """A program that stands in for Blender."""
+    program = tmp_path / "python-with-bpy"
+    program.write_text(f"#!{sys.executable}\nimport sys\n{body}\n")
+    program.chmod(program.stat().st_mode | stat.S_IEXEC)
+    return str(program)
+
+
+def test_the_folder_holds_what_the_script_reads(tmp_path):
+    done = mt.export(room(), tmp_path / "out", to="blend")
+    folder = done.path
+    script = (folder / "build.py").read_text()
+    ast.parse(script)
+    facts = json.loads((folder / "scene.json").read_text())
+    assert (facts["width"], facts["height"], facts["fov"]) == (64, 40, 50.0)
+    assert list(facts["parts"]) == ["surface", "plane0", "plane1"] and facts["parts"]["surface"] == {
+        "maps": "",
+        "repeat": False,
+    }
+    with np.load(folder / "meshes.npz") as arrays:
+        assert arrays["surface_uv"].shape[1] == 2 and arrays["plane1_faces"].shape[1] == 3
+    np.testing.assert_array_equal(read_exr(folder / "albedo.exr"), room().materials.albedo)
+    np.testing.assert_array_equal(read_exr(folder / "envmap.exr"), room().envmap)
+    assert str(folder / "build.py") in done.notes[0] and done.notes[0].startswith("Make the .blend with: blender ")
+
+
+def test_without_blender_the_script_stays(tmp_path, no_blender):
+    done = mt.export(room(), tmp_path / "room.blend", shadow_catcher=True)
+    assert done.path == tmp_path / "room" and not (tmp_path / "room.blend").exists()
+    assert (done.path / "build.py").is_file()
+    assert done.notes[0].endswith(f"-o {tmp_path / 'room.blend'} --shadow-catcher")
+
+
+def test_a_blender_that_works(tmp_path):
+    program = fake(tmp_path, "open(sys.argv[sys.argv.index('-o') + 1], 'w').write(' '.join(sys.argv))")
+    done = mt.export(room(), tmp_path / "room.blend", blender=program, fitted_material=True)
+    assert done.path.read_text().endswith("--fitted-material") and done.notes == ()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["python-with-bpy", "room.blend"]
+
+
+def test_a_blender_that_fails(tmp_path):
+    program = fake(tmp_path, "sys.exit('No module named bpy')")
+    with pytest.raises(mt.SetupError, match="No module named bpy"):
+        mt.export(room(), tmp_path / "room.blend", blender=program)
+    with pytest.raises(mt.SetupError, match="There is no program /nowhere/blender"):
+        mt.export(room(), tmp_path / "room.blend", blender="/nowhere/blender")
+    assert [path.name for path in tmp_path.iterdir()] == ["python-with-bpy"]
+
+
+@pytest.mark.slow
+def test_cycles_sees_what_we_see(tmp_path):
+    if not shutil.which(BPY):
+        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
+    from materialist.metrics import psnr
+    from materialist.render.scene import RenderScene
+
+    scene = room()
+    folder = mt.export(scene, tmp_path / "out", to="blend").path
+    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
+    subprocess.run(command, check=True, capture_output=True)
+    renderer = RenderScene(scene.geometry, scene.camera)
+    renderer.set_materials(scene.materials)
+    renderer.set_envmap(scene.envmap)
+    ours, theirs = renderer.render_path(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
+    assert psnr(ours, theirs) > 32
+    assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
+    assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30
+
+
+@pytest.mark.slow
+def test_cycles_has_our_lamps_and_glow(tmp_path):
+    if not shutil.which(BPY):
+        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
+    from dataclasses import replace
+
+    from test_bodies import GLOW, LAMP, with_bodies
+
+    from materialist.edits.light.lights import rendered
+
+    scene = with_bodies(GLOW)
+    scene = replace(scene, envmap=scene.envmap * 0.2, lamps=(LAMP,))
+    folder = mt.export(scene, tmp_path / "out", to="blend").path
+    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
+    subprocess.run(command, check=True, capture_output=True)
+    ours, theirs = rendered(scene, spp=256, seed=0), read_exr(tmp_path / "r.exr")[..., :3]
+    ratio = theirs / np.maximum(ours, 1e-3)
+    assert abs(float(np.median(ratio)) - 1) < 0.03
+    bright = np.argwhere(ours.max(-1) > 5)  # the lamp itself
+    assert len(bright) > 10 and np.median(theirs.max(-1)[tuple(bright.T)]) > 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["texture", "glass", "rough glass", "coat"])
+def test_cycles_has_our_bodies(tmp_path, kind):
+    if not shutil.which(BPY):
+        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
+    from dataclasses import replace
+
+    import trimesh
+    from test_bodies import CHECKS
+
+    from materialist.edits.insert.mesh_material import constant
+    from materialist.edits.light.lights import rendered
+    from materialist.types import Body
+
+    surface = {
+        "texture": CHECKS, "glass": constant(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
+        "rough glass": constant(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),
+        "coat": constant(0.3, 0.3, 0.0, transmission=0.6, ior=1.3),
+    }[kind]  # fmt: skip
+    ball = trimesh.creation.icosphere(4, 0.5)
+    ways = np.asarray(ball.vertices / 0.5, np.float32)
+    uv = np.stack([ways[:, 0] * 0.7 + 1.3, 0.4 - ways[:, 1] * 0.7], 1).astype(np.float32)
+    vertices = (ways * 0.5 + [0.1, 0, -2.2]).astype(np.float32)
+    body = Body(vertices, np.asarray(ball.faces, np.int32), ways, uv, surface, "ball")
+    scene = replace(room(), bodies=(body,))
+    folder = mt.export(scene, tmp_path / "out", to="blend").path
+    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
+    subprocess.run([*command, "--samples", "512"], check=True, capture_output=True)
+    ours, theirs = rendered(scene, spp=512, seed=0), read_exr(tmp_path / "r.exr")[..., :3]
+    y, x = np.indices(ours.shape[:2])
+    inside = (x - 34.9) ** 2 + (y - 19.5) ** 2 < 14**2
+    np.testing.assert_allclose(theirs[inside].mean(0), ours[inside].mean(0), rtol=0.04)
+    blurred = [np.stack([x[k : 40 - 5 + k : 5] for k in range(5)]).mean(0) for x in (ours, theirs)]  # rows, five each
+    assert np.corrcoef(blurred[0].ravel(), blurred[1].ravel())[0, 1] > 0.97

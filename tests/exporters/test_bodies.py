@@ -1,0 +1,264 @@
+"""Inserted bodies in exports: their textures, their glass, and the picture that Mitsuba makes of them."""
+
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from export_scenes import load_xml, room
+
+from materialist.edits.insert.mesh_material import constant
+from materialist.exporters import body_parts
+from materialist.exporters.glb import glb_bytes
+from materialist.exporters.parts import scene_parts
+from materialist.exporters.run import export
+from materialist.io.exr import read_exr
+from materialist.types import Body, Lamp, Scene, Surface
+
+
+def with_bodies(*surfaces: Surface) -> Scene:
+    """The room with a square plate before the box for each surface, facing the camera."""
+    made = []
+    for k, surface in enumerate(surfaces):
+        x = -0.9 + 0.9 * k
+        corners = np.array([[x, -0.4, -2], [x + 0.8, -0.4, -2], [x + 0.8, 0.4, -2], [x, 0.4, -2]], np.float32)
+        uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+        normals = np.tile(np.float32([0, 0, 1]), (4, 1))
+        made.append(Body(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, uv, surface, f"plate{k}"))
+    return replace(room(), bodies=tuple(made))
+
+
+CHECKS = Surface(
+    np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32), np.full((1, 1), 0.4, np.float32),
+    np.zeros((1, 1), np.float32),
+)  # fmt: skip
+GLASS = constant(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
+FROSTED = constant(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
+COATED = constant((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
+
+
+def document(scene):
+    data = glb_bytes(scene, [*scene_parts(scene), *body_parts.body_parts(scene)])
+    (size,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size])
+
+
+def test_glb_has_textures_that_repeat_and_glass():
+    content = document(with_bodies(CHECKS, GLASS))
+    names = [node["name"] for node in content["nodes"]]
+    assert names[-3:] == ["body0", "body1", "camera"]
+    checks, glass = content["materials"][-2:]
+    texture = content["textures"][checks["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
+    assert content["samplers"][texture["sampler"]]["wrapS"] == 10497
+    assert glass["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 1
+    np.testing.assert_allclose(glass["extensions"]["KHR_materials_ior"]["ior"], 1.4)
+    np.testing.assert_allclose(glass["pbrMetallicRoughness"]["baseColorFactor"][:3], [0.9, 0.5, 0.4])
+    assert content["extensionsUsed"] == ["KHR_materials_ior", "KHR_materials_transmission"]  # the plates are open
+    assert "extensionsUsed" not in document(room())
+
+
+def test_glass_of_a_glb_has_the_mean_way_through_it():
+    """A ball's is 4 r / 3; without any, viewers take glass for a thin wall."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.6)
+    vertices = np.asarray(ball.vertices, np.float32)
+    body = Body(
+        vertices, np.asarray(ball.faces, np.int32), vertices / 0.6, np.zeros((len(vertices), 2), np.float32), GLASS
+    )
+    content = document(replace(room(), bodies=(body,)))
+    thick = content["materials"][-1]["extensions"]["KHR_materials_volume"]["thicknessFactor"]
+    assert not content["materials"][-1]["doubleSided"], "as the extension demands"
+    assert thick == pytest.approx(0.8, rel=0.02) and "KHR_materials_volume" in content["extensionsUsed"]
+
+
+def test_glb_colours_coated_glass_by_the_mean_of_tint_and_albedo():
+    glass = constant(0.2, 0.2, 0.0, transmission=0.75, ior=1.4, tint=(1.0, 0.6, 0.2))
+    material = document(with_bodies(glass))["materials"][-1]
+    expected = 0.25 * 0.2 + 0.75 * np.array([1.0, 0.6, 0.2])
+    np.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-5)
+
+
+def test_clear_glass_keeps_no_texture_of_what_it_was():
+    clear = replace(CHECKS, transmission=1.0, tint=(0.5, 1.0, 0.5))
+    content = document(with_bodies(clear))
+    assert content["materials"][-1]["pbrMetallicRoughness"]["baseColorFactor"][:3] == [0.5, 1.0, 0.5]
+    assert len(content["images"]) == len(document(room())["images"])
+
+
+def test_the_page_shows_bodies_without_the_continued_planes():
+    from materialist.exporters.page import _packed
+
+    scene = with_bodies(CHECKS)
+    parts = [*scene_parts(scene), *body_parts.body_parts(scene)]
+    packed = _packed(scene.camera, scene.depth, parts)
+    assert len(parts) > 2 and packed["surface"] == 3 * (len(parts[0].mesh.faces) + 2) < packed["all"]
+
+
+@pytest.mark.parametrize("to", ["mitsuba", "usd", "blend"])
+def test_numbers_of_numpy_are_numbers(tmp_path, to):
+    lamp = Lamp(tuple(np.float32([0, 0.5, -2])), tuple(np.float32([1, 2, 3])), np.float32(0.05))
+    scene = replace(room(), lamps=(lamp,), camera=replace(room().camera, fov=np.float64(40.0)))
+    done = export(scene, tmp_path / "a", to=to)
+    if to == "mitsuba":
+        assert "np." not in done.path.read_text()
+
+
+def test_trimesh_reads_the_bodies_back(tmp_path):
+    import trimesh
+
+    scene = with_bodies(CHECKS)
+    export(scene, tmp_path / "a.glb")
+    read = trimesh.load_scene(tmp_path / "a.glb", process=False).geometry
+    plate = next(mesh for name, mesh in read.items() if "body0" in name)
+    np.testing.assert_allclose(plate.vertices, scene.bodies[0].vertices, atol=1e-6)
+    picture = np.asarray(plate.visual.material.baseColorTexture.convert("RGB"))
+    np.testing.assert_array_equal(picture, CHECKS.albedo * 255)
+
+
+GLOW = constant(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
+
+
+def test_glb_has_light_that_is_given_off():
+    material = document(with_bodies(GLOW))["materials"][-1]
+    np.testing.assert_allclose(material["emissiveFactor"], [1, 0.5, 0.25])
+    assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 3
+
+
+@pytest.mark.parametrize(
+    "surface", [CHECKS, GLASS, GLOW, FROSTED, COATED], ids=["texture", "glass", "glow", "frosted", "coated"]
+)
+def test_mitsuba_renders_the_same_picture(tmp_path, surface):
+    from materialist.render.scene import GLASS_DEPTH, RenderScene
+
+    scene = with_bodies(surface)
+    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    target.set_materials(scene.materials)
+    target.set_envmap(scene.envmap)
+    expected = target.render_path(spp=64, seed=1, max_depth=GLASS_DEPTH)
+    done = export(scene, tmp_path / "scene", to="mitsuba")
+    own = done.path.with_name("scene_materialist.xml")
+    loaded = load_xml(target.mi, own, spp=64, max_depth=GLASS_DEPTH)
+    picture = np.array(target.mi.render(loaded, seed=2))[..., :3]
+    plate = np.s_[16:24, 14:26]
+    np.testing.assert_allclose(picture[plate].mean((0, 1)), expected[plate].mean((0, 1)), rtol=0.05, atol=0.01)
+    np.testing.assert_allclose(picture.mean((0, 1)), expected.mean((0, 1)), rtol=0.03)
+
+
+def test_what_a_format_does_not_show_is_told(tmp_path):
+    scene = with_bodies(GLOW, GLASS, CHECKS)
+    for to in ("blend", "mitsuba"):
+        assert not any("shows bodies without" in note for note in export(scene, tmp_path / to, to=to).notes)
+    notes = export(scene, tmp_path / "a.html").notes
+    assert any("without textures but for their colours at the vertices and glass and glow;" in note for note in notes)
+    mixed = with_bodies(constant(0.2, 0.1, 0.0, transmission=0.9))
+    assert any("transmission is below 1" in note for note in export(mixed, tmp_path / "m", to="mitsuba").notes)
+
+
+def test_blender_gets_textures_glass_and_glow(tmp_path):
+    """What Cycles makes of them: test_blender.py."""
+    coat = constant(0.2, 0.01, 0.0, transmission=0.9, tint=(0.25, 1.0, 0.81))
+    folder = export(with_bodies(GLOW, coat, CHECKS), tmp_path / "folder", to="blend").path
+    facts = json.loads((folder / "scene.json").read_text())
+    parts = facts["parts"]
+    assert parts["body0"]["emission"] == [3.0, 1.5, 0.75] and "glass" not in parts["body0"]
+    assert parts["body1"]["glass"] == {
+        "share": 0.9, "ior": 1.5, "roughness": 0.0, "tint": [0.25, 1.0, 0.81],
+    }  # fmt: skip
+    assert parts["surface"] == {"maps": "", "repeat": False} and parts["body2"] == {"maps": "body2_", "repeat": True}
+    np.testing.assert_array_equal(read_exr(folder / "body2_albedo.exr"), CHECKS.albedo)
+    assert facts["bounces"] == 14
+    plain = export(with_bodies(CHECKS), tmp_path / "plain", to="blend").path
+    assert json.loads((plain / "scene.json").read_text())["bounces"] == 2
+
+
+def test_usd_gets_textures_and_says_that_nothing_refracts(tmp_path):
+    pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+    from PIL import Image
+    from pxr import Usd, UsdShade
+
+    done = export(with_bodies(CHECKS, GLASS), tmp_path / "usd", to="usd")
+    assert any("without refraction and tint of glass;" in note for note in done.notes)
+    np.testing.assert_array_equal(
+        np.asarray(Image.open(tmp_path / "usd" / "body0_base_color.png")), CHECKS.albedo * 255
+    )
+    stage = Usd.Stage.Open(str(done.path))
+    texture = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/base_color"))
+    assert (
+        texture.GetInput("file").Get().path == "./body0_base_color.png" and texture.GetInput("wrapS").Get() == "repeat"
+    )
+    own = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/surface/base_color"))
+    assert own.GetInput("file").Get().path == "./base_color.png" and own.GetInput("wrapS").Get() == "clamp"
+    glass = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body1/surface"))
+    assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(1.4)
+
+
+def test_the_page_has_a_texture_s_colours_at_the_vertices():
+    from materialist.exporters.page import _vertices
+
+    (part,) = body_parts.body_parts(with_bodies(CHECKS))
+    inside = replace(part.mesh, uv=np.float32([[0.25, 0.25], [0.75, 0.25], [1.25, -0.25], [0.75, 0.75]]))
+    colours = _vertices(replace(part, mesh=inside))["colour"]
+    np.testing.assert_array_equal(colours / 255, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]])
+
+
+LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)
+
+
+def test_lamps_leave_for_gltf_usd_and_blender(tmp_path):
+    pxr = pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+    assert pxr
+    from pxr import Usd, UsdGeom, UsdLux
+
+    scene = replace(with_bodies(GLOW), lamps=(LAMP,))
+    content = document(scene)
+    (light,) = content["extensions"]["KHR_lights_punctual"]["lights"]
+    np.testing.assert_allclose(light["intensity"] * 4 * np.pi * np.array(light["color"]), LAMP.power)
+    (node,) = [node for node in content["nodes"] if node["name"] == "lamp0"]
+    assert node["translation"] == [0.9, 0.3, -2.6] and "KHR_lights_punctual" in content["extensionsUsed"]
+    stage = Usd.Stage.Open(str(export(scene, tmp_path / "usd", to="usd").path))
+    sphere = UsdLux.SphereLight(stage.GetPrimAtPath("/Scene/lamp0"))
+    radiance = sphere.GetIntensityAttr().Get() * np.array(sphere.GetColorAttr().Get())
+    np.testing.assert_allclose(radiance, LAMP.radiance, rtol=1e-5)
+    place = UsdGeom.Xformable(sphere).ComputeLocalToWorldTransform(0).ExtractTranslation()
+    np.testing.assert_allclose(place, LAMP.position)
+    from pxr import UsdShade
+
+    glow = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/surface")).GetInput("emissiveColor").Get()
+    np.testing.assert_allclose(glow, [3, 1.5, 0.75])
+    done = export(scene, tmp_path / "blend", to="blend")
+    facts = json.loads((done.path / "scene.json").read_text())
+    assert facts["lamps"] == [{"position": [0.9, 0.3, -2.6], "power": [6.0, 4.5, 3.0], "radius": 0.12}]
+    assert not any("none of the scene" in note for note in done.notes)
+    assert any("none of the scene's 1 lamp" in note for note in export(scene, tmp_path / "a.html").notes)
+
+
+def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
+    """They are what is to be seen; those of a saved edit are in the photo."""
+    scene = with_bodies(GLOW, CHECKS)
+
+    def caught(scene, name):
+        folder = export(scene, tmp_path / name, to="blend").path
+        return json.loads((folder / "scene.json").read_text())["in_photo"][3:]
+
+    assert caught(scene, "a") == []
+    stage = {"name": "edit", "edits": [], "bodies": 1}
+    saved = replace(scene, report=replace(scene.report, stages=(*scene.report.stages, stage)))
+    assert caught(saved, "b") == ["body0"]
+    older = replace(scene, report=replace(scene.report, stages=({"name": "edit", "edits": []},)))
+    assert caught(older, "c") == ["body0", "body1"]
+
+
+def test_glass_and_its_film_share_one_roughness_where_a_format_has_one():
+    coated = replace(CHECKS, roughness=np.full((1, 1), 0.8, np.float32), transmission=0.75, glass_roughness=0.0)
+    (part,) = body_parts.body_parts(with_bodies(coated))
+    np.testing.assert_allclose(part.materials.roughness, 0.8)
+    np.testing.assert_allclose(body_parts.one_roughness(part).roughness, 0.2, atol=1e-6)
+
+
+def test_maps_of_several_sizes_are_brought_to_one():
+    surface = Surface(CHECKS.albedo, np.linspace(0, 1, 4, dtype=np.float32).reshape(4, 1), CHECKS.metallic)
+    (part,) = body_parts.body_parts(with_bodies(surface))
+    assert part.materials.albedo.shape == (4, 2, 3) and part.materials.roughness.shape == (4, 2)
+    np.testing.assert_allclose(part.materials.roughness[:, 1], [0, 1 / 3, 2 / 3, 1], atol=1e-6)
+    np.testing.assert_allclose(part.materials.albedo[::2], CHECKS.albedo)

@@ -1,0 +1,105 @@
+"""The XML as Mitsuba loads it, against our own renderer."""
+
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from export_scenes import load_xml, room
+
+from materialist.exporters.mitsuba_xml import FILES, write_mitsuba
+from materialist.exporters.parts import scene_parts
+from materialist.geometry.build import build_geometry
+from materialist.render.scene import RenderScene
+from materialist.types import Lamp
+
+OWN = "scene_materialist.xml"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mitsuba")
+    scene = room()
+    write_mitsuba(folder, scene, scene_parts(scene))
+    return scene, folder
+
+
+def test_it_renders_as_ours_does(written, capfd):
+    scene, folder = written
+    renderer = RenderScene(scene.geometry, scene.camera)
+    renderer.set_materials(scene.materials)
+    renderer.set_envmap(scene.envmap)
+    mi = renderer.mi
+    loaded = load_xml(mi, folder / OWN, spp=64, max_depth=3)
+    ours = [renderer.render_path(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
+    theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
+    # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
+    noise = np.sqrt(np.mean((ours[0] - ours[1]) ** 2))
+    assert np.sqrt(np.mean((ours[0] - theirs[1]) ** 2)) < 1.15 * noise
+    assert np.mean(theirs) == pytest.approx(np.mean(ours), rel=0.01)
+    light = next(value for name, value in mi.traverse(loaded) if name.endswith(".data") and "bsdf" not in name)
+    np.testing.assert_array_equal(np.array(light), np.array(renderer.params["light.data"]))
+    assert "WARN" not in capfd.readouterr().out
+
+
+def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
+    scene = room(completion="none")
+    mesh = scene.geometry.mesh
+    normals = mesh.normals + np.random.default_rng(0).normal(0, 1.0, mesh.normals.shape)
+    normals = (normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32)
+    assert ((normals * mesh.vertices).sum(-1) > 0).mean() > 0.1
+    scene = replace(scene, geometry=replace(scene.geometry, mesh=replace(mesh, normals=normals)))
+    write_mitsuba(tmp_path, scene, scene_parts(scene))
+    renderer = RenderScene(scene.geometry, scene.camera)
+    renderer.set_materials(scene.materials)
+    renderer.set_envmap(scene.envmap)
+    loaded = load_xml(renderer.mi, tmp_path / OWN, spp=256, max_depth=3)
+    ours, theirs = renderer.render_path(spp=256, seed=1, max_depth=3), np.array(renderer.mi.render(loaded, seed=2))
+    blocks = [image.reshape(5, 8, 8, 8, 3).mean((1, 3)) for image in (ours, theirs)]
+    np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.05)  # inside `twosided`: 0.19
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_normals_along_x_have_pictures(tmp_path, name):
+    scene = room(completion="none")
+    normal = np.zeros_like(scene.normal)
+    normal[..., 0] = 1
+    geometry = build_geometry(scene.depth, normal, scene.camera, completion="none")
+    scene = replace(scene, normal=normal, geometry=geometry)
+    write_mitsuba(tmp_path, scene, scene_parts(scene))
+    from materialist.render.variant import setup
+
+    mi = setup("auto")
+    assert np.isfinite(np.array(mi.render(load_xml(mi, tmp_path / name, spp=4), seed=1))).all()
+
+
+def test_the_portable_material_is_close(written):
+    _, folder = written
+    from materialist.render.variant import setup
+
+    mi = setup("auto")
+    images = [np.array(mi.render(load_xml(mi, folder / name, spp=64), seed=1)) for name in FILES]
+    assert np.mean(images[0]) == pytest.approx(np.mean(images[1]), rel=0.03)
+
+
+def test_lamps_light_it_as_they_light_ours(tmp_path):
+    from materialist.pipeline import render_scene
+    from materialist.render.variant import setup
+
+    scene = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (30.0, 20.0, 5.0), 0.05),))
+    write_mitsuba(tmp_path, scene, scene_parts(scene))
+    mi = setup("auto")
+    loaded = load_xml(mi, tmp_path / OWN, spp=64)
+    theirs, ours = np.array(mi.render(loaded, seed=1)), render_scene(scene, spp=64)
+    np.testing.assert_allclose(theirs.mean((0, 1)), ours.mean((0, 1)), rtol=0.03)
+    assert ours.mean() > 1.3 * render_scene(replace(scene, lamps=()), spp=16).mean()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_it_refers_only_to_files_beside_it(written, name):
+    _, folder = written
+    root = ET.parse(folder / name).getroot()
+    named = {node.get("value") for node in root.iter("string") if node.get("name") == "filename"}
+    assert named == {path.name for path in folder.iterdir()} - set(FILES)
+    assert re.search(r'name="fov" value="50\.0"', (folder / name).read_text())

@@ -1,0 +1,85 @@
+"""Which meshes and materials an export has."""
+
+import numpy as np
+import pytest
+from export_scenes import room
+
+from materialist.camera import project
+from materialist.errors import InputError
+from materialist.exporters.parts import scene_parts
+from materialist.types import Geometry, Mesh
+
+
+def test_parts_are_the_whole_mesh():
+    scene = room()
+    parts = scene_parts(scene)
+    assert [part.name for part in parts] == ["surface", "plane0", "plane1"]
+    assert sum(len(part.mesh.faces) for part in parts) == len(scene.geometry.mesh.faces)
+    assert parts[0].materials is scene.materials and not parts[0].constant
+    for part in parts[1:]:
+        members = scene.geometry.plane_label == int(part.name.removeprefix("plane"))
+        assert part.constant
+        np.testing.assert_allclose(
+            part.materials.albedo[0, 0], scene.materials.albedo[members].mean(0, dtype=float), rtol=1e-5
+        )
+        np.testing.assert_allclose(
+            part.materials.roughness[0, 0], scene.materials.roughness[members].mean(dtype=float), rtol=1e-5
+        )
+
+
+def test_a_plane_without_pixels_is_neutral():
+    scene = room()
+    label = np.where(scene.geometry.plane_label == 0, -1, scene.geometry.plane_label).astype(np.int8)
+    from dataclasses import replace
+
+    plane = scene_parts(replace(scene, geometry=Geometry(scene.geometry.mesh, label)))[1]
+    assert plane.materials.albedo[0, 0].tolist() == [0.5, 0.5, 0.5] and plane.materials.metallic[0, 0] == 0
+
+
+@pytest.mark.parametrize("most", [400, 1500, 5000])
+def test_fewer_triangles_on_the_same_frame(most):
+    scene = room()
+    parts = scene_parts(scene, most)
+    count = sum(len(part.mesh.faces) for part in parts)
+    assert 0.3 * most < count <= most
+    assert parts[0].materials.albedo.shape == (40, 64, 3)  # the texture keeps its size
+    surface = parts[0].mesh
+    pixels, _ = project(surface.vertices, scene.camera)
+    # The frame is covered to its rim, and a vertex still lies where its texture coordinate says; the continuation
+    # under silhouettes has the texture coordinate of a neighbour.
+    assert np.abs(pixels.min(0)).max() < 0.01 and np.abs(pixels.max(0) - (64, 40)).max() < 0.01
+    distance = np.abs(pixels - surface.uv * (64, 40)).max(1)
+    assert np.median(distance) < 0.01
+
+
+def test_enough_triangles_change_nothing():
+    scene = room()
+    same = scene_parts(scene, len(scene.geometry.mesh.faces))[0].mesh
+    np.testing.assert_array_equal(same.vertices, scene_parts(scene)[0].mesh.vertices)
+
+
+def test_bad_input():
+    from dataclasses import replace
+
+    scene = room()
+    with pytest.raises(InputError, match="give at least 100"):
+        scene_parts(scene, 3)
+    mesh = scene.geometry.mesh
+    planes = Mesh(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, mesh.face_pixel, mesh.face_plane * 0)
+    with pytest.raises(InputError, match="no depth surface"):
+        scene_parts(replace(scene, geometry=Geometry(planes, scene.geometry.plane_label)))
+
+
+def test_fewer_triangles_keep_the_ends_of_walls():
+    from dataclasses import asdict, replace
+
+    from materialist.geometry.completion import walls_of
+    from materialist.geometry.planes import find_planes
+
+    scene = room()
+    (wall,) = walls_of(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
+    ends = replace(wall.usual, up=wall.seen.up + 5.0)
+    told = replace(scene, provenance={**scene.provenance, "ends": [asdict(ends)]})
+    tops = [max(float(part.mesh.vertices[:, 1].max()) for part in scene_parts(s, 3000)[1:]) for s in (scene, told)]
+    # The coarse picture is a little less square, and its mesh is stretched back onto the frame.
+    assert tops[0] < tops[1] - 1 and tops[1] == pytest.approx(ends.up, rel=0.04)
