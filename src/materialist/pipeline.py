@@ -63,9 +63,9 @@ def invert(
             (MoGe), else from EXIF, else 35.
         size: longer side of the working image, pixels; a Photo keeps the size that it was read at.
         envmap_size: (width, height) of the environment map; width = 2 * height.
-        completion: `planes,backs` continues dominant planes beyond what the photo shows and gives objects backs,
-            `floors,backs` ends walls at the frame, `planes` leaves objects open behind, `none` adds nothing. `auto` is
-            the first with walls that end where light explains the photo best, or `none` where that shuts out light
+        completion: `planes` continues dominant planes beyond what the photo shows, `floors` ends walls at the frame,
+            `none` adds nothing; `planes,backs` and `floors,backs` are accepted for `planes` and `floors`. `auto` is
+            `planes` with walls that end where light explains the photo best, or `none` where that shuts out light
             that the photo shows; the report then says so.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
@@ -107,6 +107,7 @@ def invert(
     setup(device)
     from materialist.fit.attempt import AUTO, FULL, Job
     from materialist.fit.settings import preset as named
+    from materialist.geometry.build import SYNONYMS
 
     settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
     if engine == "path" and (settings.corrections or settings.materials.other_metallic is not None):
@@ -118,7 +119,7 @@ def invert(
         strategy, seed, device, overrides.get("spp"), progress, found,
     )  # fmt: skip
     # The paper's schedule is followed once, however well it does.
-    best, notes = job.best(FULL if completion == AUTO and preset == "paper" else completion)
+    best, notes = job.best(FULL if completion == AUTO and preset == "paper" else SYNONYMS.get(completion, completion))
     report = _report(picture, prior, best, (*stages, *best.stages), notes, start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
@@ -278,9 +279,9 @@ def _check(engine: str, strategy: str, completion: str, envmap_size: tuple[int, 
         raise InputError(f"Engine is '{engine}'; choose one of {', '.join(ENGINES)}.")
     if strategy not in STRATEGIES:
         raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
-    from materialist.geometry.build import COMPLETIONS
+    from materialist.geometry.build import COMPLETIONS, SYNONYMS
 
-    if completion not in ("auto", *COMPLETIONS):
+    if completion not in ("auto", *COMPLETIONS, *SYNONYMS):
         raise InputError(f"Completion is '{completion}'; choose one of 'auto', {', '.join(map(repr, COMPLETIONS))}.")
     width, height = envmap_size
     if width != 2 * height or not 8 <= height <= 4096:

@@ -107,7 +107,7 @@ class Mesh:
     vertices: Array
     """[V, 3] float32, camera frame, scene units."""
     faces: Array
-    """[F, 3] int32, counter-clockwise seen from the camera; backs of objects, from outside."""
+    """[F, 3] int32, counter-clockwise seen from the camera."""
     normals: Array
     """[V, 3] float32 unit shading normals."""
     uv: Array
@@ -115,7 +115,7 @@ class Mesh:
     face_pixel: Array
     """[F] int32 row-major index of the pixel whose surface (or nearest surface) the face carries."""
     face_plane: Array
-    """[F] int16: -1 for the depth surface and the backs of its objects, k >= 0 for the continuation of plane k."""
+    """[F] int16: -1 for the depth surface, k >= 0 for the continuation of plane k."""
 
 
 @dataclass(frozen=True)

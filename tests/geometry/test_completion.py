@@ -145,7 +145,7 @@ def test_completion_can_be_switched_off_and_its_extent_chosen(furnished):
 def test_walls_can_end_at_the_frame(furnished):
     geometry, depth, _, floor, wall = furnished
     _, normal, _ = room(CAMERA)
-    bare = build_geometry(depth, normal, CAMERA, completion="floors,backs")
+    bare = build_geometry(depth, normal, CAMERA, completion="floors")
 
     def faces(built, plane):
         return int((built.mesh.face_plane == plane).sum())
@@ -153,8 +153,22 @@ def test_walls_can_end_at_the_frame(furnished):
     assert faces(bare, floor) == faces(geometry, floor)
     assert 0 < faces(bare, wall) < faces(geometry, wall)  # it still goes on behind the box
     np.testing.assert_array_equal(bare.plane_label, geometry.plane_label)
-    assert completion_of(bare, "floors,backs") == "floors,backs"
-    assert completion_of(bare, "something older") in ("planes", "planes,backs")
+
+
+def test_the_completion_of_a_stored_scene_is_told_by_its_provenance_or_its_mesh(furnished):
+    geometry, depth, normal = furnished[0], furnished[1], room(CAMERA)[1]
+    told = ("planes", "planes,backs", "floors,backs", "none", "something older", None)
+    assert [completion_of(geometry, name) for name in told] == [
+        "planes",
+        "planes",
+        "floors",
+        "none",
+        "planes",
+        "planes",
+    ]
+    assert completion_of(build_geometry(depth, normal, CAMERA, completion="none")) == "none"
+    again = build_geometry(depth, normal, CAMERA, completion="planes,backs")
+    np.testing.assert_array_equal(again.mesh.faces, geometry.mesh.faces)
 
 
 def test_faces_of_continuations_are_well_formed(furnished):

@@ -59,7 +59,7 @@ def test_a_round_surface_is_shaded_as_before():
 def test_every_completion_has_its_creases_split():
     depth, normal, is_wall = _corner()
     edge = np.flatnonzero(is_wall.any(1)).max()  # the last row of the wall
-    for completion in ("none", "planes", "planes,backs"):
+    for completion in ("none", "planes"):
         mesh = build_geometry(depth, normal, CAMERA, completion=completion).mesh
         faces = mesh.faces[: 2 * depth.size][2 * (edge * 48 + 24)]
         np.testing.assert_allclose(mesh.normals[faces], np.tile([0.0, 0, 1], (3, 1)), atol=1e-6)

@@ -38,7 +38,7 @@ PSNR on sRGB-encoded, clipped pictures. `hue` turns the largest object's albedo 
 object; for `insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all.
 `ceiling` is the same edit path-traced with the true maps and the true light on the mesh of the true depth, no photo in
 it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited;
-`edit, predicted` with the predictor that is named; `w/o backs`: on meshes whose objects are open behind. `untouched`
+`edit, predicted` with the predictor that is named. `untouched`
 is the photo as it was. `preview` rows: seconds of one preview by cached transport, `final` those of the composite at
 256 paths, both at the latency size, and of bringing it into a photo of 24 megapixels (without the paths); CPU seconds
 hardly depend on what else the computer does."""
@@ -52,7 +52,6 @@ def run(
     size: int = 96,
     kinds: str = ",".join(KINDS),
     predictor: str = "",
-    without_backs: bool = False,
     spp: int = 256,
     truth_spp: int = 576,
     latency: int = 512,
@@ -61,7 +60,7 @@ def run(
 ) -> Report:
     """Edit `scenes` synthetic photos of `size` pixels in the `kinds` of ways (separated by commas).
 
-    `predictor` adds a row fitted with that predictor's maps, `without_backs` rows whose objects are open behind;
+    `predictor` adds a row fitted with that predictor's maps;
     `latency` is the size of the picture that previews and the final edit are timed on, 0 for no such rows. The report
     is written after every row.
     """
@@ -81,7 +80,7 @@ def run(
     setup(device)
     settings = {
         "scenes": scenes, "size": size, "kinds": ",".join(chosen), "predictor": predictor or None,
-        "without_backs": without_backs, "spp": spp, "truth_spp": truth_spp, "latency": latency, "seed": seed,
+        "spp": spp, "truth_spp": truth_spp, "latency": latency, "seed": seed,
         "data": None if data is None else data.name,
     }  # fmt: skip
     rows: list[dict[str, Any]] = []
@@ -90,7 +89,7 @@ def run(
     for scene in track(range(scenes), "bench edit", console=Console(stderr=True)):
         sample, other = (make_sample(scene, 0, k, size=size, data=data, seed=seed) for k in (scene, scene + 1))
         options: dict[str, Any] = {"spp": spp, "truth_spp": truth_spp, "seed": seed, "device": device}
-        for row in _edited(sample, other.envmap, chosen, predictor, without_backs, strips, options):
+        for row in _edited(sample, other.envmap, chosen, predictor, strips, options):
             rows.append({**row, "sample": sample.name})
             write(report, output)
     if latency:
@@ -101,7 +100,7 @@ def run(
 
 
 def _edited(
-    sample: SyntheticSample, light: Array, kinds: tuple[str, ...], predictor: str, without_backs: bool,
+    sample: SyntheticSample, light: Array, kinds: tuple[str, ...], predictor: str,
     strips: list[list[Array]], options: dict[str, Any],
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rows of all edits of one sample."""
@@ -114,19 +113,13 @@ def _edited(
         clock = _Clock()
         found = pipeline.invert(sample.photo, predictor=predictor, **shared)
         fitted["edit, predicted"] = (found, clock.read()["seconds"])
-    perfect = {"": true_scene(sample)}
-    if without_backs:
-        completion = "planes"
-        perfect[", w/o backs"] = true_scene(sample, completion)
-        clock = _Clock()
-        found = pipeline.invert(sample.photo, prior=sample.truth, completion=completion, **shared)
-        fitted["edit, w/o backs"] = (found, clock.read()["seconds"])
+    perfect = true_scene(sample)
     for edit in edits(sample, light, kinds):
         yield from _compared(edit, sample, perfect, fitted, strips, options)
 
 
 def _compared(
-    edit: Edit, sample: SyntheticSample, perfect: dict[str, Scene], fitted: dict[str, tuple[Scene, float]],
+    edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: dict[str, tuple[Scene, float]],
     strips: list[list[Array]], options: dict[str, Any],
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rows of one edit: untouched, the ceilings, and each fit."""
@@ -141,13 +134,12 @@ def _compared(
     shared = {"spp": spp, "seed": seed, "device": options["device"]}
     strip = [linear_to_srgb(p) for p in (sample.photo.linear, after)]
     strips.append(strip)
-    for suffix, scene in perfect.items():
-        truly = edit.change(scene)
-        best = composite(scene, truly, full_render=True, **shared)
-        strip.append(linear_to_srgb(best))
-        yield {"method": f"{CEILING} {edit.kind}{suffix}", **score(best)}
-        brought = composite(scene, truly, **shared)
-        yield {"method": f"{CEILING} {edit.kind}, composite{suffix}", **score(brought)}
+    truly = edit.change(perfect)
+    best = composite(perfect, truly, full_render=True, **shared)
+    strip.append(linear_to_srgb(best))
+    yield {"method": f"{CEILING} {edit.kind}", **score(best)}
+    brought = composite(perfect, truly, **shared)
+    yield {"method": f"{CEILING} {edit.kind}, composite", **score(brought)}
     for name, (scene, fit_seconds) in fitted.items():
         clock = _Clock()
         picture = composite(scene, edit.change(scene), **shared)

@@ -138,12 +138,12 @@ def _body(solid: shapes.Solid) -> Body:
     return Body(take(solid.vertices), solid.faces, take(solid.normals), take(solid.uv), constant(colour, 0.4, 0.0))
 
 
-def true_scene(sample: SyntheticSample, completion: str = "planes,backs") -> Scene:
+def true_scene(sample: SyntheticSample) -> Scene:
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light."""
     from materialist.geometry.build import build_geometry
 
     truth, camera = sample.truth, sample.photo.camera
-    geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion)
+    geometry = build_geometry(truth.depth, truth.normal, camera)
     return Scene(
         camera, sample.photo, truth, truth.materials, truth.normal, truth.depth, geometry, sample.envmap,
         sample.photo.linear,

@@ -32,7 +32,7 @@ depth mesh under it with the photograph, `relit` the depth mesh under another li
 `ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
 whole inversion by the default preset, light and materials, with the true maps as its prior; it and `default` end
 walls where light explains the photograph best (`--completion auto`), the ceiling does not. `w/o
-backs`: with objects open behind (`--completion planes`); `w/o planes`: without continued planes, either (`none`). `w/o
+planes`: without continued planes (`--completion none`). `w/o
 mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit and
 its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds add up all
 processors and hardly depend on what else the computer does. The first sample's hold the compilation of kernels that the
@@ -108,8 +108,8 @@ def run(
 
     `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
     begins with another light, so that small runs meet several. `completion` is that of `invert` for the methods; for
-    the paper's, `auto` is `planes,backs`. With `relight`, whole inversions with and without continued planes and backs
-    are relit. `spp` are the samples a pixel of all pictures that are compared. The report is written after every row.
+    the paper's, `auto` is `planes`. With `relight`, whole inversions with and without continued planes are relit. `spp`
+    are the samples a pixel of all pictures that are compared. The report is written after every row.
     """
     chosen = _methods(methods)
     if scenes < 1:
@@ -147,7 +147,7 @@ def _methods(names: str) -> dict[str, Method]:
     return chosen
 
 
-ADDED = {"auto": "", "planes": " w/o backs", "none": " w/o planes"}
+ADDED = {"auto": "", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
 
 
@@ -291,7 +291,7 @@ def fit(
 
 def _all(completion: str) -> str:
     """What `auto` adds where nothing speaks against it."""
-    return "planes,backs" if completion == "auto" else completion
+    return "planes" if completion == "auto" else completion
 
 
 def _neutral(materials: Materials) -> Materials:

@@ -60,7 +60,9 @@ def invert(
     envmap_size: Annotated[str, typer.Option(metavar="WxH", help="Size of the environment map.")] = "512x256",
     completion: Annotated[
         Completion,
-        typer.Option(help="Continue planes beyond what is seen, give objects backs; auto: unless that ruins the fit."),
+        typer.Option(
+            help="Continue planes beyond what is seen; auto: unless that ruins the fit; planes,backs means planes."
+        ),
     ] = (Completion.auto),
     tau: Annotated[float, typer.Option(help="Grazing angle below which the surface is cut, degrees.")] = 6.0,
     mask: Annotated[Path | None, typer.Option(metavar="PNG", help="Region with one roughness and metallic.")] = None,

@@ -38,10 +38,11 @@ class Completion(StrEnum):
     """How what the picture does not show is continued."""
 
     auto = "auto"
+    planes = "planes"
+    floors = "floors"
+    none = "none"
     planes_backs = "planes,backs"
     floors_backs = "floors,backs"
-    planes = "planes"
-    none = "none"
 
 
 class Strategy(StrEnum):

@@ -24,7 +24,7 @@ from materialist.render.scene import RenderScene
 from materialist.render.share import Share
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
-AUTO, FULL = "auto", "planes,backs"
+AUTO, FULL = "auto", "planes"
 FINAL_PATHS = 112
 """Paths a pixel of the re-rendering that a scene is judged by: 28 camera rays, or 38 where none aims at the light,
 or under a sun as many samples."""
@@ -259,7 +259,7 @@ def prior_trust(stages: Sequence[dict]) -> float | None:
 def _left_out(before: float, after: float) -> str:
     """What a report says where completion is left out, PSNR with and without it in dB."""
     return (
-        f"Continued planes shut out light that the photo shows ({before:.1f} dB); they and the backs of objects "
+        f"Continued planes shut out light that the photo shows ({before:.1f} dB); they "
         f"were left out ({after:.1f} dB). New lights and objects will miss them; --completion {FULL} keeps them."
     )
 

@@ -76,7 +76,7 @@ def find_ends(
     if not walls:
         return None
     geometry = build_geometry(
-        prior.depth, prior.normal, camera, tau=tau, completion="planes,backs", ends=[farthest(w) for w in walls],
+        prior.depth, prior.normal, camera, tau=tau, completion="planes", ends=[farthest(w) for w in walls],
         seed=seed,
     )  # fmt: skip
     engine = TransportEngine(geometry, camera, photo, seed=seed, light_height=settings.light_grid)

@@ -130,11 +130,6 @@ def complete(
     return join(parts)
 
 
-def structural(planes: list[Plane], depth: Array, camera: Camera) -> list[Plane]:
-    """The planes that `complete` continues: floors, walls and table tops, not the flat sides of objects."""
-    return [sheet.plane for sheet in _sheets(planes, np.asarray(depth, np.float64), camera, EXTENT)]
-
-
 def _sheets(
     planes: list[Plane], depth: Array, camera: Camera, extent: float, ends: Sequence[Ends] = ()
 ) -> list[_Sheet]:

@@ -12,7 +12,6 @@ from itertools import combinations
 import numpy as np
 
 from materialist.geometry.boundary import QUAD, face_camera
-from materialist.geometry.objects import pixel_corners
 from materialist.types import Array, Mesh
 
 CREASE = 40.0
@@ -60,6 +59,15 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CR
         uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
         faces=np.concatenate([new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]).astype(np.int32),
     ))  # fmt: skip
+
+
+def pixel_corners(mesh: Mesh, surface: Array) -> Array:
+    """[H, W, 4] front vertices of each pixel's corners, read off the two faces that come first for each pixel."""
+    faces = mesh.faces[: 2 * int(surface.sum())].reshape(-1, 6)
+    corner = np.full((*surface.shape, 4), -1, np.int64)
+    # Faces of a pixel: top left, bottom left, bottom right; top left, bottom right, top right.
+    corner[surface] = faces[:, [0, 5, 1, 2]]
+    return corner
 
 
 def _tidy(mesh: Mesh) -> Mesh:

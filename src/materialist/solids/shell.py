@@ -47,12 +47,3 @@ def cavities(shell: Shell) -> int:
     p, q, r = (shell.vertices[k].astype(np.float64) - shell.vertices.mean(0) for k in (a, b, c))
     volume = np.bincount(number[a], np.einsum("ij,ij->i", p, np.cross(q, r)) / 6)
     return int((volume < 0).sum())
-
-
-def vertex_normals(vertices: Array, faces: Array) -> Array:
-    """[V, 3] float32 unit normals, the area-weighted mean of the faces around each vertex."""
-    corner = vertices[faces]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    ids = faces.ravel()
-    total = np.stack([np.bincount(ids, np.repeat(area[:, k], 3), len(vertices)) for k in range(3)], -1)
-    return (total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-30)).astype(np.float32)
