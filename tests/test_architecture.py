@@ -42,7 +42,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": set(),
     "batches": SCENE | OPERATIONS | {"edits", "edits.composite", "jobs", "pipeline", "predict"},
     "studio": SCENE | OPERATIONS | {"edits", "edits.composite", "exporters", "jobs", "pipeline"},
-    "procedural": SCENE,
+    "procedural": SCENE | {"predict"},
     "train": {"io", "render", "predict", "procedural"},
     "bench": SCENE
     | OPERATIONS
@@ -50,12 +50,23 @@ MAY_IMPORT: dict[str, set[str]] = {
     "doctor": {"predict", "render"},
     "cli": SCENE
     | OPERATIONS
-    | {"edits", "edits.composite", "batches", "bench", "doctor", "exporters", "pipeline", "predict", "studio", "train"},
+    | {
+        "edits",
+        "edits.composite",
+        "batches",
+        "bench",
+        "doctor",
+        "exporters",
+        "pipeline",
+        "predict",
+        "procedural",
+        "studio",
+        "train",
+    },
     "__main__": {"cli"},
 }
 """Package -> the packages it may import beside the nouns; docs/architecture.md draws this table."""
 NOT_YET: set[tuple[str, str]] = {
-    ("bench", "train"),
     ("bsdf", "transport"),
     ("edits.composite", "edits.glass"),
     ("edits.composite", "edits.insert"),

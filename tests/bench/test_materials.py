@@ -13,11 +13,11 @@ from materialist.bench.predictor import forward, timed
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
+from materialist.metrics.lpips import lpips
 from materialist.predict.bundled.network import Architecture, BundledNetwork
 from materialist.predict.normals import normals_from_depth
+from materialist.procedural.dataset import CONTENT, options_for, read_description
 from materialist.procedural.sample import make_sample
-from materialist.train.lpips import lpips
-from materialist.train.produce import CONTENT, options_for, read_description
 from materialist.types import Camera
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import torch
 
+from materialist.io.samples import SampleFolder
 from materialist.train.budget import Budget
 from materialist.train.launch import Processes, join
 from materialist.train.recipes import recipe
-from materialist.train.samples import SampleFolder
 from materialist.train.tasks import BundledTask
 from materialist.train.trainer import Habits, Trainer
 

@@ -6,8 +6,8 @@ import made_samples
 import numpy as np
 import pytest
 
+from materialist.io.samples import read_sample
 from materialist.train import augment
-from materialist.train.samples import read_sample
 
 
 @pytest.fixture

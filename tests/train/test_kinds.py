@@ -7,11 +7,11 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.procedural.thickness import dataset as lessons
 from materialist.train import checkpoint, small
 from materialist.train.budget import Budget
 from materialist.train.clicks import trainer as clicks
 from materialist.train.export import export_run
-from materialist.train.refraction import lessons
 from materialist.train.refraction import trainer as refraction
 
 

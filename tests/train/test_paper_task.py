@@ -6,11 +6,11 @@ import pytest
 import torch
 
 from materialist.errors import WeightsError
+from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet, Size
 from materialist.train import tasks
 from materialist.train.paper_task import PaperTask, freeze, load_start
 from materialist.train.recipes import recipe
-from materialist.train.samples import SampleFolder
 from materialist.train.stream import epoch
 
 TINY = Size(width=12, blocks=4, heads=2, layers=(0, 1, 2, 3), pyramid=(8, 8, 8, 8), fused=8, grid=4)

@@ -13,6 +13,7 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.io.samples import SampleFolder
 from materialist.predict.bundled import weights
 from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
 from materialist.predict.bundled.predictor import BundledPredictor
@@ -21,7 +22,6 @@ from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
 from materialist.train.export import export_run
 from materialist.train.recipes import recipe
-from materialist.train.samples import SampleFolder
 from materialist.train.tasks import BundledTask, relative_log_depth
 from materialist.train.trainer import CURVE, SCORES, Habits
 

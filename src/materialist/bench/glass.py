@@ -255,7 +255,7 @@ def masked_ssim(a: Array, b: Array, mask: Array) -> float:
 
 
 def _lpips(a: Array, b: Array, mask: Array) -> float | None:
-    from materialist.train.lpips import lpips
+    from materialist.metrics.lpips import lpips
 
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]

@@ -109,7 +109,7 @@ def _turned(index: int, seed: int) -> Thing:
 def _free(index: int, seed: int) -> Thing:
     """A lumpy or twisted body."""
     from materialist.procedural.objects import solids
-    from materialist.train.refraction.glassware import centred
+    from materialist.procedural.objects.glassware import centred
 
     rng = np.random.default_rng([seed, 8, index])
     if index % 2:
@@ -202,7 +202,7 @@ class GlassScene:
 
 def seen(solid: Solid, camera: Camera) -> Front:
     """What the camera sees of a mesh in its frame."""
-    from materialist.train.refraction.paths import Tracer, towards
+    from materialist.procedural.thickness.ray_paths import Tracer, towards
 
     rays = pixel_rays(camera)
     shape = rays.shape[:2]

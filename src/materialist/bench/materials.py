@@ -114,7 +114,7 @@ def run(
         add(data, "", limit)
         settings |= lost(data, split)
     if count:
-        from materialist.train.produce import CONTENT
+        from materialist.procedural.dataset import CONTENT
 
         settings["procedural content"] = CONTENT["heldout"]
         with tempfile.TemporaryDirectory() as place:
@@ -125,7 +125,7 @@ def run(
 
 def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmaps: str, device: str) -> Path:
     """A new set of held-out procedural pictures; see `train.data.produce`."""
-    from materialist.train.produce import options_for, produce
+    from materialist.procedural.dataset import options_for, produce
 
     options = options_for(
         size=size, seed=seed, split="heldout", device=device, meshes=Path(meshes) if meshes else None,
@@ -137,7 +137,7 @@ def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmap
 
 def lost(data: Path, split: str) -> dict[str, Any]:
     """How many scenes of an InteriorVerse split are not there, and how many pictures have been scored without them."""
-    from materialist.train.interiorverse import InteriorVerse, is_interiorverse
+    from materialist.io.interiorverse import InteriorVerse, is_interiorverse
 
     if photo_folders(data) or not is_interiorverse(data):
         return {}
@@ -169,9 +169,9 @@ def _samples(
     if folders:
         yield from ((folder.name, partial(_read_folder, folder)) for folder in _spread(folders, limit))
         return
-    from materialist.train.samples import SampleFolder
-    from materialist.train.sources import open_source
-    from materialist.train.tasks import as_photo
+    from materialist.io.datasets import open_source
+    from materialist.io.samples import SampleFolder
+    from materialist.procedural.photographic import as_photo
 
     source = open_source(data, split=split)
     procedural = isinstance(source, SampleFolder)
@@ -230,7 +230,7 @@ def _spread(things: list, limit: int) -> list:
 def _scored(source: Any, photo: Photo, truth: Prediction, seed: int) -> tuple[Prediction, dict[str, float]]:
     """The prediction and its figures."""
     from materialist.bench.predictors import predicted
-    from materialist.train.scores import ordinal_accuracy, score
+    from materialist.metrics.maps import ordinal_accuracy, score
 
     prediction, seconds = predicted(source, photo, seed)
     found = score(prediction, truth)
@@ -245,8 +245,8 @@ def _scored(source: Any, photo: Photo, truth: Prediction, seed: int) -> tuple[Pr
 
 def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, float]:
     """LPIPS of albedo (after one factor), roughness and metallic over the true surface, where it is installed."""
-    from materialist.train.lpips import lpips
-    from materialist.train.scores import best_scale
+    from materialist.metrics.lpips import lpips
+    from materialist.metrics.maps import best_scale
 
     scale = np.float32(best_scale(found.albedo, true.albedo, surface))
     pairs = {"albedo": (found.albedo * scale, true.albedo)}
@@ -260,7 +260,7 @@ def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, 
 
 def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The rows with the pooled PSNRs of their method, the same in each, so that the table of means shows them."""
-    from materialist.train.scores import summary
+    from materialist.metrics.maps import summary
 
     figures = ("roughness_psnr_pooled", "metallic_psnr_pooled")
     pooled = {}
@@ -272,6 +272,6 @@ def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _draw(lines: list[list], path: Path) -> None:
     """Each picture with the maps of every predictor under each other, the truth last."""
-    from materialist.train.sheets import strip, write_sheet
+    from materialist.io.map_sheet import strip, write_sheet
 
     write_sheet([strip(image, *predictions) for image, *predictions in lines], path)

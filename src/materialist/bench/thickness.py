@@ -39,10 +39,10 @@ def run(
         raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
     from materialist.predict.refraction import WEIGHTS
     from materialist.predict.refraction.weights import load
+    from materialist.procedural.thickness.dataset import Plan
+    from materialist.procedural.thickness.dataset import views as lessons_of
+    from materialist.procedural.thickness.errors import of_meshes
     from materialist.render.variant import setup
-    from materialist.train.refraction.lessons import Plan
-    from materialist.train.refraction.lessons import views as lessons_of
-    from materialist.train.refraction.scores import of_meshes
 
     setup("cpu")
     network, _ = load(Path(weights) if weights else WEIGHTS)
@@ -59,7 +59,7 @@ def run(
 
 def _rows(group: str, name: str, network: Any, lessons: dict[str, Array]) -> list[dict[str, Any]]:
     """A row a view for the network and for the prior."""
-    from materialist.train.refraction.scores import errors
+    from materialist.procedural.thickness.errors import errors
 
     each = errors(network, lessons)
     rows = []

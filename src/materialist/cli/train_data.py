@@ -48,14 +48,14 @@ def data(
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
     if sheet is not None:
         from materialist.io.image import ensure_image_writable
-        from materialist.train.sheet import write_sheet
+        from materialist.procedural.sheet import write_sheet
 
         ensure_image_writable(sheet, force=force)
         shown = write_sheet(output, sheet, seed=seed)
         report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
     from materialist.cli.progress import StageProgress
-    from materialist.train.produce import options_for, produce
+    from materialist.procedural.dataset import options_for, produce
 
     options = options_for(
         size=size,

@@ -72,9 +72,9 @@ def matnet(
     budget = Budget(steps=steps, minutes=minutes)
     chosen = recipe(config.value, batch=batch, size=size, rate=rate)
     from materialist.cli.progress import StageProgress
+    from materialist.io.datasets import open_sources
     from materialist.train import checkpoint
     from materialist.train.launch import join
-    from materialist.train.sources import open_sources
     from materialist.train.tasks import task
     from materialist.train.trainer import Habits, Trainer
 

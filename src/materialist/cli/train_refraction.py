@@ -53,7 +53,7 @@ def refraction(
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
     from materialist.cli.progress import StageProgress
-    from materialist.train.refraction.lessons import Plan, produce
+    from materialist.procedural.thickness.dataset import Plan, produce
 
     note = (lambda _: None) if as_json else lambda text: typer.echo(text, err=True)
     folder = data or output / "views"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance, srgb_to_linear
+from materialist.io.samples import Sample
 from materialist.types import Array
 
 
@@ -26,6 +29,11 @@ def photographic(image: Array, rng: np.random.Generator) -> Array:
     picture = _vignetted(_blurred(np.minimum(picture, 8), rng), rng)
     picture = _noisy(picture, rng)
     return srgb_to_linear(_compressed(_developed(picture, rng), rng))
+
+
+def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
+    """The sample with its picture as `photographic` makes it, without its shading, which no longer fits."""
+    return replace(sample, image=np.clip(photographic(sample.image, rng), 0, 1).astype(np.float32), shading=None)
 
 
 def white_balanced(image: Array, rng: np.random.Generator) -> Array:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from materialist.camera import rays_at
-from materialist.train.samples import Sample
+from materialist.io.samples import Sample
 from materialist.types import Array
 
 LEAST_CROP = 0.55

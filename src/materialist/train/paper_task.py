@@ -11,15 +11,15 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.errors import WeightsError
+from materialist.io.samples import Sample
+from materialist.metrics.lpips import backbone
 from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.weights import read_state
 from materialist.train import augment, losses
-from materialist.train.lpips import backbone
 from materialist.train.recipes import Recipe
-from materialist.train.samples import Sample
 from materialist.train.tasks import Batch
 from materialist.types import Materials, Prediction
 

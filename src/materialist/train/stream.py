@@ -13,7 +13,7 @@ import torch
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from materialist.errors import InputError
-from materialist.train.samples import Sample, Source
+from materialist.io.samples import Sample, Source
 from materialist.train.tasks import Task, tensors
 
 ATTEMPTS = 4

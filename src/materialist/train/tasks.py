@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,12 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from materialist.io.samples import Sample
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
+from materialist.procedural.photographic import as_photo
 from materialist.train import losses, start
 from materialist.train.augment import augment
 from materialist.train.recipes import Recipe
-from materialist.train.samples import Sample
 from materialist.types import Prediction
 
 Batch = Mapping[str, Tensor]
@@ -44,13 +44,6 @@ class Task(Protocol):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps of a sample that is a photograph already."""
         ...
-
-
-def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
-    """The sample with its picture seen through a camera: tone, noise, blur, JPEG; linear again, in [0, 1]."""
-    from materialist.procedural.photographic import photographic
-
-    return replace(sample, image=np.clip(photographic(sample.image, rng), 0, 1).astype(np.float32), shading=None)
 
 
 def tensors(sample: Sample) -> dict[str, Tensor]:
@@ -140,4 +133,4 @@ def task(recipe: Recipe, options: dict[str, Any] | None = None) -> Task:
     return BundledTask(**(options or {}))
 
 
-__all__ = ["Batch", "BundledTask", "Task", "as_photo", "relative_log_depth", "task", "tensors"]
+__all__ = ["Batch", "BundledTask", "Task", "relative_log_depth", "task", "tensors"]

@@ -10,16 +10,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from materialist.errors import InputError
+from materialist.io.map_sheet import strip, write_sheet
+from materialist.io.samples import Sample, Source
+from materialist.metrics.maps import score, summary
+from materialist.procedural.photographic import as_photo
 from materialist.train import checkpoint, stream
 from materialist.train.budget import Budget, Clock
 from materialist.train.ending import Ending
 from materialist.train.launch import Processes
 from materialist.train.recipes import Recipe
-from materialist.train.samples import Source
 from materialist.train.tasks import Batch, Task
 
 KIND = "matnet"
@@ -29,6 +33,8 @@ CURVE = "curve.jsonl"
 SCORES = "scores.jsonl"
 """Figures on the samples kept aside, at every checkpoint; `of` says so, or that there were too few to keep any."""
 REPORT_STEPS = 20
+ROWS = 6
+"""Samples that the sheet shows."""
 KEPT_ASIDE, TRAINED_ON = "samples kept aside", "samples trained on"
 
 Note = Callable[[str], None]
@@ -49,6 +55,20 @@ class Habits:
         for option, number in (("workers", self.workers), ("score-samples", self.score_samples)):
             if number < 0:
                 raise InputError(f"--{option} is {number}; give 0 or more.")
+
+
+def score_and_draw(task: Task, network: nn.Module, samples: list[Sample], path: Path) -> dict[str, float]:
+    """Mean figures of the network on `samples`, seen as photographs (always the same ones), and a sheet at `path`."""
+    rows, strips = [], []
+    with torch.inference_mode():
+        for k, sample in enumerate(samples):
+            photo = as_photo(sample, np.random.default_rng((7, k)))
+            predicted = task.predict(network, photo)
+            rows.append(score(predicted, photo.truth()))
+            if k < ROWS:
+                strips.append(strip(photo.image, predicted, photo.truth()))
+    write_sheet(strips, path)
+    return summary([row for row in rows if row])
 
 
 class Trainer:
@@ -139,8 +159,6 @@ class Trainer:
         """
         if not self.habits.score_samples:
             return {}
-        from materialist.train.sheets import score_and_draw
-
         samples = stream.kept_aside(self.source, self.habits.score_samples)
         if not samples:
             self.note("No sample that is kept aside can be read: no figures.")

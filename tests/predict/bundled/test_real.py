@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from materialist.io.photo import read_photo
+from materialist.metrics.maps import depth_figures, ordinal_accuracy
 from materialist.predict import resample
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.maps import MapsPredictor
-from materialist.train.scores import depth_figures, ordinal_accuracy
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 MOTORCYCLE = DATA / "photos" / "indoor" / "motorcycle_garage.png"

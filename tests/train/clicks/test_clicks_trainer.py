@@ -121,7 +121,7 @@ def test_bad_input(tmp_path, folder):
 
 
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
-    from materialist.train.produce import options_for, produce
+    from materialist.procedural.dataset import options_for, produce
 
     data = tmp_path / "set"
     produce(data, options_for(size=64, seed=11, spp=4, device="cpu"), count=2)
@@ -142,7 +142,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
 
 
 def test_views_of_another_set_are_refused(tmp_path):
-    from materialist.train.produce import options_for, produce
+    from materialist.procedural.dataset import options_for, produce
 
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):

@@ -15,9 +15,11 @@ from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError, OutputError
 from materialist.predict.refraction import weights
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.procedural.thickness import dataset as lessons
+from materialist.procedural.thickness import errors as scores
 from materialist.train import checkpoint
 from materialist.train.budget import Budget
-from materialist.train.refraction import lessons, scores, trainer
+from materialist.train.refraction import trainer
 from materialist.train.refraction.trainer import Recipe, Trainer
 
 RECIPE = Recipe(batch=4, warm_up=1, side=32, rate=1e-3)

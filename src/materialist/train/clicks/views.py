@@ -12,10 +12,10 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
+from materialist.io.samples import SampleFolder, read_arrays, read_sample, write_arrays
 from materialist.predict.clicks.features import features
 from materialist.predict.weights import sha256
-from materialist.train.produce import identity
-from materialist.train.samples import SampleFolder, read_arrays, read_sample, write_arrays
+from materialist.procedural.dataset import identity
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]

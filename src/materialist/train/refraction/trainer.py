@@ -16,10 +16,10 @@ from materialist.errors import InputError
 from materialist.predict.refraction import weights
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import STRIDE, RefractionNet
+from materialist.procedural.thickness import dataset as lessons
+from materialist.procedural.thickness.errors import score
 from materialist.train import small
 from materialist.train.budget import Budget
-from materialist.train.refraction import lessons
-from materialist.train.refraction.scores import score
 from materialist.types import Array
 
 SOFT = (0.05, 0.02)

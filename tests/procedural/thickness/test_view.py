@@ -8,9 +8,10 @@ import pytest
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.procedural.objects import solids
-from materialist.train.refraction import lessons, view
-from materialist.train.refraction.glassware import Shape, shape
-from materialist.train.refraction.paths import Tracer
+from materialist.procedural.objects.glassware import Shape, shape
+from materialist.procedural.thickness import dataset as lessons
+from materialist.procedural.thickness import view
+from materialist.procedural.thickness.ray_paths import Tracer
 
 
 @pytest.mark.parametrize("index", range(20))

@@ -16,10 +16,10 @@ import pytest
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError, OutputError
 from materialist.procedural import heldout
+from materialist.procedural.dataset import options_for, produce, read_description, sample_path
 from materialist.procedural.objects import things
 from materialist.procedural.sample import ATTEMPTS, make_sample, make_world
-from materialist.train.produce import options_for, produce, read_description, sample_path
-from materialist.train.sheet import write_sheet
+from materialist.procedural.sheet import write_sheet
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 SIZE = 32

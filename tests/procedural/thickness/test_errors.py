@@ -6,7 +6,7 @@ import trimesh
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import MASK
-from materialist.train.refraction.scores import of_meshes
+from materialist.procedural.thickness.errors import of_meshes
 
 
 def test_views_of_a_ball_have_the_chords_of_a_ball(tmp_path):

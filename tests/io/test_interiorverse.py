@@ -6,9 +6,9 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
+from materialist.io.datasets import open_source, open_sources
 from materialist.io.exr import write_exr
-from materialist.train.interiorverse import InteriorVerse
-from materialist.train.sources import open_source, open_sources
+from materialist.io.interiorverse import InteriorVerse
 from materialist.types import Camera
 
 

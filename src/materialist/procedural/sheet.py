@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError, OutputError
-from materialist.train.samples import read_arrays
+from materialist.io.samples import read_arrays
 from materialist.types import Array
 
 COLUMNS = ("image", "albedo", "roughness", "metallic", "normal", "depth", "shading")

@@ -1,41 +1,22 @@
-"""Sample sheets: what the network says of pictures that it was not trained on, beside the truth."""
+"""A sheet of predicted maps beside the true ones."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
-import torch
-from torch import nn
 
 from materialist.color import linear_to_srgb
-from materialist.train.samples import Sample
-from materialist.train.scores import score, summary
-from materialist.train.tasks import Task, as_photo
 from materialist.types import Array, Prediction
 
 SIDE = 144
 """Pixels of a picture's longer side in the sheet."""
-ROWS = 6
-
-
-def score_and_draw(task: Task, network: nn.Module, samples: list[Sample], path: Path) -> dict[str, float]:
-    """Mean figures of the network on `samples`, seen as photographs (always the same ones), and a sheet at `path`."""
-    rows, strips = [], []
-    with torch.inference_mode():
-        for k, sample in enumerate(samples):
-            photo = as_photo(sample, np.random.default_rng((7, k)))
-            predicted = task.predict(network, photo)
-            rows.append(score(predicted, photo.truth()))
-            if k < ROWS:
-                strips.append(strip(photo.image, predicted, photo.truth()))
-    write_sheet(strips, path)
-    return summary([row for row in rows if row])
 
 
 def strip(image: Array, *predictions: Prediction) -> Array:
     """The picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
+    import cv2
+
     lines = [np.concatenate([linear_to_srgb(image), *maps_of(p)], 1) for p in predictions]
     joined = np.concatenate(lines, 0)
     factor = SIDE / max(image.shape[:2])
@@ -63,6 +44,8 @@ def nearness(depth: Array) -> Array:
 
 def write_sheet(strips: list[Array], path: Path) -> None:
     """Strips under each other as a PNG, written whole or not at all."""
+    import cv2
+
     if not strips:
         return
     wide = max(s.shape[1] for s in strips)

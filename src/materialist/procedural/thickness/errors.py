@@ -8,10 +8,10 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
+from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
-from materialist.train.refraction.glassware import Shape, centred
-from materialist.train.refraction.paths import Tracer
-from materialist.train.refraction.view import lesson
+from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.view import lesson
 from materialist.types import Array
 
 THIN = 0.05

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.train.scores import depth_figures, ordinal_accuracy, score, summary
+from materialist.metrics.maps import depth_figures, ordinal_accuracy, score, summary
 from materialist.types import Materials, Prediction
 
 

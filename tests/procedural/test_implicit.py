@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.train.refraction.grown import creature, surface
+from materialist.procedural.objects.implicit import creature, surface
 
 
 def volume(solid):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from materialist.procedural.objects import shapes, solids
-from materialist.train.refraction.paths import Tracer
+from materialist.procedural.thickness.ray_paths import Tracer
 
 RADIUS = 0.5
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError, OutputError
-from materialist.train.refraction.glassware import SPLITS, shape
-from materialist.train.refraction.paths import Tracer
-from materialist.train.refraction.view import lesson
-from materialist.train.samples import read_arrays, write_arrays
+from materialist.io.samples import read_arrays, write_arrays
+from materialist.procedural.objects.glassware import SPLITS, shape
+from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.view import lesson
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]

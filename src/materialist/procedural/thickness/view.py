@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
-from materialist.train.refraction.glassware import Shape
-from materialist.train.refraction.paths import Paths, Tracer, towards
+from materialist.procedural.objects.glassware import Shape
+from materialist.procedural.thickness.ray_paths import Paths, Tracer, towards
 from materialist.types import Array
 
 LEAST_PIXELS = 0.02

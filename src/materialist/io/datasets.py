@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from materialist.errors import InputError
-from materialist.train.interiorverse import InteriorVerse, is_interiorverse
-from materialist.train.samples import Sample, SampleFolder, Source
+from materialist.io.interiorverse import InteriorVerse, is_interiorverse
+from materialist.io.samples import Sample, SampleFolder, Source
 
 
 def open_source(folder: str | Path, *, split: str = "train") -> Source:

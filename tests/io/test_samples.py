@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.train.samples import SampleFolder, read_sample
-from materialist.train.sources import open_source, open_sources
+from materialist.io.datasets import open_source, open_sources
+from materialist.io.samples import SampleFolder, read_sample
 
 
 def test_a_sample_in_our_conventions(tmp_path):

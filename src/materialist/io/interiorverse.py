@@ -23,7 +23,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.io.exr import read_exr
-from materialist.train.samples import Sample
+from materialist.io.samples import Sample
 from materialist.types import Array, Camera
 
 SPLITS = ("train", "val", "test")

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from materialist.procedural.objects import shapes, solids
+from materialist.procedural.objects.implicit import creature
 from materialist.procedural.objects.shapes import Solid
-from materialist.train.refraction.grown import creature
 from materialist.types import Array
 
 SPLITS = {"train": 71, "heldout": 72}
