@@ -20,3 +20,24 @@ def texel_directions(height: int, width: int) -> Array:
     return np.stack(
         np.broadcast_arrays(np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)), -1
     ).astype(np.float32)
+
+
+def environment(direction: Array, envmap: Array) -> Array:
+    """[N, 3] bilinear lookup of an envmap [h, 2h, 3] in unit directions [N, 3]."""
+    height, width = envmap.shape[:2]
+    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * width
+    y = np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * height
+    wrapped = np.concatenate([envmap[:, -1:], envmap, envmap[:, :1]], 1)
+    return bilinear(wrapped, np.stack([x + 1, y], -1))
+
+
+def bilinear(picture: Array, place: Array) -> Array:
+    """[N, C] values of a picture [H, W, C] at pixel positions [N, 2] (x right, y down); the edge goes on outside."""
+    height, width = picture.shape[:2]
+    x = np.clip(np.nan_to_num(place[:, 0]) - 0.5, 0, width - 1)
+    y = np.clip(np.nan_to_num(place[:, 1]) - 0.5, 0, height - 1)
+    x0, y0 = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
+    x1, y1 = np.minimum(x0 + 1, width - 1), np.minimum(y0 + 1, height - 1)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
+    return top * (1 - fy) + (picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx) * fy

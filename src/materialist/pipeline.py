@@ -154,7 +154,7 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
 
     `spp` counts camera rays a pixel. Denoising is for pictures only.
     """
-    from materialist.edits.light.lights import rendered
+    from materialist.edits.core.renderer import rendered
 
     if spp < 1:
         raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")

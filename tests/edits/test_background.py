@@ -65,13 +65,13 @@ def test_what_was_put_before_it_stays_whole(native):
     from test_composite import tetrahedron
 
     from materialist.edits.composite.composite import developed
-    from materialist.edits.light.lights import Studio
+    from materialist.edits.core.renderer import EditRenderer
 
     scene = rendered_scene(native)
     red = replace(scene, bodies=(tetrahedron(),))
     saved = developed(scene, red, composite(scene, red, spp=16))
-    studio, size = Studio(saved), saved.photo.original.shape[:2]
-    here, there = studio.bodies_seen(saved), studio.bodies_in(saved, size, (0, size[0], 0, size[1]))
+    studio, size = EditRenderer(saved), saved.photo.original.shape[:2]
+    here, there = studio.body_coverage(saved), studio.body_coverage_in(saved, size, (0, size[0], 0, size[1]))
     mask = block_mask(36, 48)
     mask |= (here > 0) & (np.arange(48) < np.median(np.nonzero(here)[1]))
     assert (here[mask] == 1).sum() > 10
@@ -338,8 +338,8 @@ def test_under_a_body_nothing_of_the_photo_is_left(native):
 
 
 def test_glass_goes_on_under_the_rim_of_what_stands_before_it():
+    from materialist.edits.composite.native_layer import NativeLayer
     from materialist.edits.composite.revealed import RIM, _under
-    from materialist.edits.insert.portrait import Portrait
 
     covered = np.zeros((20, 30), bool)
     covered[:, :12] = True
@@ -347,7 +347,7 @@ def test_glass_goes_on_under_the_rim_of_what_stands_before_it():
     inside[5:15, 10:25] = 1
     covered &= inside == 0
     shown = np.where(covered[..., None], 0.2, np.where(inside[..., None] > 0, 9, 0.7)).astype(np.float32)
-    more, under = _under(Portrait(inside, inside, shown), covered, shown)
+    more, under = _under(NativeLayer(inside, inside, shown), covered, shown)
     assert more[6:14, 10:12].all() and not more[6:14, 10 + int(RIM) : 21].any()
     np.testing.assert_array_equal(under[more], np.full((more.sum(), 1), np.float32(0.2)))
     np.testing.assert_array_equal(under[~more], shown[~more])
@@ -358,8 +358,8 @@ def test_what_is_revealed_has_glass_under_the_rim_of_what_stands_before_it():
     from types import SimpleNamespace
 
     from materialist.edits.composite.layers import Layers
+    from materialist.edits.composite.native_layer import NativeLayer
     from materialist.edits.composite.revealed import revealed
-    from materialist.edits.insert.portrait import Portrait
 
     scene = rendered_scene()
     removed = without(scene, MASK)
@@ -369,8 +369,8 @@ def test_what_is_revealed_has_glass_under_the_rim_of_what_stands_before_it():
     covered = MASK & (inside == 0)
     glass = np.where(covered[..., None], np.float32([0.1, 0.6, 0.2]), base).astype(np.float32)
     everywhere = np.ones(MASK.shape, bool)
-    portrait = Portrait(inside, inside, np.zeros_like(base))
-    layers = Layers(base, glass, everywhere, MASK, glass, portrait=portrait, covered=covered)
+    portrait = NativeLayer(inside, inside, np.zeros_like(base))
+    layers = Layers(base, glass, everywhere, MASK, glass, native=portrait, covered=covered)
     studio = SimpleNamespace(scene=scene, photo_lights=lambda edited: ~everywhere)
     photo, found = revealed(studio, removed, layers, spp=1)
     for picture in (found.base, found.edited, photo.linear):
@@ -381,7 +381,7 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
     from materialist.edits.composite.composite import into_photo
     from materialist.edits.composite.layers import Layers
-    from materialist.edits.insert.portrait import Portrait
+    from materialist.edits.composite.native_layer import NativeLayer
 
     photo = rendered_scene(4).photo
     shape = photo.linear.shape[:2]
@@ -394,7 +394,7 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
     base = np.full_like(grey.linear, 0.6)
     edited = np.where(inside[..., None] > 0, 5, 0.3).astype(np.float32)  # all in shade, but for the body
-    layers = Layers(base, edited, everywhere, changed, edited, portrait=Portrait(inside, share, 0 * grey.original))
+    layers = Layers(base, edited, everywhere, changed, edited, native=NativeLayer(inside, share, 0 * grey.original))
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
 

@@ -46,7 +46,7 @@ def test_the_network_is_believed_where_it_is_sure(table, monkeypatch, sure):
     scene, first, _ = table
     half = first & (np.indices(first.shape)[1] < 50)
     share = np.where(half, 0.95 if sure else 0.55, 0.02 if sure else 0.4).astype(np.float32)
-    monkeypatch.setattr("materialist.edits.select.select.likely", lambda scene, points: share * (first | half))
+    monkeypatch.setattr(boxes, "likely", lambda scene, points: share * (first | half))
     seen = []
     monkeypatch.setattr(boxes, "grabcut", lambda scene, label, rounds: seen.append(label) or label == boxes.PROBABLE)
     found = in_box(scene, around(first, 6))
@@ -56,7 +56,7 @@ def test_the_network_is_believed_where_it_is_sure(table, monkeypatch, sure):
 def test_what_ends_outside_of_the_box_is_not_meant(table, monkeypatch):
     scene, first, _ = table
     everywhere = np.ones(first.shape, np.float32)
-    monkeypatch.setattr("materialist.edits.select.select.likely", lambda scene, points: everywhere)
+    monkeypatch.setattr(boxes, "likely", lambda scene, points: everywhere)
     np.testing.assert_array_equal(in_box(scene, around(first, 6)), in_box(scene, around(first, 6), network=False))
 
 

@@ -7,9 +7,10 @@ import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.camera import project
+from materialist.edits.composite import composite as composites
 from materialist.edits.composite.composite import FLOOR, _calmed, composite, developed, into_photo, pictures
 from materialist.edits.composite.layers import Layers, difference, significance, texture_held
-from materialist.edits.light.lights import Studio
+from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
@@ -51,7 +52,7 @@ def test_the_edit_is_the_rendering_where_the_fit_is_the_photo():
     scene = rendered_scene()
     edited = edit(scene, MASK, albedo=(0.1, 0.2, 0.05))
     out = composite(scene, edited, spp=96, seed=4, denoise=False)
-    expected = Studio(edited).twins(edited)[0](384, 9)
+    expected = EditRenderer(edited).pair(edited)[0](384, 9)
     inner = MASK.copy()
     inner[:-1] &= MASK[1:]
     inner[1:] &= MASK[:-1]
@@ -157,7 +158,7 @@ def test_the_rim_of_a_lamp_that_the_photo_shows_takes_no_colour_under_another_li
 def test_both_sides_use_the_same_tracer_under_a_lamp():
     scene = rendered_scene()
     lit = relight(scene, lamps=[lamp(scene, 30, 10, 2.5, 3000, 1e-6)])
-    base, edited = Studio(scene).twins(lit)
+    base, edited = EditRenderer(scene).pair(lit)
     # A lamp of no power leaves the light alone; only its little sphere is new.
     same = np.isclose(base(16, 2), edited(16, 2), rtol=0.2, atol=0.02).all(-1)
     assert same.mean() > 0.6
@@ -167,7 +168,7 @@ def test_full_render_is_the_plain_picture():
     scene = rendered_scene()
     edited = edit(scene, MASK, roughness=0.2)
     plain = composite(scene, edited, spp=12, seed=3, full_render=True, denoise=False)
-    np.testing.assert_array_equal(plain, Studio(scene).twins(edited)[1](12, 3))
+    np.testing.assert_array_equal(plain, EditRenderer(scene).pair(edited)[1](12, 3))
 
 
 def test_many_edits_render_the_base_once():
@@ -202,7 +203,7 @@ def test_a_body_that_is_put_in_is_seen_and_nothing_far_from_it_changes():
     scene = rendered_scene(1)
     body = tetrahedron()
     out = composite(scene, replace(scene, bodies=(body,)), spp=12)
-    seen = Studio(scene).covered(replace(scene, bodies=(body,)))
+    seen = EditRenderer(scene).covered(replace(scene, bodies=(body,)))
     assert 10 < seen.sum() < 400
     assert (out[seen] != scene.photo.original[seen]).any(-1).all()
     np.testing.assert_array_equal(composite(scene, replace(scene, bodies=()), spp=6), scene.photo.original)
@@ -338,3 +339,13 @@ def test_the_rim_of_what_is_brighter_than_white_is_as_soft_as_the_photo_s(hdr):
         expected = share * 1 + (1 - share) * right
         assert np.abs(out[20:40] - expected)[:, 31:34].max() < 0.25 and (out[20:40, :26] > 1).all()
     np.testing.assert_array_equal(out[:, 44:], original[:, 44:])
+
+
+def test_frames_that_are_alike_are_rendered_once(monkeypatch):
+    asked = []
+    scene = flat_scene()
+    monkeypatch.setattr(composites, "render_layers", lambda _, edited, **__: asked.append(edited))
+    monkeypatch.setattr(composites, "_finished", lambda *_, **__: len(asked))
+    a, b, c = (relight(scene, rotate=angle) for angle in (10, 20, 30))
+    assert list(pictures(scene, [a, a, b, b, b, c])) == [1, 1, 2, 2, 2, 3]
+    assert len(asked) == 3

@@ -7,16 +7,15 @@ import pytest
 import trimesh
 from made_meshes import box_file, floor_scene
 
+from materialist.edits.core.topology import volume
 from materialist.edits.drop.convex import convex_pieces, thinned
 from materialist.edits.drop.drop import METRES, down, drop, upright
 from materialist.edits.drop.drop_ground import Surroundings
 from materialist.edits.drop.ground import Field, blocks
 from materialist.edits.drop.physics import GRAVITY, Thing, fall
 from materialist.edits.insert.insert import extent, insert
-from materialist.edits.insert.mesh_shape import volume
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import support_at
-from materialist.edits.light import film
 from materialist.errors import InputError
 
 pytest.importorskip("mujoco")
@@ -261,11 +260,3 @@ def test_thinning_keeps_the_shape():
     v, f = thinned(np.asarray(ball.vertices), np.asarray(ball.faces))
     assert len(f) < len(ball.faces)
     np.testing.assert_allclose(volume(v, f), 4 / 3 * np.pi, rtol=0.02)
-
-
-def test_frames_that_are_alike_are_rendered_once(monkeypatch):
-    asked = []
-    monkeypatch.setattr(film, "pictures", lambda scene, edits, **_: (asked.append(e) or e for e in edits))
-    last = [None]
-    assert list(film.filmed(None, ["a", "a", "b", "b", "b", "c"], last=last)) == ["a", "a", "b", "b", "b", "c"]
-    assert asked == ["a", "b", "c"] and last == ["c"]

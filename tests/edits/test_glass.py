@@ -205,7 +205,7 @@ def balls(*spheres, sky=False):
 def test_two_objects_are_as_thick_together_as_alone():
     from scipy.ndimage import binary_erosion
 
-    from materialist.edits.select.several import objects_in
+    from materialist.edits.glass.several import objects_in
 
     scene, number, through = balls(((-0.7, -0.2, -3), 0.4), ((0.75, -0.3, -3.6), 0.3))
     parts = objects_in(number >= 0, scene.depth)
@@ -225,7 +225,7 @@ def test_two_objects_are_as_thick_together_as_alone():
 
 
 def test_one_object_behind_a_pole_stays_one():
-    from materialist.edits.select.several import objects_in
+    from materialist.edits.glass.several import objects_in
 
     scene, number, _ = balls(((0.0, -0.1, -3), 0.5))
     depth = scene.depth.copy()
@@ -312,13 +312,13 @@ def test_thin_masks_give_no_warnings_of_numpy(place, recwarn):
 
 
 def test_a_note_is_told_again_for_another_object():
+    from materialist.edits.core.notes import warnings_since
     from materialist.edits.glass.glass import LID
-    from materialist.edits.material.material import told_since
 
     scene = flat_scene()
     first = glass(scene, MASK, hollow="open", thickness="symmetry")
     right = np.zeros(MASK.shape, bool)
     right[20:30, 34:44] = True
     second = glass(first, right, hollow="open", thickness="symmetry")
-    assert told_since(scene, first).count(LID) == 1 and told_since(first, second).count(LID) == 1
-    assert told_since(scene, second).count(LID) == 1
+    assert warnings_since(scene, first).count(LID) == 1 and warnings_since(first, second).count(LID) == 1
+    assert warnings_since(scene, second).count(LID) == 1

@@ -5,7 +5,7 @@ import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.edits.composite.composite import composite
-from materialist.edits.glass.fireflies import without_fireflies
+from materialist.edits.composite.fireflies import without_fireflies
 from materialist.edits.glass.glass import glass
 from materialist.edits.glass.preview import GlassPreview
 from materialist.errors import InputError

@@ -9,9 +9,11 @@ import pytest
 from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite, pictures
-from materialist.edits.light import glows
+from materialist.edits.composite.emitters import WHITE, in_photo
+from materialist.edits.core.emitters import KEY, base_of, emitting
+from materialist.edits.light import emitters
+from materialist.edits.light.emitters import _explained, _patch, dimmed, visible_lights
 from materialist.edits.light.frames import moving_light
-from materialist.edits.light.glows import _explained, _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight, rotated
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
@@ -46,7 +48,7 @@ def rooms() -> tuple[Scene, Scene]:
     dark = Photo(albedo, camera, albedo, fov_source="option")
     prior = Prediction(materials, normal, depth, "made")
     bare = Scene(camera, dark, prior, materials, normal, depth, geometry, envmap, albedo)
-    true = replace(bare, bodies=(_patch(bare, LIGHT, (RADIANCE,) * 3, "window"),))
+    true = replace(bare, bodies=(emitting(_patch(bare, LIGHT, "window"), (RADIANCE,) * 3),))
     linear = np.clip(picture(true), 0, 1)
     photo = Photo(linear, camera, linear, fov_source="option")
     rendered = picture(bare)
@@ -77,7 +79,7 @@ def test_its_radiance_is_found():
 @pytest.mark.parametrize("dim", [0.0, 0.5])
 def test_dimming_is_the_true_room_with_a_dimmer_window(dim):
     true, fit = rooms()
-    lights = (_patch(true, LIGHT, (dim * RADIANCE,) * 3, "window"),)
+    lights = (emitting(_patch(true, LIGHT, "window"), (dim * RADIANCE,) * 3),)
     expected = picture(replace(true, bodies=lights), seed=5)
     out = composite(fit, relight(fit, dim=dim), spp=64)
     away = ~LIGHT
@@ -105,7 +107,7 @@ def test_the_window_stays_while_the_rest_turns():
 def test_frames_share_the_dimmed_lights_and_the_picture_that_they_are_compared_with(monkeypatch):
     _, fit = rooms()
     asked = []
-    monkeypatch.setattr(glows, "_explained", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
+    monkeypatch.setattr(emitters, "_explained", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
     film = list(moving_light(fit, 3, dim=0.25))
     assert len(asked) == 1 and film[0].bodies is film[2].bodies and len(film[0].bodies) == 1
     np.testing.assert_allclose(film[0].bodies[0].surface.emission, 1.5)
@@ -136,7 +138,7 @@ def test_bad_input_and_files(tmp_path):
 
 def test_edits_before_do_not_change_what_is_found():
     """The lights are those of the photo, whatever has been done to the floor."""
-    from materialist.edits.light.glows import KEY
+    from materialist.edits.core.emitters import KEY
     from materialist.edits.material.material import edit
 
     _, fit = rooms()
@@ -154,12 +156,12 @@ def test_edits_before_do_not_change_what_is_found():
 
 
 def test_off_is_as_good_as_off():
-    from materialist.edits.insert.portrait import free_bodies
+    from materialist.edits.composite.native_layer import new_bodies
 
     _, fit = rooms()
     off = dimmed(fit, 0.0)
     assert max(off.bodies[0].surface.emission) <= 1e-6
-    assert free_bodies(fit, off) == [], "it keeps the outline that the photo has"
+    assert new_bodies(fit, off) == [], "it keeps the outline that the photo has"
 
 
 def test_an_hdr_photo_tells_how_bright_its_lights_are():
@@ -232,13 +234,13 @@ def test_dimmed_lights_keep_what_is_seen_in_them():
     original[6:9, 12:16] = [0.1, 0.3, 0.05]
     photo = replace(fit.photo, original=original)
     found = {"radiance": 8.0, "dim": 0.1}
-    out = glows.in_photo(np.full_like(original, 9), photo, LIGHT, found)
+    out = in_photo(np.full_like(original, 9), photo, LIGHT, found)
     np.testing.assert_allclose(out[7, 13:15], 0.1 * original[7, 13:15], rtol=1e-5)
     np.testing.assert_allclose(out[7, 20:28], 0.8, rtol=0.05)
     assert (out[20:] == 9).all()
     before = np.zeros((30, 40), np.float32)
     before[7, 20:28] = 1  # something that was inserted stands before it
-    np.testing.assert_array_equal(glows.in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
+    np.testing.assert_array_equal(in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
 
 
 def spot(rows=slice(22, 26), columns=slice(14, 20)):
@@ -298,11 +300,11 @@ def test_dimming_by_one_is_none_and_dimming_brightens_nothing():
     original[4:11:2, 10:30:2] = 0.75  # twigs
     photo = replace(fit.photo, original=original)
     picture = np.full_like(original, 0.3)
-    same = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 1.0})
+    same = in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 1.0})
     np.testing.assert_array_equal(same, picture)
-    half = glows.in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 0.5})
+    half = in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 0.5})
     np.testing.assert_allclose(half[6, 14], 0.375, rtol=1e-5)
-    unclipped = LIGHT & (original.min(-1) < glows.CLIPPED)
+    unclipped = LIGHT & (original.min(-1) < WHITE)
     assert (half <= np.maximum(original, picture) + 1e-6)[unclipped].all()
 
 
@@ -319,8 +321,6 @@ def test_lights_of_known_radiance_keep_their_own():
     with pytest.raises(InputError, match="give dim"):
         list(moving_light(fit, 3, lights=left))
     old = dimmed(fit, 0.5)
-    old = replace(old, provenance={**old.provenance, glows.KEY: {**old.provenance[glows.KEY]}})
-    del old.provenance[glows.KEY]["emission"]  # as an earlier version saved it
-    assert glows.explained(fit, old).bodies[0].surface.emission[0] == pytest.approx(
-        2 * old.bodies[0].surface.emission[0]
-    )
+    old = replace(old, provenance={**old.provenance, KEY: {**old.provenance[KEY]}})
+    del old.provenance[KEY]["emission"]  # as an earlier version saved it
+    assert base_of(fit, old).bodies[0].surface.emission[0] == pytest.approx(2 * old.bodies[0].surface.emission[0])

@@ -8,10 +8,11 @@ from made_meshes import box_file, floor_scene
 
 from materialist.camera import project
 from materialist.edits.composite.composite import composite
+from materialist.edits.composite.native_layer import native_layer
+from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert, put
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import picture_width, support_at
-from materialist.edits.light.lights import Studio
 from materialist.errors import InputError
 from materialist.types import Materials
 
@@ -112,7 +113,7 @@ def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     edited = insert(scene, box, (24.0, 26.0), material="0.1,0.1,0.6")
     out = composite(scene, edited, spp=8)
     assert out.shape == (36 * native, 48 * native, 3)
-    body = Studio(scene).portrait(edited, spp=8, seed=0, clean=False)
+    body = native_layer(EditRenderer(scene), edited, spp=8, seed=0, clean=False)
     alone = body.share > 0.999
     assert alone.any()
     blue = out[alone]
@@ -126,7 +127,7 @@ def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
 def test_the_matte_is_the_bodys_outline_at_native_size(box):
     scene = floor_scene(native=4)
     edited = insert(scene, box, (24.0, 26.0))
-    share = Studio(scene).portrait(edited, spp=2, seed=0, clean=False).share
+    share = native_layer(EditRenderer(scene), edited, spp=2, seed=0, clean=False).share
     place, _ = project(edited.bodies[0].vertices.astype(np.float64), scene.camera)
     from scipy.spatial import ConvexHull
 
@@ -141,7 +142,7 @@ def test_nothing_of_the_background_is_in_a_body(box):
     bright = replace(scene.materials, albedo=np.ones_like(scene.materials.albedo))
     scene = replace(scene, materials=Materials(bright.albedo, bright.roughness, bright.metallic))
     edited = insert(scene, box, (24.0, 26.0), material="0,0,0")
-    body = Studio(scene).portrait(edited, spp=16, seed=0, clean=False)
+    body = native_layer(EditRenderer(scene), edited, spp=16, seed=0, clean=False)
     rim = (body.share > 0.05) & (body.share < 0.95)
     assert rim.any() and np.median(body.picture[rim]) < 0.2  # black but for its gloss; the floor is 1
 
@@ -150,7 +151,7 @@ def test_a_native_picture_of_another_shape_is_no_obstacle(box):
     scene = floor_scene()
     wide = replace(scene, photo=replace(scene.photo, original=np.full((71, 96, 3), 0.5, np.float32)))
     edited = insert(wide, box, (24.0, 26.0))
-    body = Studio(wide).portrait(edited, spp=4, seed=0, clean=False)
+    body = native_layer(EditRenderer(wide), edited, spp=4, seed=0, clean=False)
     assert body.share.shape == (71, 96) and body.picture[body.share > 0.99].min() > 0
 
 
@@ -160,9 +161,9 @@ def test_a_body_looks_as_in_the_plain_rendering(box):
     red = np.broadcast_to(np.float32([2.0, 0.4, 0.1]), (8, 16, 3)).copy()
     scene = replace(scene, envmap=red)
     edited = insert(scene, box, (24.0, 26.0), material="0.5,0.5,0.5")
-    studio = Studio(scene)
-    body = studio.portrait(edited, spp=64, seed=0, clean=False)  # before anything else is rendered
-    plain = studio.twins(edited)[1](256, 3)
+    studio = EditRenderer(scene)
+    body = native_layer(studio, edited, spp=64, seed=0, clean=False)  # before anything else is rendered
+    plain = studio.pair(edited)[1](256, 3)
     inside = body.share > 0.999
     np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)
 
@@ -171,16 +172,16 @@ def test_what_stands_where_something_was_removed_or_glows_has_its_own_outline(bo
     """Only what the photo shows has the photo's outline: its lights, and its glass."""
     from edit_scenes import block_mask, rendered_scene
 
+    from materialist.edits.composite.native_layer import new_bodies
     from materialist.edits.glass.glass import glass
-    from materialist.edits.insert.portrait import free_bodies
     from materialist.edits.remove.background import without
 
     scene = rendered_scene()
     mask = block_mask(36, 48)
-    assert free_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
+    assert new_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
     gone = without(scene, mask)
     there = insert(gone, box, (18.0, 20.0), scale=2)
-    assert free_bodies(scene, there) == ["body0"]
+    assert new_bodies(scene, there) == ["body0"]
     (body,) = there.bodies
     lamp = replace(body, surface=replace(body.surface, emission=(5.0, 5.0, 5.0)))
-    assert free_bodies(scene, replace(there, bodies=(lamp,))) == ["body0"]
+    assert new_bodies(scene, replace(there, bodies=(lamp,))) == ["body0"]

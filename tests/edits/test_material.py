@@ -5,7 +5,8 @@ import pytest
 from edit_scenes import block_mask, flat_scene
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.material.material import edit, parse_colour, shifted_hsv
+from materialist.edits.core.surfaces import parse_colour
+from materialist.edits.material.material import edit, shifted_hsv
 from materialist.errors import InputError
 
 SCENE = flat_scene()

@@ -10,7 +10,8 @@ from made_meshes import box_file, gltf_file, textured_obj
 from PIL import Image
 
 from materialist.color import srgb_to_linear
-from materialist.edits.insert.mesh_shape import creased_normals, edge_faults
+from materialist.edits.core.topology import edge_faults
+from materialist.edits.insert.mesh_shape import creased_normals
 from materialist.edits.insert.meshes import read_model, repainted
 from materialist.errors import InputError
 from materialist.io.image import read_map

@@ -7,11 +7,11 @@ import pytest
 from made_meshes import box_file, floor_scene
 
 from materialist.edits.composite.composite import developed
+from materialist.edits.core.region import body_coverage
+from materialist.edits.core.renderer import EditRenderer, rendered
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
-from materialist.edits.light.lights import Studio, rendered
 from materialist.edits.material.material import edit
-from materialist.edits.select.region import placed
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.pipeline import render_scene
@@ -30,8 +30,8 @@ def scenes(tmp_path_factory):
 
 def test_a_scene_is_rendered_with_what_was_put_into_it(scenes):
     scene, with_box = scenes
-    share = placed(with_box)
-    assert share.max() == 1 and placed(scene).max() == 0
+    share = body_coverage(with_box)
+    assert share.max() == 1 and body_coverage(scene).max() == 0
     before, after = (render_scene(s, spp=16) for s in scenes)
     changed = np.abs(after - before).mean(-1)
     assert changed[share == 1].mean() > 5 * changed[:20].mean()
@@ -43,15 +43,15 @@ def test_its_own_maps_guide_the_denoiser(scenes):
     _, with_box = scenes
     pattern = (np.indices(with_box.depth.shape).sum(0) % 2)[..., None] * np.ones(3, np.float32)
     striped = replace(with_box, materials=replace(with_box.materials, albedo=pattern.astype(np.float32)))
-    albedo, _ = Studio(striped).guides(striped)
-    inside = placed(striped) == 1
+    albedo, _ = EditRenderer(striped).guides(striped)
+    inside = body_coverage(striped) == 1
     assert np.ptp(albedo[inside]) < 0.01 < np.ptp(pattern[inside])
-    np.testing.assert_array_equal(albedo[placed(striped) == 0], pattern[placed(striped) == 0])
+    np.testing.assert_array_equal(albedo[body_coverage(striped) == 0], pattern[body_coverage(striped) == 0])
 
 
 def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
     _, with_box = scenes
-    share = placed(with_box)
+    share = body_coverage(with_box)
     row, column = np.argwhere(share == 1)[len(np.argwhere(share == 1)) // 2]
     with pytest.raises(InputError, match=r"is on a thing that was put into the scene"):
         select(with_box, click=(column, row))

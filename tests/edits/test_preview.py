@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
-from materialist.edits.light.lights import Studio
+from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.preview import Preview
@@ -22,7 +22,7 @@ def preview():
 
 
 def traced(edited):
-    return Studio(edited).twins(edited)[0](192, 7)
+    return EditRenderer(edited).pair(edited)[0](192, 7)
 
 
 def test_material_change_agrees_with_the_path_tracer(preview):
@@ -79,7 +79,7 @@ def test_another_geometry_is_refused(preview):
 
 @pytest.mark.parametrize("ambient, share", [(0.3, 0.7), (1.0, 0.1), (1.5, 0.2), (0.0, 1.0)])
 def test_dimmed_lights_of_the_photo_take_their_share_of_the_light_along(ambient, share):
-    from materialist.edits.light.glows import KEY
+    from materialist.edits.core.emitters import KEY
 
     preview = Preview.__new__(Preview)
     preview.scene = rendered_scene()

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
-from materialist.edits.light.frames import moving_light, write_frames
-from materialist.edits.light.lights import Studio, kelvin_colour
-from materialist.edits.light.relight import lamp, read_envmap, relight, rotated, with_sun
+from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.light.frames import moving_light
+from materialist.edits.light.relight import kelvin_colour, lamp, read_envmap, relight, rotated, with_sun
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.exr import write_exr
+from materialist.io.video import write_frames
 from materialist.types import Materials
 
 SCENE = flat_scene()
@@ -80,7 +81,7 @@ def test_a_lamp_of_power_one_shows_a_white_wall_as_white():
     lit = replace(white, lamps=(lamp(white, 16, 12, 3.0 - distance, 6504, 1.0),))
     # From the camera the lamp hides what it lights best; its foot on the wall is seen beside it.
     hidden = replace(lit.lamps[0], position=(0.4, 0.0, -(3.0 - distance)))
-    picture = Studio(lit).twins(replace(lit, lamps=(hidden,)))[1](256, 1)
+    picture = EditRenderer(lit).pair(replace(lit, lamps=(hidden,)))[1](256, 1)
     column = round(0.4 / 3 * lit.camera.focal + 16 - 0.5)
     np.testing.assert_allclose(picture[11:13, column].mean(), 1.0, rtol=0.2)  # R = 1: the lobes add up to 1.02-1.05
 

@@ -8,10 +8,10 @@ from edit_scenes import block_mask, flat_scene
 from made_meshes import box_file
 
 from materialist.edits.composite.composite import composite
+from materialist.edits.core.sky import LEAST, sky_maps, traced
 from materialist.edits.glass import preview as glass_preview
 from materialist.edits.glass.glass import glass
 from materialist.edits.glass.preview import GlassPreview
-from materialist.edits.glass.sky import LEAST, sky_maps, traced
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
 from materialist.geometry.build import build_geometry

@@ -104,7 +104,7 @@ def test_cycles_has_our_lamps_and_glow(tmp_path):
 
     from test_bodies import GLOW, LAMP, with_bodies
 
-    from materialist.edits.light.lights import rendered
+    from materialist.edits.core.renderer import rendered
 
     scene = with_bodies(GLOW)
     scene = replace(scene, envmap=scene.envmap * 0.2, lamps=(LAMP,))
@@ -128,14 +128,14 @@ def test_cycles_has_our_bodies(tmp_path, kind):
     import trimesh
     from test_bodies import CHECKS
 
-    from materialist.edits.insert.mesh_material import constant
-    from materialist.edits.light.lights import rendered
+    from materialist.edits.core.renderer import rendered
+    from materialist.edits.core.surfaces import uniform_surface
     from materialist.types import Body
 
     surface = {
-        "texture": CHECKS, "glass": constant(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
-        "rough glass": constant(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),
-        "coat": constant(0.3, 0.3, 0.0, transmission=0.6, ior=1.3),
+        "texture": CHECKS, "glass": uniform_surface(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
+        "rough glass": uniform_surface(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),
+        "coat": uniform_surface(0.3, 0.3, 0.0, transmission=0.6, ior=1.3),
     }[kind]  # fmt: skip
     ball = trimesh.creation.icosphere(4, 0.5)
     ways = np.asarray(ball.vertices / 0.5, np.float32)

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from export_scenes import load_xml, room
 
-from materialist.edits.insert.mesh_material import constant
+from materialist.edits.core.surfaces import uniform_surface
 from materialist.exporters import body_parts
 from materialist.exporters.glb import glb_bytes
 from materialist.exporters.parts import scene_parts
@@ -34,9 +34,9 @@ CHECKS = Surface(
     np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32), np.full((1, 1), 0.4, np.float32),
     np.zeros((1, 1), np.float32),
 )  # fmt: skip
-GLASS = constant(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
-FROSTED = constant(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
-COATED = constant((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
+GLASS = uniform_surface(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
+FROSTED = uniform_surface(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
+COATED = uniform_surface((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
 
 
 def document(scene):
@@ -73,7 +73,7 @@ def test_glass_of_a_glb_has_the_mean_way_through_it():
 
 
 def test_glb_colours_coated_glass_by_the_mean_of_tint_and_albedo():
-    glass = constant(0.2, 0.2, 0.0, transmission=0.75, ior=1.4, tint=(1.0, 0.6, 0.2))
+    glass = uniform_surface(0.2, 0.2, 0.0, transmission=0.75, ior=1.4, tint=(1.0, 0.6, 0.2))
     material = document(with_bodies(glass))["materials"][-1]
     expected = 0.25 * 0.2 + 0.75 * np.array([1.0, 0.6, 0.2])
     np.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-5)
@@ -116,7 +116,7 @@ def test_trimesh_reads_the_bodies_back(tmp_path):
     np.testing.assert_array_equal(picture, CHECKS.albedo * 255)
 
 
-GLOW = constant(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
+GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
 
 
 def test_glb_has_light_that_is_given_off():
@@ -151,13 +151,13 @@ def test_what_a_format_does_not_show_is_told(tmp_path):
         assert not any("shows bodies without" in note for note in export(scene, tmp_path / to, to=to).notes)
     notes = export(scene, tmp_path / "a.html").notes
     assert any("without textures but for their colours at the vertices and glass and glow;" in note for note in notes)
-    mixed = with_bodies(constant(0.2, 0.1, 0.0, transmission=0.9))
+    mixed = with_bodies(uniform_surface(0.2, 0.1, 0.0, transmission=0.9))
     assert any("transmission is below 1" in note for note in export(mixed, tmp_path / "m", to="mitsuba").notes)
 
 
 def test_blender_gets_textures_glass_and_glow(tmp_path):
     """What Cycles makes of them: test_blender.py."""
-    coat = constant(0.2, 0.01, 0.0, transmission=0.9, tint=(0.25, 1.0, 0.81))
+    coat = uniform_surface(0.2, 0.01, 0.0, transmission=0.9, tint=(0.25, 1.0, 0.81))
     folder = export(with_bodies(GLOW, coat, CHECKS), tmp_path / "folder", to="blend").path
     facts = json.loads((folder / "scene.json").read_text())
     parts = facts["parts"]

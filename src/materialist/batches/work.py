@@ -103,7 +103,7 @@ def _edited(job: Job, scene: Scene, tick: Tick) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.material.material import told_since
+    from materialist.edits.core.notes import warnings_since
     from materialist.edits.recipe import apply
 
     assert job.edits is not None
@@ -115,7 +115,7 @@ def _edited(job: Job, scene: Scene, tick: Tick) -> tuple[Array, list[str]]:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
     picture = composite(scene, edited, spp=job.spp, seed=seed, device=device, progress=tick)
     write_composite(job.picture, picture, scene.photo, force=True)
-    return picture, told_since(scene, edited)
+    return picture, warnings_since(scene, edited)
 
 
 def _hash(source: bytes | None) -> str:

@@ -158,7 +158,7 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
     from materialist.edits.composite.composite import composite, into_photo
     from materialist.edits.composite.layers import render_layers
-    from materialist.edits.light.lights import Studio
+    from materialist.edits.core.renderer import EditRenderer
     from materialist.edits.light.relight import relight
     from materialist.edits.material.material import edit
     from materialist.edits.preview import Preview
@@ -182,7 +182,7 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     clock = _Clock()
     composite(scene, changes[0], spp=256, seed=seed, device=device)
     yield {"method": "final: material, 256 paths", "sample": sample, **clock.read()}
-    layers = render_layers(Studio(scene, device=device), changes[0], spp=16, seed=seed)
+    layers = render_layers(EditRenderer(scene, device=device), changes[0], spp=16, seed=seed)
     photo = _enlarged(scene.photo)
     clock = _Clock()
     into_photo(photo, layers)

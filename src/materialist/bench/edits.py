@@ -131,11 +131,13 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Edit |
 
 
 def _body(solid: shapes.Solid) -> Body:
-    from materialist.edits.insert.mesh_material import constant
+    from materialist.edits.core.surfaces import uniform_surface
 
     take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
     colour = np.array([0.15, 0.35, 0.6], np.float32)
-    return Body(take(solid.vertices), solid.faces, take(solid.normals), take(solid.uv), constant(colour, 0.4, 0.0))
+    return Body(
+        take(solid.vertices), solid.faces, take(solid.normals), take(solid.uv), uniform_surface(colour, 0.4, 0.0)
+    )
 
 
 def true_scene(sample: SyntheticSample) -> Scene:

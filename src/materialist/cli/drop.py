@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -62,13 +63,12 @@ def drop(
     force: Force = False,
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it."""
-    from materialist.edits.composite.composite import developed
+    from materialist.edits.composite.composite import developed, pictures
+    from materialist.edits.core.notes import warnings_since
     from materialist.edits.drop.drop import drop as simulate
     from materialist.edits.insert.meshes import read_model
-    from materialist.edits.light.film import filmed
-    from materialist.edits.light.frames import write_frames
-    from materialist.edits.material.material import told_since
     from materialist.io.package import load_scene, save_scene
+    from materialist.io.video import write_frames
 
     check_paths(spp)
     check_saved(output, save, force, full_render)
@@ -82,17 +82,21 @@ def drop(
         loaded, models, places, frames=frames, fps=fps, height=height, spin=spin, scale=scale, material=material,
         gravity=direction, metres=metres, seed=seed,
     )  # fmt: skip
-    last: list[Any] = [None]
+    last: Any = None
+
+    def taken(progress: Any) -> Iterator[Any]:
+        nonlocal last
+        options: dict[str, Any] = {"denoise": denoise, "full_render": full_render, "device": device.value}
+        for picture in pictures(loaded, film, spp=spp, seed=seed, progress=progress, **options):
+            last = picture
+            yield picture
+
     with StageProgress(quiet=as_json) as progress:
-        pictures = filmed(
-            loaded, film, spp=spp, seed=seed, denoise=denoise, full_render=full_render, device=device.value,
-            progress=progress, last=last,
-        )  # fmt: skip
-        write_frames(output, pictures, fps=fps, force=force)
+        write_frames(output, taken(progress), fps=fps, force=force)
     if save is not None:
-        save_scene(developed(loaded, film[-1], last[0], seed=seed, device=device.value), save, force=force)
+        save_scene(developed(loaded, film[-1], last, seed=seed, device=device.value), save, force=force)
     shown = [f"Look at {output}", *([f"The edited scene is {save}"] if save is not None else [])]
-    warnings = told_since(loaded, film[-1])
+    warnings = warnings_since(loaded, film[-1])
     report_success(
         "drop", as_json, [*(f"Note: {note}" for note in warnings), *shown], video=str(output),
         frames=frames, fps=fps, scene=str(save) if save else None, warnings=warnings,

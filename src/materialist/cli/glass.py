@@ -78,9 +78,10 @@ def glass(
     force: Force = False,
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
+    from materialist.edits.core.notes import PICTURED
+    from materialist.edits.core.surfaces import parse_colour
     from materialist.edits.glass.glass import OPEN, check_glass
     from materialist.edits.glass.glass import glass as change
-    from materialist.edits.material.material import PICTURED, parse_colour
     from materialist.edits.remove.hole import told_shadow
     from materialist.errors import InputError
     from materialist.io.package import load_scene
@@ -121,8 +122,8 @@ def _preview(
     from materialist.cli.outcome import report_success
     from materialist.cli.progress import StageProgress
     from materialist.edits.composite.output import write_composite
+    from materialist.edits.core.notes import warnings_since
     from materialist.edits.glass.preview import GlassPreview
-    from materialist.edits.material.material import told_since
 
     start = time.monotonic()
     with StageProgress(quiet=as_json) as progress:
@@ -132,7 +133,7 @@ def _preview(
         picture = made.picture(**look, spp=spp, seed=options["seed"])
     write_composite(output, picture, loaded.photo, force=force)
     size, source = f"{picture.shape[1]} x {picture.shape[0]}", made.edited.provenance["edits"][-1]["thickness"]
-    warnings = told_since(loaded, made.edited)
+    warnings = warnings_since(loaded, made.edited)
     lines = [
         f"{int(region.sum())} pixels are glass; thickness: {source}.",
         f"A preview: {size}, the size that the scene was worked out at, without the shadow and caustics of the glass.",

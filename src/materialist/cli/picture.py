@@ -57,7 +57,7 @@ def check_paths(spp: int) -> None:
 
 def check_video(output: Path, fps: int, force: bool, device: str) -> None:
     """Everything about a video that can be wrong, before the work starts; renderings are done on `device`."""
-    from materialist.edits.light.frames import ensure_video_writable
+    from materialist.io.video import ensure_video_writable
 
     if not 1 <= fps <= 120:
         raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
@@ -108,9 +108,9 @@ def write_result(
 ) -> None:  # fmt: skip
     """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
     from materialist.edits.composite.composite import composite, developed
-    from materialist.edits.composite.layers import is_relit
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.material.material import told_since
+    from materialist.edits.core.notes import warnings_since
+    from materialist.edits.core.renderer import is_relit
     from materialist.io.package import save_scene
 
     start = time.monotonic()
@@ -122,7 +122,7 @@ def write_result(
     write_composite(output, picture, scene.photo, force=force)
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=seed, device=device), save, force=force)
-    warnings = told_since(scene, edited)
+    warnings = warnings_since(scene, edited)
     if not full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
         warnings.append(f"The picture looks like the photo: nothing of the edit is to be seen. {unseen}".rstrip())
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]

@@ -130,8 +130,9 @@ def _video(
     force: bool,
 ) -> None:  # fmt: skip
     from materialist.edits.composite.composite import pictures
-    from materialist.edits.light.frames import moving_light, write_frames
-    from materialist.edits.material.material import told_since
+    from materialist.edits.core.notes import warnings_since
+    from materialist.edits.light.frames import moving_light
+    from materialist.io.video import write_frames
 
     start = time.monotonic()
     last = scene
@@ -146,7 +147,7 @@ def _video(
     with StageProgress(quiet=as_json) as progress:
         taken = pictures(scene, relit(), progress=progress, count=count, **shared)
         write_frames(output, taken, fps=fps, force=force)
-    warnings = told_since(scene, last)
+    warnings = warnings_since(scene, last)
     report_success(
         "relight", as_json, [*(f"Note: {note}" for note in warnings), f"Look at {output}"], video=str(output),
         frames=count, fps=fps, warnings=warnings, seconds=time.monotonic() - start,

@@ -29,7 +29,7 @@ def render(
 ) -> None:
     """Path-trace a scene package."""
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.material.material import PICTURED, is_pictured
+    from materialist.edits.core.notes import PICTURED, is_pictured
     from materialist.io.image import ensure_image_writable
     from materialist.io.package import load_scene
 

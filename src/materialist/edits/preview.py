@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from materialist.edits.composite.layers import Layers, changed_pixels, is_relit, texture_held
+from materialist.edits.composite.layers import Layers, changed_pixels, texture_held
+from materialist.edits.core.renderer import is_relit
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -97,9 +98,9 @@ class Preview:
         comes from around, as the fit has it."""
         from dataclasses import replace
 
-        from materialist.edits.light.glows import newly_dimmed
+        from materialist.edits.core.emitters import dimmed_emitters
 
-        found = newly_dimmed(self.scene, edited)
+        found = dimmed_emitters(self.scene, edited)
         if found is None:
             return edited
         ambient, dim = float(found["ambient"]), float(found.get("dim", 1.0))

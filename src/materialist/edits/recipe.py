@@ -6,12 +6,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from materialist.edits.core.surfaces import parse_colour
 from materialist.edits.drop.drop_rest import settle
 from materialist.edits.glass.glass import OPEN, glass
 from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import lamp, read_envmap, relight
-from materialist.edits.material.material import edit, parse_colour
+from materialist.edits.material.material import edit
 from materialist.edits.remove.background import without
 from materialist.edits.remove.hole import told_shadow
 from materialist.edits.select.select import select

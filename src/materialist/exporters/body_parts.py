@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.insert.mesh_shape import edge_faults, volume
+from materialist.edits.core.topology import edge_faults, volume
 from materialist.exporters.parts import Part
 from materialist.types import Array, Body, Materials, Mesh, Scene, Surface
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from materialist.edits.material.material import PICTURED, is_pictured
+from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError
 from materialist.exporters.body_parts import body_parts, left_out
 from materialist.exporters.parts import Part, scene_parts

@@ -9,7 +9,7 @@ from materialist.render.bodies import body_bsdf, body_emitter
 from materialist.render.buffers import floats, integers, tensor
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, is_sunny, on_mitsuba_grid
 from materialist.render.variant import setup
-from materialist.types import Array, Body, Camera, Geometry, Materials, Mesh
+from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
@@ -25,20 +25,25 @@ class RenderScene:
     """Path tracing of one geometry from one camera.
 
     `mi_scene` is Mitsuba's scene. Its shapes are `surface`, with the faces that `geometry.mesh` gives the depth
-    surface in their order, `plane0`, `plane1`, ...: the continued planes likewise (see `part`), and `body0`, ...
+    surface in their order, `plane0`, `plane1`, ...: the continued planes likewise (see `part`), `body0`, ...,
+    and `lamp0`, ...
 
     Args:
         geometry: the depth surface carries the per-pixel maps; the continuation of a plane carries the mean of the
             maps over the plane's pixels.
         camera: pinhole at the origin.
         bodies: things with materials of their own.
+        lamps: glowing spheres.
         device: `auto`, `cpu` or `cuda`.
 
     Raises:
         InputError: a picture below 2 x 2 pixels, or a mesh without a depth surface. SetupError: see `variant.setup`.
     """
 
-    def __init__(self, geometry: Geometry, camera: Camera, *, bodies: tuple[Body, ...] = (), device: str = "auto"):
+    def __init__(
+        self, geometry: Geometry, camera: Camera, *, bodies: tuple[Body, ...] = (), lamps: tuple[Lamp, ...] = (),
+        device: str = "auto",
+    ):  # fmt: skip
         if min(camera.width, camera.height) < 2:
             raise InputError(f"The picture is {camera.width} x {camera.height}; rendering needs 2 x 2 pixels or more.")
         if not (geometry.mesh.face_plane == -1).any():
@@ -70,6 +75,8 @@ class RenderScene:
             description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
         for k, body in enumerate(bodies):
             description[f"body{k}"] = _shape(mi, body, body_bsdf(mi, body.surface), body_emitter(mi, body.surface))
+        for k, lamp in enumerate(lamps):
+            description[f"lamp{k}"] = _sphere(lamp)
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
@@ -265,6 +272,15 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     return {
         "type": "materialist_disney",
         "base_color": texture(3, 0.5), "roughness": texture(1, 0.5), "metallic": texture(1, 0.0),
+    }  # fmt: skip
+
+
+def _sphere(lamp: Lamp) -> dict:
+    """A sphere whose radiant flux is the lamp's."""
+    return {
+        "type": "sphere", "center": [float(v) for v in lamp.position], "radius": float(lamp.radius),
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
+        "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(lamp.radiance)}},
     }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import gradio as gr
 import numpy as np
 
-from materialist.edits.material.material import parse_colour
+from materialist.edits.core.surfaces import parse_colour
 from materialist.studio.context import Context
 from materialist.studio.follow import box
 from materialist.studio.guard import guarded

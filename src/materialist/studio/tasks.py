@@ -90,7 +90,7 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.material.material import told_since
+    from materialist.edits.core.notes import warnings_since
 
     loaded, edited = _edited(progress, scene, edits)
     picture = composite(loaded, edited, spp=spp, seed=seed, progress=progress)
@@ -98,7 +98,7 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
     write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
-    notes = told_since(loaded, edited)
+    notes = warnings_since(loaded, edited)
     return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 
 
@@ -131,10 +131,10 @@ def do_fall(
     height: str = "1.5", seed: str = "0", frames: int = 36, spp: int = 32,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist drop`: a mesh falls onto the photo, as a video."""
+    from materialist.edits.composite.composite import pictures
     from materialist.edits.drop.drop import drop
-    from materialist.edits.light.film import filmed
-    from materialist.edits.light.frames import ensure_video_writable, write_frames
     from materialist.io.package import load_scene
+    from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
     progress("load", 0, 1)
@@ -143,7 +143,7 @@ def do_fall(
         loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, scale=float(scale), material=material,
         height=float(height), seed=int(seed),
     )  # fmt: skip
-    write_frames(output, filmed(loaded, film, spp=spp, progress=progress), fps=24, force=True)
+    write_frames(output, pictures(loaded, film, spp=spp, progress=progress), fps=24, force=True)
     return {"file": output}
 
 
@@ -189,7 +189,8 @@ def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *,
 def _turntable(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
     """`materialist relight --rotate 360`: the light once round, over the edits."""
     from materialist.edits.composite.composite import pictures
-    from materialist.edits.light.frames import ensure_video_writable, moving_light, write_frames
+    from materialist.edits.light.frames import moving_light
+    from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
     scenes = list(moving_light(edited, frames, turn=360.0))

@@ -8,13 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from materialist.edits.composite.layers import Layers, denoised, render_layers
+from materialist.edits.composite.emitters import in_photo
+from materialist.edits.composite.layers import Layers, render_layers
+from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.composite.revealed import revealed
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips, window
-from materialist.edits.insert.portrait import Portrait
-from materialist.edits.light.glows import explained, in_photo, newly_dimmed
-from materialist.edits.light.lights import Studio, rendered
-from materialist.edits.material.material import PICTURED, is_pictured
+from materialist.edits.core.emitters import base_of, dimmed_emitters
+from materialist.edits.core.notes import PICTURED, is_pictured
+from materialist.edits.core.renderer import EditRenderer, denoised, rendered
 from materialist.errors import InputError
 from materialist.types import Array, Photo, Scene
 
@@ -76,14 +77,14 @@ def composite(
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     _check_rendered(edited, full_render)
-    lights = newly_dimmed(scene, edited)
-    scene = explained(scene, edited)
-    studio = Studio(scene, device=device)
+    lights = dimmed_emitters(scene, edited)
+    scene = base_of(scene, edited)
+    renderer = EditRenderer(scene, device=device)
     if full_render:
-        picture = plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+        picture = plain(renderer, edited, spp=spp, seed=seed, denoise=denoise)
         return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
-    layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise, sparing=True, progress=progress)
-    return _finished(studio, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
+    layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
+    return _finished(renderer, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
 
 
 def pictures(
@@ -92,33 +93,41 @@ def pictures(
 ) -> Iterator[Array]:  # fmt: skip
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
 
+    An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
     tick = progress or (lambda *_: None)
     total = len(edits) if isinstance(edits, Sequence) else count or 0
-    studio, lights = Studio(scene, device=device), None
+    renderer, lights = EditRenderer(scene, device=device), None
+    before: Scene | None = None
+    picture = scene.photo.original
     for k, edited in enumerate(edits):
         tick("frames", k, total)
+        if edited is before:
+            yield picture
+            continue
+        before = edited
         _check_rendered(edited, full_render)
-        found = newly_dimmed(scene, edited)
+        found = dimmed_emitters(scene, edited)
         if found != lights:  # frames of one film share their lights, and so their base picture
-            studio, lights = Studio(explained(scene, edited), device=device), found
+            renderer, lights = EditRenderer(base_of(scene, edited), device=device), found
         if full_render:
-            yield plain(studio, edited, spp=spp, seed=seed, denoise=denoise)
+            picture = plain(renderer, edited, spp=spp, seed=seed, denoise=denoise)
         else:
-            layers = render_layers(studio, edited, spp=spp, seed=seed, clean=denoise)
-            yield _finished(studio, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
+            layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise)
+            picture = _finished(renderer, edited, layers, lights, spp=spp, seed=seed, clean=denoise)
+        yield picture
     tick("frames", total, total)
 
 
-def _finished(studio: Studio, edited: Scene, layers: Layers, lights: dict | None, **options) -> Array:
+def _finished(renderer: EditRenderer, edited: Scene, layers: Layers, lights: dict | None, **options) -> Array:
     """[H0, W0, 3] the composite of layers; `lights`: what was found of the photo's lights where these were dimmed."""
-    photo, layers = revealed(studio, edited, layers, **options)
+    photo, layers = revealed(renderer, edited, layers, **options)
     picture = into_photo(photo, layers)
     if not lights:
         return picture
-    before = None if layers.portrait is None else layers.portrait.share
-    return in_photo(picture, photo, studio.photo_lights(edited), lights, before)
+    before = None if layers.native is None else layers.native.share
+    return in_photo(picture, photo, renderer.emitter_pixels(edited), lights, before)
 
 
 def _check_rendered(edited: Scene, full_render: bool) -> None:
@@ -126,13 +135,13 @@ def _check_rendered(edited: Scene, full_render: bool) -> None:
         raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
 
 
-def plain(studio: Studio, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
+def plain(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
     """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo."""
-    picture = studio.twins(edited)[1](spp, seed)
+    picture = renderer.pair(edited)[1](spp, seed)
     if not denoise:
         return picture
-    albedo, normal = studio.guides(edited)
-    return denoised(picture, picture, (albedo, albedo, normal))[1]
+    albedo, normal = renderer.guides(edited)
+    return denoised(picture, albedo, normal)
 
 
 def _upscaled(picture: Array, shape: tuple[int, ...], upscale: Upscale) -> Array:
@@ -153,14 +162,14 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
 
     out = photo.original.copy()
     if not layers.reached.any():
-        return _in_front(out, layers.portrait, photo.hdr)
+        return _in_front(out, layers.native, photo.hdr)
     stack = np.concatenate((_other_light if layers.relit else _same_light)(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
     alpha = matte(layers.changed, photo.original)
     changed, clear = layers.changed, np.ones_like(layers.changed)
-    if layers.portrait is not None:
-        clear = layers.portrait.inside == 0
+    if layers.native is not None:
+        clear = layers.native.inside == 0
     if clear.any() and not clear.all():
         # The rim of a body: what light changes beside it goes on under it, where there is nothing to look up.
         away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
@@ -172,7 +181,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
             clear = clear | lost
     reached = (stack[..., :3] != 0).any(-1)
     if not reached.any():
-        return _in_front(out, layers.portrait, photo.hdr)
+        return _in_front(out, layers.native, photo.hdr)
     box, columns = window(reached, native, 3)  # nothing of it is seen further away: see `GuidedUpsample`
 
     def laid(rows: slice) -> None:
@@ -195,7 +204,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
 
     with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
-    return _in_front(out, layers.portrait, photo.hdr)
+    return _in_front(out, layers.native, photo.hdr)
 
 
 def _above_white(photo: Array, side: Array, share: Array) -> Array:
@@ -215,16 +224,16 @@ def _looked_up(changed: Array, clear: Array) -> Array:
     return np.where(changed, *near)
 
 
-def _in_front(picture: Array, portrait: Portrait | None, hdr: bool) -> Array:
+def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:
     """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share.
 
     At the rim of what is brighter than an ordinary photo's white, white is mixed in, as a photo's pixels would be
     enlarged: a few hundredths of a lamp's radiance would fill a pixel, and its outline would be ragged.
     """
-    if portrait is None:
+    if native is None:
         return picture
-    share = portrait.share[..., None]
-    own = portrait.picture if hdr else np.where(share < 1, np.minimum(portrait.picture, 1), portrait.picture)
+    share = native.share[..., None]
+    own = native.picture if hdr else np.where(share < 1, np.minimum(native.picture, 1), native.picture)
     return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
 
 

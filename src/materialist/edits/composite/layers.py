@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.edits.composite.sparing import FEWEST, Begun, spared
-from materialist.edits.glass.fireflies import without_fireflies
-from materialist.edits.insert.portrait import Portrait
+from materialist.edits.composite.fireflies import without_fireflies
+from materialist.edits.composite.native_layer import NativeLayer, native_layer
+from materialist.edits.core.region import body_coverage
+from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -19,8 +19,6 @@ DARKEST = 0.02
 """Added to albedo before its logarithm is taken."""
 PATTERNED, AT_RIM = (0.3, 0.8), 2
 """Contrast of albedo (logarithms) within so many pixels: none of a pattern, and certainly of one."""
-Render = Callable[[int, int], Array]
-"""render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ class Layers:
     """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
     relit: bool = False
     """Whether the light is another one."""
-    portrait: Portrait | None = None
+    native: NativeLayer | None = None
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
     covered: Array | None = None
     """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
@@ -51,38 +49,35 @@ class Layers:
 
 
 def render_layers(
-    studio, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, sparing: bool = False, progress=None
+    renderer: EditRenderer, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None
 ) -> Layers:
-    """Render a fitted scene (`lights.Studio`) and an edit of it, and separate the edit from the noise.
+    """Render a fitted scene and an edit of it, and separate the edit from the noise.
 
     `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
-    noise. See `difference`. With `sparing` pixels whose difference has little noise get a quarter of the paths (see
-    `sparing`); for the one edit of a scene, since the base picture then fits no other.
+    noise. See `difference`.
     """
-    scene = studio.scene
-    base, other = studio.twins(edited)
+    scene = renderer.scene
+    base, other = renderer.pair(edited)
     replaced, relit = replaced_pixels(scene, edited), is_relit(scene, edited)
     changed = replaced | relit  # another light changes every pixel
-    begun = studio.begun(edited) if sparing and spp >= FEWEST and not relit else None
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
-        alone = studio.portrait(edited, spp=spp, seed=seed, clean=clean)
-        covered = anything = studio.covered(edited)
+        alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
+        covered = anything = renderer.covered(edited)
         if alone is not None:
             covered = anything & (alone.inside == 0)
         changed, replaced = changed | covered, replaced | anything
-        if clean and anything.any():
-            albedo, normal = studio.body_guides(edited, anything)
+        if clean:
+            albedo, normal = renderer.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(
-        base, other, changed, guides, spp=spp, seed=seed, clean=clean, begun=begun, progress=progress,
-        focused=focused(edited),
+        base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress, focused=focused(edited),
     )  # fmt: skip
     if relit:
         replaced = replaced | (edited.depth == 0)
     held = texture_held(scene.materials.albedo, edited.materials.albedo)
-    return replace(layers, relit=relit, portrait=alone, covered=covered, replaced=replaced, held=held)
+    return replace(layers, relit=relit, native=alone, covered=covered, replaced=replaced, held=held)
 
 
 def texture_held(albedo: Array, edited: Array) -> Array:
@@ -121,14 +116,6 @@ def focused(scene: Scene) -> bool:
     return lit and any(is_transparent(body.surface) for body in scene.bodies)
 
 
-def is_relit(scene: Scene, edited: Scene) -> bool:
-    """Whether the two scenes have different light."""
-    glowing = [[body for body in s.bodies if max(body.surface.emission) > 0] for s in (scene, edited)]
-    return (
-        scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
-    )  # fmt: skip
-
-
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
     return replaced_pixels(scene, edited) | is_relit(scene, edited)
@@ -141,15 +128,13 @@ def replaced_pixels(scene: Scene, edited: Scene) -> Array:
     # Where a surface was taken away, what stands behind it is seen, but for what a body hides before and after.
     changed = (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
     if changed.any() and scene.bodies and scene.bodies == edited.bodies[: len(scene.bodies)]:
-        from materialist.edits.select.region import placed
-
-        changed &= placed(scene) < 1
+        changed &= body_coverage(scene) < 1
     return changed
 
 
 def difference(
     base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
-    clean: bool = True, begun: tuple[Begun, Begun] | None = None, progress=None, focused: bool = False,
+    clean: bool = True, progress=None, focused: bool = False,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
 
@@ -162,22 +147,18 @@ def difference(
         guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
             another one, of the edited scene.
         clean: denoise both pictures before they are compared, where the denoiser is installed.
-        begun: the same two renderings in shares, to trace all paths only where noise would be seen.
         focused: whether small lights stand beside glass, so that lone bright pixels are what lights the rest.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     tick = progress or (lambda *_: None)
-    if begun is not None:
-        halves = spared(begun, changed, spp=spp, seed=seed, tick=tick)[0]
-    else:
-        halves = []
-        for k in range(2):
-            pair = []
-            for j, render in enumerate((base, edited)):
-                tick("render", 2 * k + j, 4)
-                pair.append(render(-(-spp // 2), 2 * seed + k))
-            halves.append(pair)
+    halves = []
+    for k in range(2):
+        pair = []
+        for j, render in enumerate((base, edited)):
+            tick("render", 2 * k + j, 4)
+            pair.append(render(-(-spp // 2), 2 * seed + k))
+        halves.append(pair)
     tick("render", 4, 4)
     (b0, e0), (b1, e1) = halves
     b, e = (b0 + b1) / 2, (e0 + e1) / 2
@@ -187,7 +168,8 @@ def difference(
         return Layers(b, b, differs, changed & differs, raw)
     gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
     if clean:
-        b, e = denoised(b, without_fireflies(e, changed, spread=focused), guides)
+        b = denoised(b, guides[0], guides[2])
+        e = denoised(without_fireflies(e, changed, spread=focused), guides[1], guides[-1])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached, raw)
@@ -212,20 +194,3 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
             variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / window**2
         gain = np.maximum(gain, 1 - sigmas**2 * variance / np.maximum(m2, 1e-30))
     return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
-
-
-def denoised(base: Array, edited: Array, guides: tuple[Array, ...]) -> tuple[Array, Array]:
-    """Both pictures [H, W, 3] without noise; as they are where the denoiser is not installed.
-
-    guides: [H, W, 3] each, as for `difference`.
-    """
-    from materialist.errors import SetupError
-    from materialist.render.denoise import denoise
-
-    try:
-        return (
-            denoise(base, albedo=guides[0], normal=guides[2]),
-            denoise(edited, albedo=guides[1], normal=guides[-1]),
-        )
-    except SetupError:
-        return base, edited

@@ -10,9 +10,10 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from materialist.edits.composite.layers import Layers, denoised
-from materialist.edits.insert.portrait import Portrait
-from materialist.edits.select.region import placed
+from materialist.edits.composite.layers import Layers
+from materialist.edits.composite.native_layer import NativeLayer
+from materialist.edits.core.region import body_coverage
+from materialist.edits.core.renderer import EditRenderer, denoised
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Materials, Photo, Scene
 
@@ -30,23 +31,23 @@ RIM = 4.0
 """Pixels beside a filled place in which surfaces do not meet."""
 
 
-def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, clean: bool = True):
-    """(Photo, Layers) for `composite.into_photo`, of the layers that a `lights.Studio` rendered.
+def revealed(renderer: EditRenderer, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, clean: bool = True):
+    """(Photo, Layers) for `composite.into_photo`, of the layers that a `EditRenderer` rendered.
 
-    The photo is that of the studio's scene where the edit left it, else that of `edited`; the base there is a
+    The photo is that of the renderer's scene where the edit left it, else that of `edited`; the base there is a
     rendering of what that photo shows: the scene without the object, under its own light, and without what the edit
     put in its place. So a place that is merely uncovered shows the filled photo, and the shadow of glass falls on it.
     What the object did to the light around goes on in it: it was filled from surroundings that had that light.
     Under a body in place of the photo's surface (`layers.covered`) the rendering alone counts: what the photo has
     beyond the fit is not what is seen through the body or on it.
     """
-    scene = studio.scene
+    scene = renderer.scene
     if edited.photo is scene.photo:
         return scene.photo, layers
     filled = hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     if scene.bodies:
-        filled = hole & (placed(scene) < 1)
-    bare = _bare(studio, edited, layers, hole, spp, seed, clean)
+        filled = hole & (body_coverage(scene) < 1)
+    bare = _bare(renderer, edited, layers, hole, spp, seed, clean)
     # What the removal alone does to the light, as far as it is believed; everything else of the edit comes on top.
     trust = _trust(scene, layers.base, filled)
     lit = np.maximum(bare - _too_bright(scene, bare - layers.base, filled), 0)
@@ -66,9 +67,9 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     base = np.where(filled[..., None], bare, layers.base)
     photo, covered = edited.photo, layers.covered
     if covered is not None:
-        covered = covered & ~studio.photo_lights(edited)  # these stay the photo's
+        covered = covered & ~renderer.emitter_pixels(edited)  # these stay the photo's
     if covered is not None and covered.any():
-        covered, shown = _under(layers.portrait, covered, shown)
+        covered, shown = _under(layers.native, covered, shown)
         base = np.where(covered[..., None], shown, base)
         photo = _as_body(photo, covered, shown)
     return photo, replace(
@@ -82,9 +83,11 @@ def revealed(studio, edited: Scene, layers: Layers, *, spp: int, seed: int = 0, 
     )
 
 
-def _bare(studio, edited: Scene, layers: Layers, hole: Array, spp: int, seed: int, clean: bool) -> Array:
+def _bare(
+    renderer: EditRenderer, edited: Scene, layers: Layers, hole: Array, spp: int, seed: int, clean: bool
+) -> Array:
     """[H, W, 3] the fitted scene without what was taken away, and with nothing else of the edit."""
-    scene = studio.scene
+    scene = renderer.scene
     old, new = scene.materials, edited.materials
     albedo = np.where(hole[..., None], new.albedo, old.albedo)
     rest = (np.where(hole, *pair) for pair in ((new.roughness, old.roughness), (new.metallic, old.metallic)))
@@ -93,9 +96,8 @@ def _bare(studio, edited: Scene, layers: Layers, hole: Array, spp: int, seed: in
     if same and edited.bodies == scene.bodies and not layers.relit:
         return layers.edited
     bare = replace(edited, materials=materials, bodies=scene.bodies, envmap=scene.envmap, lamps=scene.lamps)
-    picture = studio.beside(edited, bare)(-(-spp // 2), 2 * seed)
-    guides = (albedo, albedo, edited.normal)
-    return denoised(picture, picture, guides)[0] if clean else picture
+    picture = renderer.beside(edited, bare)(-(-spp // 2), 2 * seed)
+    return denoised(picture, albedo, edited.normal) if clean else picture
 
 
 def _too_bright(scene: Scene, gained: Array, filled: Array) -> Array:
@@ -180,14 +182,14 @@ def _continued(change: Array, filled: Array, plane: Array) -> Array:
     return out
 
 
-def _under(portrait: Portrait | None, covered: Array, shown: Array) -> tuple[Array, Array]:
+def _under(native: NativeLayer | None, covered: Array, shown: Array) -> tuple[Array, Array]:
     """`covered` [H, W] bool and `shown` [H, W, 3], which go on under the rim of what stands before them: pixels there
     show both."""
     from scipy.ndimage import distance_transform_edt
 
-    if portrait is None or not (portrait.inside == 0).any():
+    if native is None or not (native.inside == 0).any():
         return covered, shown
-    away, (row, column) = distance_transform_edt(portrait.inside > 0, return_indices=True)
+    away, (row, column) = distance_transform_edt(native.inside > 0, return_indices=True)
     own = (away > 0) & (away <= RIM) & covered[row, column]
     return covered | own, np.where(own[..., None], shown[row, column], shown)
 

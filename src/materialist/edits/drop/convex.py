@@ -6,7 +6,7 @@ import logging
 
 import numpy as np
 
-from materialist.edits.insert.mesh_shape import edge_faults, places, volume
+from materialist.edits.core.topology import edge_faults, places, volume
 from materialist.errors import SetupError
 from materialist.types import Array
 

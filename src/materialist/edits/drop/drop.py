@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.convex import convex_pieces, hull
 from materialist.edits.drop.drop_ground import Surroundings, blocks_of, middle
 from materialist.edits.drop.physics import Pose, Thing, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import Model, read_model, repainted
 from materialist.edits.insert.support import Support
-from materialist.edits.light.frames import MAX_FRAMES
-from materialist.edits.material.material import noted, warned
 from materialist.errors import InputError
+from materialist.io.video import MAX_FRAMES
 from materialist.types import Array, Body, Scene
 
 METRES = 0.2

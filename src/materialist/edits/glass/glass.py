@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from materialist.camera import pixel_rays
+from materialist.edits.core.notes import noted, warned
+from materialist.edits.core.region import checked_region
+from materialist.edits.glass.several import objects_in
 from materialist.edits.glass.thickness import ObjectThickness, object_thickness
-from materialist.edits.material.material import noted, warned
 from materialist.edits.remove.background import Inpaint, without
 from materialist.edits.remove.hole import GROW
-from materialist.edits.select.region import checked_region
-from materialist.edits.select.several import objects_in
 from materialist.errors import InputError
 from materialist.solids.shell import Shell, cavities, joined
 from materialist.solids.standing import room, standing_body

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from materialist.edits.composite.fireflies import without_fireflies
 from materialist.edits.composite.layers import focused
-from materialist.edits.glass.fireflies import without_fireflies
 from materialist.edits.glass.glass import glass, glass_surface
-from materialist.edits.light.lights import add_lamps
 from materialist.errors import InputError
 from materialist.types import Array, Scene, Surface
 
@@ -40,7 +39,7 @@ class GlassPreview:
     """
 
     def __init__(self, scene: Scene, mask: Array, *, device: str = "auto", **options: Any):
-        from materialist.edits.glass.sky import sky_maps
+        from materialist.edits.core.sky import sky_maps
         from materialist.render.variant import setup
 
         if options.get("model", "closed") != "closed":
@@ -63,9 +62,10 @@ class GlassPreview:
 
         `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS.
         """
+        from materialist.edits.composite.native_layer import spread
+        from materialist.edits.core.renderer import denoised
+        from materialist.edits.core.sky import traced
         from materialist.edits.glass.glass import check_glass
-        from materialist.edits.glass.sky import traced
-        from materialist.edits.insert.portrait import denoised, spread
         from materialist.render.portrait import radiance
         from materialist.render.scene import GLASS_DEPTH
 
@@ -82,9 +82,9 @@ class GlassPreview:
             return radiance(target, size, box, spp=max(1, round(share * paths)), **options)
 
         seen = traced(trace, target, self._edited, self._sky, share=SKY)
-        return self._in_photo(
-            denoised(without_fireflies(spread(seen), spread=focused(self._edited)), self._guides[size]), surface
-        )
+        calm = without_fireflies(spread(seen), spread=focused(self._edited))
+        guide = self._guides[size]
+        return self._in_photo(denoised(calm, guide.albedo, guide.normal), surface)
 
     @property
     def edited(self) -> Scene:
@@ -162,9 +162,9 @@ class GlassPreview:
 
         edited = self._edited
         bodies = (*edited.bodies[:-1], replace(edited.bodies[-1], surface=surface))
-        target = RenderScene(edited.geometry, edited.camera, bodies=bodies, device=self._device)
-        if edited.lamps:
-            add_lamps(target, edited.lamps)
+        target = RenderScene(
+            edited.geometry, edited.camera, bodies=bodies, lamps=edited.lamps, device=self._device
+        )  # fmt: skip
         target.set_materials(edited.materials)
         target.set_envmap(edited.envmap)
         return target, target.mi.traverse(target.mi_scene)

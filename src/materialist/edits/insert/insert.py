@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from materialist.camera import project
+from materialist.edits.core.notes import noted, warned
 from materialist.edits.insert.meshes import Model, read_model, repainted
 from materialist.edits.insert.support import Support, picture_width, support_at
-from materialist.edits.material.material import noted, warned
 from materialist.errors import InputError
 from materialist.types import Array, Body, Scene
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import srgb_to_linear
+from materialist.edits.core.surfaces import uniform_surface
 from materialist.errors import InputError
 from materialist.types import Array, Surface
 
@@ -24,20 +25,13 @@ MAX_TEXTURE = 4096
 """Pixels along the longer side of a texture; larger ones are shrunk."""
 
 
-def constant(albedo: Array | float, roughness: float, metallic: float, **glass: Any) -> Surface:
-    """A surface of one value: albedo [3] linear or a grey. `glass` are further fields of `Surface`."""
-    colour = np.broadcast_to(np.asarray(albedo, np.float32), (3,)).reshape(1, 1, 3).copy()
-    flat = lambda v: np.full((1, 1), v, np.float32)  # noqa: E731
-    return Surface(colour, flat(roughness), flat(metallic), **glass)
-
-
 def surface_of(material: Any, folder: Any, factor: Any = None) -> Surface:
     """The Surface of a trimesh material, None for none; further maps of an .mtl are read through `folder`.
 
     `factor` [3 or 4] is glTF's base colour as the file has it: trimesh keeps 8 bits of it.
     """
     if material is None:
-        return constant(GREY, GREY, 0.0)
+        return uniform_surface(GREY, GREY, 0.0)
     if hasattr(material, "metallicFactor"):
         return _from_gltf(material, folder, factor)
     return _from_mtl(material, folder)

@@ -11,10 +11,12 @@ from typing import Any, cast
 import numpy as np
 
 from materialist.color import srgb_to_linear
+from materialist.edits.core.surfaces import uniform_surface
+from materialist.edits.core.topology import edge_faults
 from materialist.edits.insert import mesh_gltf, mesh_obj
 from materialist.edits.insert.mesh_folder import FORMATS, MAX_FACES, MeshFolder, claimed_faces
-from materialist.edits.insert.mesh_material import GREY, constant, surface_of, texels
-from materialist.edits.insert.mesh_shape import creased_normals, edge_faults, inside_out
+from materialist.edits.insert.mesh_material import GREY, surface_of, texels
+from materialist.edits.insert.mesh_shape import creased_normals, inside_out
 from materialist.errors import InputError
 from materialist.types import Array, Body, Surface
 
@@ -84,17 +86,17 @@ def repainted(model: Model, material: str) -> Model:
 
     Glass is smooth with an index of 1.5; the mirror's albedo is 0.95; a colour is dielectric with roughness 0.5.
     """
-    from materialist.edits.material.material import parse_colour
+    from materialist.edits.core.surfaces import parse_colour
 
     if material == "as-is":
         return model
     if material == "glass":
-        surface = constant(1.0, 0.0, 0.0, transmission=1.0, ior=1.5)
+        surface = uniform_surface(1.0, 0.0, 0.0, transmission=1.0, ior=1.5)
     elif material == "mirror":
-        surface = constant(0.95, 0.03, 1.0)
+        surface = uniform_surface(0.95, 0.03, 1.0)
     else:
         try:
-            surface = constant(parse_colour(material), 0.5, 0.0)
+            surface = uniform_surface(parse_colour(material), 0.5, 0.0)
         except InputError as error:
             raise InputError(
                 f"The material is {material!r}; give as-is, glass, mirror, R,G,B in [0, 1], or #rrggbb."
@@ -223,7 +225,7 @@ class _Reader:
         if visual.kind in ("vertex", "face"):
             colours = np.asarray(visual.face_colors)[kept, :3].astype(np.float32) / 255
             texture, places = texels(colours if self.linear else srgb_to_linear(colours))
-            return np.zeros((count, 2)), replace(constant(GREY, GREY, 0.0), albedo=texture), places
+            return np.zeros((count, 2)), replace(uniform_surface(GREY, GREY, 0.0), albedo=texture), places
         material = getattr(visual, "material", None)
         said = self.said(material)
         surface = surface_of(material, self.folder, (said.get("pbrMetallicRoughness") or {}).get("baseColorFactor"))

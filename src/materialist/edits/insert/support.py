@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays, unproject
-from materialist.edits.select.region import checked_pixel
+from materialist.edits.core.region import checked_pixel
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.edits.light.lights import kelvin_colour
-from materialist.edits.material.material import noted, warned
-from materialist.edits.select.region import checked_pixel
+from materialist.edits.core.notes import noted, warned
+from materialist.edits.core.region import checked_pixel
+from materialist.edits.core.surfaces import triple
 from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.types import Array, Lamp, Scene
@@ -59,7 +59,7 @@ def relight(
         if not (np.isfinite(amount) and 0 <= amount <= high):
             raise InputError(f"The {name} is {amount}; it must lie in [0, {high:g}].")
     if dim is not None:
-        from materialist.edits.light.glows import dimmed
+        from materialist.edits.light.emitters import dimmed
 
         scene = dimmed(scene, dim, lights=lights, fitted=fitted)
     elif lights is not None:
@@ -103,10 +103,32 @@ def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: f
     return Lamp(triple(position), triple(flux), LAMP_RADIUS * middle)
 
 
-def triple(values: Array) -> tuple[float, float, float]:
-    """Three numbers as a tuple of plain floats, as files and comparisons want them."""
-    a, b, c = (float(v) for v in values)
-    return a, b, c
+def kelvin_colour(kelvin: float) -> Array:
+    """[3] linear Rec.709 of a black body of that temperature, with luminance 1 and no channel below 0.
+
+    Chromaticity by the cubic fits of Kim et al. (2002). Raises InputError outside 1667 to 25000 K.
+    """
+    from materialist.color import LUMINANCE
+
+    if not 1667 <= kelvin <= 25000:
+        raise InputError(f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000.")
+    t = 1000.0 / kelvin
+    if kelvin < 4000:
+        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
+    else:
+        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
+    if kelvin < 2222:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif kelvin < 4000:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    xyz = np.array([x / y, 1.0, (1 - x - y) / y])
+    to_rgb = np.array(
+        [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+    )
+    rgb = np.maximum(to_rgb @ xyz, 0)
+    return (rgb / (LUMINANCE @ rgb)).astype(np.float32)
 
 
 def checked_envmap(envmap: Array) -> Array:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.select.region import checked_region
+from materialist.edits.core.notes import noted
+from materialist.edits.core.region import checked_region
+from materialist.edits.core.surfaces import parse_colour
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -73,31 +74,6 @@ SETTABLE = ("albedo", "roughness", "metallic")
 """Properties of which 0 is a value of its own and not 'as it is'."""
 
 
-def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
-    """The scene with one more entry in `provenance["edits"]`, which reports and packages carry along."""
-    entries = [*scene.provenance.get("edits", []), {"kind": kind, **what}]
-    return replace(scene, provenance={**scene.provenance, "edits": entries})
-
-
-def warned(scene: Scene, *notes: str) -> Scene:
-    """The scene with further warnings in its report; one that an earlier edit gave comes again."""
-    return replace(scene, report=replace(scene.report, warnings=(*scene.report.warnings, *dict.fromkeys(notes))))
-
-
-PICTURED = "Glass of the two-interface model is a picture in the photo: "
-"""The beginning of what is said where the photo is not shown."""
-
-
-def is_pictured(scene: Scene) -> bool:
-    """Whether the photo of an edited scene shows glass that no rendering of the scene has."""
-    return any(step.get("model") == "two-interface" for step in scene.provenance.get("edits", ()))
-
-
-def told_since(scene: Scene, edited: Scene) -> list[str]:
-    """The warnings of the edits that led from one scene to another, each once."""
-    return list(dict.fromkeys(edited.report.warnings[len(scene.report.warnings) :]))
-
-
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
     """[..., 3] linear albedo moved in the HSV of its sRGB encoding (the numbers colour pickers show); float32.
 
@@ -115,28 +91,6 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     v = v + value * (1 - v) if value > 0 else v * (1 + value)
     moved = cv2.cvtColor(np.stack([h, s, v], -1).astype(np.float32), cv2.COLOR_HSV2RGB)
     return srgb_to_linear(np.clip(moved, 0, 1)).reshape(shape)
-
-
-def parse_colour(colour: tuple[float, float, float] | str, name: str = "albedo") -> Array:
-    """[3] float32 linear colour from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB.
-
-    Raises InputError, which says what colour of what `name`.
-    """
-    if isinstance(colour, str) and colour.startswith("#"):
-        try:
-            if len(colour) != 7:
-                raise ValueError
-            return srgb_to_linear(np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32))
-        except ValueError as error:
-            raise InputError(f"The {name} {colour!r} must look like #ff8800.") from error
-    try:
-        parts = colour.split(",") if isinstance(colour, str) else colour
-        rgb = np.array([float(c) for c in parts], np.float32)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
-    if rgb.shape != (3,) or not (np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()):
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
-    return rgb
 
 
 def _base_colour(scene: Scene, weight: Array, albedo, texture: Array | None, scale: float) -> Array:

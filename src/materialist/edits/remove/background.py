@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.material.material import noted, warned
+from materialist.edits.core.notes import noted, warned
+from materialist.edits.core.region import body_coverage
 from materialist.edits.remove.amodal import going_on
 from materialist.edits.remove.behind import Behind, behind, is_thing
 from materialist.edits.remove.exemplar import Plan, exemplar_plan
@@ -17,7 +18,6 @@ from materialist.edits.remove.filled import laid, outline, with_hole
 from materialist.edits.remove.hole import GROW, Hole, make_hole
 from materialist.edits.remove.regular import regular_sources
 from materialist.edits.remove.seamless import seamless
-from materialist.edits.select.region import placed
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.io.image import same_aspect
@@ -60,7 +60,7 @@ def without(
     found = behind(scene.depth, scene.normal, label, hole.gone, front, scene.camera, things)
     features = looks(scene.materials.albedo, scene.photo.linear)
     photographed = replace(scene, bodies=(fitted or scene).bodies)  # what an edit puts there is not in the photo
-    usable = placed(photographed) == 0 if photographed.bodies else None
+    usable = body_coverage(photographed) == 0 if photographed.bodies else None
     plan = sources(features, hole.painted, found.label, found.depth, scene.camera, seed=seed, usable=usable)
     shown = _denoised(scene)
     picture, notes = _given(scene, background, inpaint, hole)
@@ -196,7 +196,7 @@ def _painted(
 
 def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
     """The scene with its bodies in the filled photo and re-rendering again: they stand before what was taken away."""
-    share = placed(scene)
+    share = body_coverage(scene)
     if not (share[hole.painted] > 0).any():
         return removed
     photo, native = scene.photo, scene.photo.original.shape[:2]
@@ -210,14 +210,16 @@ def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
 
 def _enlarged_share(scene: Scene, where: Array, native: tuple[int, int]) -> Array:
     """[H0, W0] share of each native pixel in which a body is seen, near `where` [H, W] bool; 0 elsewhere."""
-    from materialist.edits.light.lights import Studio
+    from materialist.edits.core.renderer import EditRenderer
 
     box: list[int] = []
     for axis in (0, 1):
         (inside,), scale = np.nonzero(where.any(1 - axis)), native[axis] / where.shape[axis]
         box += [max(0, int((inside[0] - 1) * scale)), min(native[axis], int(np.ceil((inside[-1] + 2) * scale)))]
     large = np.zeros(native, np.float32)
-    large[box[0] : box[1], box[2] : box[3]] = Studio(scene).bodies_in(scene, native, (box[0], box[1], box[2], box[3]))
+    large[box[0] : box[1], box[2] : box[3]] = EditRenderer(scene).body_coverage_in(
+        scene, native, (box[0], box[1], box[2], box[3])
+    )
     return large
 
 
@@ -226,22 +228,20 @@ def _matched(removed: Scene, hole: Hole, picture: Array, fitted: Scene, *, spp: 
 
     One rendering says how far the guess was off; for a matt surface the radiance goes with the albedo.
     """
-    from materialist.edits.composite.layers import denoised
-    from materialist.edits.light.lights import Studio
+    from materialist.edits.core.renderer import EditRenderer, denoised
 
     known = replace(removed, envmap=fitted.envmap, lamps=fitted.lamps, bodies=fitted.bodies)
-    studio = Studio(known)
-    guides = (removed.materials.albedo, removed.materials.albedo, removed.normal)
+    renderer = EditRenderer(known)
     wanted = resized(picture, hole.painted.shape)
     for _ in range(2):
-        render, _ = studio.twins(known)
+        render, _ = renderer.pair(known)
         seen = render(spp, 1)
-        seen, _ = denoised(seen, seen, guides)
+        seen = denoised(seen, removed.materials.albedo, removed.normal)
         factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.2, 5)
         albedo = np.where(hole.painted[..., None], known.materials.albedo * factor, known.materials.albedo)
         albedo = np.clip(albedo, 0, 1).astype(np.float32)
         known = replace(known, materials=replace(known.materials, albedo=albedo))
-        studio = Studio(known)
+        renderer = EditRenderer(known)
     return replace(removed, materials=known.materials)
 
 
@@ -286,10 +286,9 @@ def _geometry(scene: Scene, found: Behind):
 
 def _denoised(scene: Scene) -> Array:
     """[H, W, 3] the re-rendering without its noise, where the denoiser is installed."""
-    from materialist.edits.composite.layers import denoised
+    from materialist.edits.core.renderer import denoised
 
-    guides = (scene.materials.albedo, scene.materials.albedo, scene.normal)
-    return denoised(scene.rerender, scene.rerender, guides)[0]
+    return denoised(scene.rerender, scene.materials.albedo, scene.normal)
 
 
 def resized(picture: Array, shape: tuple[int, ...]) -> Array:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.edits.core.region import body_coverage, checked_region
 from materialist.edits.remove.cast import cast
 from materialist.edits.remove.halo import softness
-from materialist.edits.select.region import checked_region, placed
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -97,7 +97,7 @@ def _soft_rim(scene: Scene, own: Array) -> Array:
     """[H, W] bool: the object as far as it colours its surroundings, but for what stands before it."""
     from scipy.ndimage import distance_transform_edt
 
-    body = placed(scene) > 0 if scene.bodies else np.zeros_like(own)
+    body = body_coverage(scene) > 0 if scene.bodies else np.zeros_like(own)
     bare = own & ~body
     if not bare.any():
         return own

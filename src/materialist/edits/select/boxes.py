@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from materialist.edits.select.objects import certainty
+from materialist.edits.select.objects import certainty, likely
 from materialist.edits.select.refine import grabcut, overlap, tidy
 from materialist.types import Array, Scene
 
@@ -92,7 +92,6 @@ def _likely(scene: Scene, box: Box) -> Array | None:
 
     None where it finds nothing that ends in the box.
     """
-    from materialist.edits.select.select import likely
 
     x0, y0, x1, y1 = grown(box, SLACK, scene.depth.shape)
     inside = np.zeros(scene.depth.shape, bool)

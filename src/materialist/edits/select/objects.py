@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from materialist.types import Array
+from materialist.types import Array, Scene
 
 _COLOUR, _STEP, _CREASE = 12.0, 0.03, 0.35
 """A full edge: Lab distance between neighbours, share of a jump of depth beyond the slope, 1 - cos of a turn."""
@@ -212,3 +212,11 @@ def _second(values: Array) -> Array:
     x = padded[1:-1, 2:] - 2 * values + padded[1:-1, :-2]
     y = padded[2:, 1:-1] - 2 * values + padded[:-2, 1:-1]
     return np.hypot(x, y)
+
+
+def likely(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] in [0, 1]: how likely each pixel is of the object that all (column, row) points lie on, says ClickNet."""
+    from materialist.color import linear_to_srgb
+    from materialist.predict.clicks.segment import Photo, object_at
+
+    return object_at(Photo(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth), points)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.edits.select.region import HIDDEN, PLACED, checked_pixel, checked_region, placed
+from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
+from materialist.edits.select.objects import likely
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -64,14 +65,6 @@ def select(
         other = "draw the box a little larger" if frame is not None else "click another place on the object"
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
     return found
-
-
-def likely(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] in [0, 1]: how likely each pixel is of the object that all (column, row) points lie on, says ClickNet."""
-    from materialist.color import linear_to_srgb
-    from materialist.predict.clicks.segment import Photo, object_at
-
-    return object_at(Photo(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth), points)
 
 
 def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | None = None) -> Array:
@@ -142,7 +135,7 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
     for x, y in points:
         if scene.depth[y, x] <= 0:
             raise InputError(f"The click {x},{y} is on the sky, where there is no surface; click on an object.")
-        if scene.bodies and placed(scene)[y, x] > HIDDEN:
+        if scene.bodies and body_coverage(scene)[y, x] > HIDDEN:
             raise InputError(f"The click {x},{y} is on {PLACED}, or click on something else.")
     return points
 

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.glass import glass
-from materialist.edits.insert.mesh_material import constant
-from materialist.edits.light import glows
+from materialist.edits.composite.upsample import matte
+from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
+from materialist.edits.core.sky import sky_maps, traced
+from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
+from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
 
 MOST = 1_500_000
@@ -25,12 +27,12 @@ CONTACT = 0.05
 
 
 NOWHERE = np.zeros((0, 3), np.float32)
-LAMP = Body(NOWHERE, NOWHERE.astype(np.int32), NOWHERE, NOWHERE[:, :2], constant(1.0, 1.0, 0.0), "lamp")
+LAMP = Body(NOWHERE, NOWHERE.astype(np.int32), NOWHERE, NOWHERE[:, :2], uniform_surface(1.0, 1.0, 0.0), "lamp")
 """What stands for a lamp where its albedo is asked for."""
 
 
 @dataclass(frozen=True)
-class Portrait:
+class NativeLayer:
     """The new bodies of an edit, as the photo would show them."""
 
     inside: Array
@@ -41,22 +43,35 @@ class Portrait:
     """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
-def free_bodies(scene: Scene, edited: Scene) -> list[str]:
+def new_bodies(scene: Scene, edited: Scene) -> list[str]:
     """Names of the shapes of bodies that `edited` has and `scene` has not, and whose outline is not in the photo.
 
     The photo's own lights and what is turned to glass in it have the outline that the photo shows.
     """
     new = {f"body{k}": body for k, body in enumerate(edited.bodies) if body not in scene.bodies}
-    return [name for name, body in new.items() if not body.name.startswith((glows.NAME, glass.NAME))]
+    return [name for name, body in new.items() if not body.name.startswith((PHOTO_LIGHT, PHOTO_GLASS))]
 
 
-def portrait(
-    target: Any, scene: Scene, edited: Scene, names: list[str], *, spp: int, seed: int, max_depth: int, clean: bool,
-) -> Portrait | None:  # fmt: skip
-    """Trace the named bodies of a `RenderScene` at native size; None where the camera sees none of them."""
-    from materialist.edits.glass.sky import sky_maps, traced
+def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool) -> NativeLayer | None:
+    """Trace the bodies and lamps that are new in `edited` at native size; None where the camera sees none of them.
+
+    Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
+    every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
+    """
+    scene = renderer.scene
+    lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
+    if not is_relit(scene, edited):
+        lamps = new_lamps(scene, edited)
+    names = new_bodies(scene, edited) + lamps
+    return _traced(renderer.render_scene(edited), scene, edited, names, spp, seed, clean) if names else None
+
+
+def _traced(
+    target: Any, scene: Scene, edited: Scene, names: list[str], spp: int, seed: int, clean: bool
+) -> NativeLayer | None:
+    """The named bodies of a `RenderScene` as a layer."""
     from materialist.render import portrait as trace
-    from materialist.render.bodies import is_transparent
+    from materialist.render.scene import MAX_DEPTH
 
     camera, native = scene.camera, scene.photo.original.shape[:2]
     working = (camera.height, camera.width)
@@ -78,14 +93,15 @@ def portrait(
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     contact = 2.0 if all(name.startswith("lamp") for name in names) else CONTACT
     gap = contact * _extent(alone)
-    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": max_depth, "names": names, "gap": gap}
+    depth = path_depth(edited) or MAX_DEPTH
+    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
     clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
     maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
     picture = traced(lambda _: trace.radiance(target, size, part, **options), target, edited, maps)
     guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
     picture = spread(picture)
     if clean:
-        picture = denoised(picture, guide)
+        picture = denoised(picture, guide.albedo, guide.normal)
     picture = _enlarged(picture, sight.share.shape)
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
@@ -93,7 +109,7 @@ def portrait(
     share[rows, columns] = _behind_things(sight, alone, scene, box, gap)
     whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
     bright = any(max(bodies[name].surface.emission) > 1 or name.startswith("lamp") for name in names)
-    return Portrait(_around(small.share) if bright else small.share, share, whole)
+    return NativeLayer(_around(small.share) if bright else small.share, share, whole)
 
 
 def _around(share: Array) -> Array:
@@ -124,17 +140,6 @@ def _scaled(box: tuple[int, int, int, int], native: tuple[int, int], size: tuple
     return top, min(bottom, size[0]), left, min(right, size[1])
 
 
-def denoised(picture: Array, guide: Any) -> Array:
-    """[h, w, 3] without noise, where the denoiser is installed; `guide` is a `render.portrait.Sight`."""
-    from materialist.errors import SetupError
-    from materialist.render.denoise import denoise
-
-    try:
-        return denoise(picture, albedo=guide.albedo, normal=guide.normal)
-    except SetupError:
-        return picture
-
-
 def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
     import cv2
 
@@ -151,8 +156,6 @@ def _behind_things(
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
     """
     import cv2
-
-    from materialist.edits.composite.upsample import matte
 
     native = scene.photo.original.shape[:2]
     rows, columns = slice(*box[:2]), slice(*box[2:])

@@ -6,6 +6,7 @@ from threading import Lock
 
 import numpy as np
 
+from materialist.edits.core.renderer import EditRenderer
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -37,25 +38,21 @@ def checked_region(scene: Scene, mask: Array) -> Array:
     weight = weight * (scene.depth > 0)
     if not weight.any():
         raise InputError("The mask covers only sky, where the scene has no surface to edit; mark a surface.")
-    if scene.bodies and float((placed(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
-        from materialist.edits.light.lights import Studio
-
-        lights = Studio(scene).photo_lights(scene)
-        what = DIMMED if float((lights * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
+    if scene.bodies and float((body_coverage(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
+        emitters = EditRenderer(scene).emitter_pixels(scene)
+        what = DIMMED if float((emitters * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
         raise InputError(f"What is marked is {what}, or mark something else.")
     return weight
 
 
-def placed(scene: Scene) -> Array:
+def body_coverage(scene: Scene) -> Array:
     """[H, W] share of each pixel in which something is seen that was put into the scene, or made glass."""
-    from materialist.edits.light.lights import Studio
-
     asked = (scene.geometry, *scene.bodies)
     key = tuple(map(id, asked))
     with _LOCK:
         known = _answered.get(key)
     if known is None:
-        known = asked, Studio(scene).bodies_seen(scene)
+        known = asked, EditRenderer(scene).body_coverage(scene)
         with _LOCK:
             _answered[key] = known
             while len(_answered) > _KEPT:
@@ -65,7 +62,7 @@ def placed(scene: Scene) -> Array:
 
 _LOCK, _KEPT = Lock(), 8
 _answered: dict[tuple[int, ...], tuple[tuple, Array]] = {}
-"""What `placed` was asked of of late, which keeps their ids theirs, and its answers."""
+"""Latest answers of `body_coverage`; each holds the objects whose ids are its key, so that no id is used again."""
 
 
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from materialist.camera import project
-from materialist.edits.glass.two_interface import environment
-from materialist.envmap import texel_directions
+from materialist.envmap import environment, texel_directions
 from materialist.types import Array, Materials, Scene
 
 ROWS = 768

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.composite.upsample import matte, window
-from materialist.edits.insert.mesh_material import constant
-from materialist.edits.material.material import warned
+from materialist.edits.core.emitters import KEY, OFF, emitting, with_emitters
+from materialist.edits.core.notes import is_edited, warned
+from materialist.edits.core.region import checked_region
+from materialist.edits.core.surfaces import PHOTO_LIGHT, triple, uniform_surface
 from materialist.errors import InputError
 from materialist.render.scene import part
 from materialist.types import Array, Body, Photo, Scene
@@ -27,8 +28,6 @@ LEAST = 0.001
 """Smallest share of the picture that a light covers; less is a highlight."""
 SMALLEST = 9
 """Pixels below which a mask is no light."""
-NEARLY = 0.9
-"""Least channel from which a pixel may be brighter than it looks."""
 LIFT = 2e-3
 """A light lies before its surface by this share of the depth."""
 RADIANCES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
@@ -37,14 +36,9 @@ HALF, SOME = 0.5, 0.1
 """Share of a light that is clipped beyond which its colour is unknown, and up to which its radiance is known."""
 WORSE = 1.02
 """Errors of the photo that are alike: up to so many times the least one."""
-DARK = 1e-6
-"""Radiance of a light that is off: it is still the photo's own, with its outline."""
 BRIGHTER = 4.0
 """So many times as bright as an HDR photo in the median is a light in it, at least."""
 SPP = 32
-NAME = "photo light"
-KEY = "photo_lights"
-"""Entry of the provenance of a scene whose lights are surfaces."""
 
 
 def visible_lights(scene: Scene) -> list[Array]:
@@ -107,7 +101,7 @@ def dimmed(
     """
     if not (np.isfinite(dim) and 0 <= dim <= 10):
         raise InputError(f"The dimming is {dim:g}; it must lie in [0, 10], 1 for as it is, 0 for off.")
-    if any(body.name.startswith(NAME) for body in scene.bodies):
+    if any(body.name.startswith(PHOTO_LIGHT) for body in scene.bodies):
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")
     if fitted is None and is_edited(scene):
         raise InputError(
@@ -127,8 +121,11 @@ def dimmed(
     ambient, radiance, share = _explained(known, masks, colours, seed, device, given)
     shining = [[radiance * c for c in colour] for colour in colours]
     found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": shining}
-    glow = [[max(dim * c, DARK) for c in own] for own in shining]
-    edited = _shining(scene, [_patch(scene, masks[k], own, f"{NAME} {k}") for k, own in enumerate(glow)], found)
+    emitters = [
+        emitting(_patch(scene, mask, f"{PHOTO_LIGHT} {k}"), [dim * c for c in own])
+        for k, (mask, own) in enumerate(zip(masks, shining))
+    ]  # fmt: skip
+    edited = with_emitters(scene, emitters, found)
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     kind = "clipped regions" if lights is None else "regions"
     note = f"Taken for lights, {radiance:.3g} times as bright as the photo's white: the {kind} around {places}."
@@ -137,8 +134,6 @@ def dimmed(
 
 def _given(scene: Scene, lights: Array) -> list[Array]:
     """The parts of a mask of lights that are large enough to be a surface."""
-    from materialist.edits.select.region import checked_region
-
     masks = [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() >= SMALLEST]
     if not masks:
         raise InputError(f"The mask of lights has no connected part of {SMALLEST} pixels; mark the whole light.")
@@ -156,80 +151,14 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
     An HDR photo tells how bright its lights are, and any photo those that are not clipped. Else colours are 1 in the
     brightest channel, and white where most of a light is clipped.
     """
-    from materialist.edits.light.relight import triple
-
     inside = [photo.linear[mask] for mask in masks]
     clipped = np.concatenate([(part.max(-1) >= CLIPPED) for part in inside]).mean()
     if photo.hdr or clipped < SOME:
-        peak = max(max(float(part.mean(0).max()) for part in inside), DARK)
+        peak = max(max(float(part.mean(0).max()) for part in inside), OFF)
         return [triple(part.mean(0) / peak) for part in inside], peak
     white = [(part.min(-1) >= CLIPPED).mean() > HALF for part in inside]
     means = [np.ones(3) if is_white else part.mean(0) for part, is_white in zip(inside, white)]
     return [triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
-
-
-def is_edited(scene: Scene) -> bool:
-    """Whether a scene has edits that its photo and its re-rendering do not show."""
-    saved = [len(stage.get("edits", ())) for stage in scene.report.stages if stage.get("name") == "edit"]
-    return len(scene.provenance.get("edits", ())) > max(saved, default=0)
-
-
-def newly_dimmed(scene: Scene, edited: Scene) -> dict | None:
-    """The entry KEY of an edit that dimmed the lights of this scene's photo, None where it did not."""
-    return None if KEY in scene.provenance else edited.provenance.get(KEY) or None
-
-
-def explained(scene: Scene, edited: Scene) -> Scene:
-    """What an edit is compared with: the scene itself, or where the edit has dimmed its lights, the scene with them.
-
-    The two give the same photo; the scene's own map has the light of the photo's lights from elsewhere.
-    """
-    found = newly_dimmed(scene, edited)
-    if found is None:
-        return scene
-    white = [[found["radiance"]] * 3] * len(edited.bodies)  # of scenes of earlier versions
-    return _shining(scene, _emitting(edited, found.get("emission", white)), found)
-
-
-def _shining(scene: Scene, lights: Sequence[Body], found: dict) -> Scene:
-    envmap = scene.envmap * np.float32(found["ambient"])
-    return replace(scene, envmap=envmap, bodies=(*scene.bodies, *lights))
-
-
-def _emitting(scene: Scene, emission: Sequence[Sequence[float]]) -> list[Body]:
-    """The photo's lights among a scene's bodies, with that emission [K][3]."""
-    lights = [body for body in scene.bodies if body.name.startswith(NAME)]
-    found = []
-    for body, own in zip(lights, emission):
-        red, green, blue = (max(float(c), DARK) for c in own)
-        found.append(replace(body, surface=replace(body.surface, emission=(red, green, blue))))
-    return found
-
-
-def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Array | None = None) -> Array:
-    """[H0, W0, 3] a composite in which the photo's lights are the photo itself, dimmed: with the trees in the window.
-
-    What is clipped is as bright as the light was found to be.
-
-    Args:
-        seen: [H, W] bool: where lights are seen. found: the entry KEY. before: [H0, W0] share of what stands before.
-    """
-    dim = float(found["dim"])
-    if dim == 1 or not seen.any():
-        return picture
-    share, picture = matte(seen, photo.original), picture.copy()
-    box = window(seen, picture.shape[:2], 4)
-    share, seen_so, here = share[box][..., None], photo.original[box], picture[box]
-    if before is not None:
-        share = share * (1 - before[box])[..., None]
-    white = seen_so.min(-1, keepdims=True)
-    own = dim * seen_so
-    if not photo.hdr:
-        lifted = own * (1 + max(found["radiance"] - 1, 0) * np.clip((white - NEARLY) / (CLIPPED - NEARLY), 0, 1))
-        # What is not clipped is as bright as it is, and dimming brightens nothing.
-        own = np.where((white < CLIPPED) & (dim < 1), np.minimum(lifted, seen_so), lifted)
-    picture[box] = np.where(share > 0, share * own + (1 - share) * here, here)
-    return picture
 
 
 def _explained(
@@ -246,7 +175,7 @@ def _explained(
     """
     from materialist.render.scene import RenderScene
 
-    shining = tuple(_patch(scene, mask, colour, NAME) for mask, colour in zip(masks, colours))
+    shining = tuple(emitting(_patch(scene, mask, PHOTO_LIGHT), colour) for mask, colour in zip(masks, colours))
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *shining), device=device)
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), 1e-6, np.float32))
@@ -270,8 +199,8 @@ def _explained(
     return found[chosen][0], chosen, float(chosen * lit.mean() / max(base.mean(), 1e-6))
 
 
-def _patch(scene: Scene, mask: Array, emission: Sequence[float], name: str) -> Body:
-    """The surface of the masked pixels, lifted a little towards the camera, black but for its light [3]."""
+def _patch(scene: Scene, mask: Array, name: str) -> Body:
+    """The surface of the masked pixels, black, and moved a little towards the camera."""
     surface = part(scene.geometry.mesh, -1)
     chosen = mask.reshape(-1)[surface.face_pixel]
     faces = surface.faces[chosen]
@@ -279,5 +208,5 @@ def _patch(scene: Scene, mask: Array, emission: Sequence[float], name: str) -> B
     vertices = (surface.vertices[used] * np.float32(1 - LIFT)).astype(np.float32)
     return Body(
         vertices, numbers.reshape(faces.shape).astype(np.int32), surface.normals[used], surface.uv[used],
-        constant(0.0, 1.0, 0.0, emission=(float(emission[0]), float(emission[1]), float(emission[2]))), name,
+        uniform_surface(0.0, 1.0, 0.0), name,
     )  # fmt: skip

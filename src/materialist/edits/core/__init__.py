@@ -1,0 +1,1 @@
+"""What every edit needs: the checked region, notes in the provenance, and renderings beside the fitted scene."""

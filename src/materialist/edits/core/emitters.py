@@ -1,0 +1,47 @@
+"""In-photo emitters: lights that the photo shows and that an edit has turned into surfaces (`light.emitters`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from materialist.edits.core.surfaces import PHOTO_LIGHT
+from materialist.types import Body, Scene
+
+KEY = "photo_lights"
+"""Entry of the provenance of a scene with in-photo emitters: `ambient` (factor on the fitted environment map),
+`radiance` of the emitters, `dim` (the factor that the user asked for), their `share` of the light, `emission`."""
+OFF = 1e-6
+"""Radiance of an emitter that is switched off: the renderer still knows it as an emitter."""
+
+
+def dimmed_emitters(scene: Scene, edited: Scene) -> dict | None:
+    """The entry KEY of an edit that dimmed emitters of this scene's photo; None where it did not."""
+    return None if KEY in scene.provenance else edited.provenance.get(KEY) or None
+
+
+def base_of(scene: Scene, edited: Scene) -> Scene:
+    """The scene that an edit is compared with: the fitted scene, with its emitters as surfaces if the edit has them.
+
+    Both give the photo; without the surfaces the light of the emitters is in the environment map.
+    """
+    found = dimmed_emitters(scene, edited)
+    if found is None:
+        return scene
+    white = [[found["radiance"]] * 3] * len(edited.bodies)  # scenes of earlier versions hold no colours
+    emission = found.get("emission", white)
+    lights = [body for body in edited.bodies if body.name.startswith(PHOTO_LIGHT)]
+    return with_emitters(scene, [emitting(body, own) for body, own in zip(lights, emission)], found)
+
+
+def with_emitters(scene: Scene, emitters: Sequence[Body], found: dict) -> Scene:
+    """The scene with emitters as further bodies, and without their light in the environment map."""
+    return replace(scene, envmap=scene.envmap * np.float32(found["ambient"]), bodies=(*scene.bodies, *emitters))
+
+
+def emitting(body: Body, emission: Sequence[float]) -> Body:
+    """The body with an emission [3]; a channel of 0 becomes `OFF`."""
+    red, green, blue = (max(float(c), OFF) for c in emission)
+    return replace(body, surface=replace(body.surface, emission=(red, green, blue)))

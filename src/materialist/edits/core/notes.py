@@ -1,0 +1,38 @@
+"""Notes of edits in the provenance of a scene, and warnings in its report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from materialist.types import Scene
+
+PICTURED = "Glass of the two-interface model is a picture in the photo: "
+"""The beginning of messages about glass that no rendering shows."""
+
+
+def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
+    """The scene with one more entry in `provenance["edits"]`, which reports and packages carry along."""
+    entries = [*scene.provenance.get("edits", []), {"kind": kind, **what}]
+    return replace(scene, provenance={**scene.provenance, "edits": entries})
+
+
+def warned(scene: Scene, *notes: str) -> Scene:
+    """The scene with further warnings in its report; a warning that an earlier edit gave is repeated."""
+    return replace(scene, report=replace(scene.report, warnings=(*scene.report.warnings, *dict.fromkeys(notes))))
+
+
+def warnings_since(scene: Scene, edited: Scene) -> list[str]:
+    """The warnings of the edits that led from one scene to another, each once."""
+    return list(dict.fromkeys(edited.report.warnings[len(scene.report.warnings) :]))
+
+
+def is_pictured(scene: Scene) -> bool:
+    """Whether the photo of an edited scene shows glass that no rendering of the scene has."""
+    return any(step.get("model") == "two-interface" for step in scene.provenance.get("edits", ()))
+
+
+def is_edited(scene: Scene) -> bool:
+    """Whether a scene has edits that its photo and its re-rendering do not show."""
+    saved = [len(stage.get("edits", ())) for stage in scene.report.stages if stage.get("name") == "edit"]
+    return len(scene.provenance.get("edits", ())) > max(saved, default=0)

@@ -1,0 +1,219 @@
+"""Renderings of a fitted scene and of its edits, with common random numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from materialist.edits.core.sky import only_lit_by, sky_maps
+from materialist.edits.core.surfaces import PHOTO_LIGHT
+from materialist.errors import SetupError
+from materialist.render.bodies import is_glowing, is_transparent
+from materialist.types import Array, Scene
+
+Render = Callable[[int, int], Array]
+"""render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
+
+
+class EditRenderer:
+    """Renderings of one fitted scene and of its edits, with common random numbers, so that their noise cancels.
+
+    Under another light other directions are sampled, and less of the noise cancels. Scenes of one geometry, with the
+    same bodies and lamps, share a Mitsuba scene; a picture of the base is rendered once for each number of paths and
+    seed.
+    """
+
+    def __init__(self, scene: Scene, *, device: str = "auto"):
+        self.scene, self.device = scene, device
+        self._built: list[tuple[Scene, Any]] = []
+        self._base: dict[tuple[int, int, int, int], Array] = {}
+
+    def pair(self, edited: Scene) -> tuple[Render, Render]:
+        """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
+
+        The splitting tracer serves most light. With lamps, a sun or glass on either side both pictures come from
+        Mitsuba's path tracer, which samples the lights and follows paths through glass.
+        """
+        depth, paths = self._tracer(edited)
+
+        def base(spp: int, seed: int) -> Array:
+            key = (depth, paths, spp, seed)
+            if key not in self._base:
+                self._base[key] = self._render(self.scene, depth, paths, spp, seed)
+            return self._base[key]
+
+        missing = self._missing_sky(edited)
+        if missing is None:
+            return base, lambda spp, seed: self._render(edited, depth, paths, spp, seed)
+        where, more, less = missing
+
+        def before_sky(spp: int, seed: int) -> Array:
+            sky = self._render(more, depth, paths, spp, seed) - self._render(less, depth, paths, spp, seed)
+            return self._render(edited, depth, paths, spp, seed) + np.where(where, sky, 0)
+
+        return base, before_sky
+
+    def beside(self, edited: Scene, other: Scene) -> Render:
+        """render(spp, seed) of `other` by the tracer that `pair` takes for `edited`."""
+        depth, paths = self._tracer(edited)
+        return lambda spp, seed: self._render(other, depth, paths, spp, seed)
+
+    def covered(self, edited: Scene) -> Array:
+        """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""
+        seen = np.zeros(self.scene.depth.shape, bool)
+        for scene, other in ((self.scene, edited), (edited, self.scene)):
+            own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
+            own += new_lamps(other, scene)
+            if own:
+                seen |= self._seen(scene, own) > 0
+        return seen
+
+    def body_coverage(self, scene: Scene) -> Array:
+        """[H, W] share of each pixel in which one of its bodies is seen."""
+        names = [f"body{k}" for k in range(len(scene.bodies))]
+        return self._seen(scene, names) if names else np.zeros(scene.depth.shape, np.float32)
+
+    def emitter_pixels(self, edited: Scene) -> Array:
+        """[H, W] bool: where in-photo emitters of `edited` are seen."""
+        names = [f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(PHOTO_LIGHT)]
+        return self._seen(edited, names) > 0.5 if names else np.zeros(edited.depth.shape, bool)
+
+    def body_coverage_in(self, scene: Scene, size: tuple[int, int], box: tuple[int, int, int, int]) -> Array:
+        """`body_coverage` in a box (top, bottom, left, right) of a picture of another size (H, W)."""
+        from materialist.render.portrait import look
+
+        bodies = {f"body{k}": body for k, body in enumerate(scene.bodies)}
+        return look(self.render_scene(scene).mi_scene, scene.camera, bodies, size, box).share
+
+    def guides(self, edited: Scene) -> tuple[Array, Array]:
+        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with those of its bodies."""
+        return self.body_guides(edited, self.body_coverage(edited) > 0)
+
+    def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
+        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, where `covered` those of its bodies."""
+        from materialist.render.portrait import look
+
+        if not covered.any():
+            return edited.materials.albedo, edited.normal
+        bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+        rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
+        box = (int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1)
+        sight = look(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, box)
+        albedo, normal = edited.materials.albedo.copy(), edited.normal.copy()
+        part = np.s_[box[0] : box[1], box[2] : box[3]]
+        share = np.where(covered[part], sight.share, 0)[..., None]
+        albedo[part] = share * sight.albedo + (1 - share) * albedo[part]
+        normal[part] = share * sight.normal + (1 - share) * normal[part]
+        return albedo, normal
+
+    def render_scene(self, scene: Scene):
+        """The `RenderScene` of a scene's geometry, lamps and bodies, with its materials and its light."""
+        target = self._target(scene)
+        target.set_materials(scene.materials)
+        target.set_envmap(scene.envmap)
+        return target
+
+    def _missing_sky(self, edited: Scene) -> tuple[Array, Scene, Scene] | None:
+        """([H, W, 1] where new glass is seen, the edit under the photo's sky alone, and under what the fit has there).
+
+        None where no new glass stands before sky, or where the light is another than the photo's.
+        """
+        old = self.scene.bodies
+        new = [f"body{k}" for k, b in enumerate(edited.bodies) if b not in old and is_transparent(b.surface)]
+        maps = None if not new or is_relit(self.scene, edited) else sky_maps(edited)
+        if maps is None:
+            return None
+        more, less = (only_lit_by(edited, envmap) for envmap in maps)
+        return self._seen(edited, new)[..., None] > 0, more, less
+
+    def _tracer(self, edited: Scene) -> tuple[int, int]:
+        """(path length of Mitsuba's path tracer or 0 for the splitting tracer, paths of either scene a camera ray)."""
+        depth = max(path_depth(s) for s in (self.scene, edited))
+        return depth, 1 if depth else max(self.render_scene(s).paths for s in (self.scene, edited))
+
+    def _render(self, scene: Scene, depth: int, paths: int, spp: int, seed: int) -> Array:
+        target = self.render_scene(scene)
+        if depth:
+            return target.render_path(spp=spp, seed=seed, max_depth=depth)
+        return target.render(spp=-(-spp // paths), seed=seed)
+
+    def _seen(self, scene: Scene, names: list[str]) -> Array:
+        """[H, W] share of each pixel in which the named bodies are seen."""
+        from materialist.render.seen import bodies_seen
+
+        return bodies_seen(self._target(scene).mi_scene, scene.camera, names)
+
+    def _target(self, scene: Scene):
+        """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""
+        for other, target in self._built:
+            if other.geometry is scene.geometry and (other.lamps, other.bodies) == (scene.lamps, scene.bodies):
+                return target
+        from materialist.render.scene import RenderScene
+
+        target = RenderScene(
+            scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
+        )  # fmt: skip
+        if self._built:
+            target.aim_as(self._built[0][1])
+        # The base, and the last edit of another shape: a moving lamp must not fill the memory.
+        self._built = [*self._built[:1], (scene, target)]
+        return target
+
+
+def is_relit(scene: Scene, edited: Scene) -> bool:
+    """Whether the two scenes have different light."""
+    glowing = [[body for body in s.bodies if is_glowing(body.surface)] for s in (scene, edited)]
+    return (
+        scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
+    )  # fmt: skip
+
+
+def new_lamps(scene: Scene, edited: Scene) -> list[str]:
+    """Names of the shapes of lamps that `edited` has and `scene` has not; a second one like the first is new."""
+    known, names = list(scene.lamps), []
+    for k, lamp in enumerate(edited.lamps):
+        if lamp in known:
+            known.remove(lamp)
+        else:
+            names.append(f"lamp{k}")
+    return names
+
+
+def path_depth(scene: Scene) -> int:
+    """Length of the paths that Mitsuba's path tracer must follow; 0 where the splitting tracer serves the scene."""
+    from materialist.render.envmap import is_sunny
+    from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
+
+    if any(is_transparent(body.surface) for body in scene.bodies):
+        return GLASS_DEPTH
+    glows = any(is_glowing(body.surface) for body in scene.bodies)
+    return MAX_DEPTH if glows or scene.lamps or is_sunny(scene.envmap) else 0
+
+
+def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:
+    """[H, W, 3] float32 linear: the scene as it stands, with its bodies and lamps; `spp` camera rays a pixel.
+
+    Raises SetupError with `denoise` where the denoiser is not installed.
+    """
+    renderer = EditRenderer(scene, device=device)
+    target = renderer.render_scene(scene)
+    depth = path_depth(scene) if scene.bodies or scene.lamps else 0
+    picture = target.render_path(spp=spp, seed=seed, max_depth=depth) if depth else target.render(spp=spp, seed=seed)
+    if denoise:
+        from materialist.render.denoise import denoise as clean
+
+        albedo, normal = renderer.guides(scene)
+        picture = clean(picture, albedo=albedo, normal=normal)
+    return picture
+
+
+def denoised(picture: Array, albedo: Array, normal: Array) -> Array:
+    """[H, W, 3] without noise, guided by albedo and normal [H, W, 3]; as it is where no denoiser is installed."""
+    from materialist.render.denoise import denoise
+
+    try:
+        return denoise(picture, albedo=albedo, normal=normal)
+    except SetupError:
+        return picture
