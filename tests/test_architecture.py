@@ -7,7 +7,7 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
-NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "plain"}
+NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "option_kinds", "options", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 OPERATIONS = {
     "edits.select",
@@ -113,7 +113,7 @@ NETWORKS = (
     "predict.lite",
 )
 """Networks need torch at their top; whoever calls them imports them late."""
-LIGHT_START = ("", "types", "errors", "color", "camera", "plain", "cli")
+LIGHT_START = ("", "types", "errors", "color", "camera", "option_kinds", "options", "plain", "cli")
 """Modules that load at every start and so may import nothing slow at the top."""
 SLOW = HEAVY | {"cv2", "OpenEXR", "scipy", "skimage", "matplotlib", "PIL", "rawpy", "pillow_heif", "transformers"}
 

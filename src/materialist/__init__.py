@@ -33,6 +33,7 @@ _HOME = {
     "settle": "edits.drop.drop_rest",
     "composite": "edits.composite.composite",
     "batch": "batches.run",
+    **dict.fromkeys(("Drop", "Glass", "Insertion", "InvertOptions", "MaterialEdit", "Relight", "Removal"), "options"),
     **dict.fromkeys(
         (
             "Body",
@@ -79,6 +80,13 @@ if TYPE_CHECKING:
     from materialist.io.package import load_scene as load_scene
     from materialist.io.package import save_scene as save_scene
     from materialist.io.photo import read_photo as read_photo
+    from materialist.options import Drop as Drop
+    from materialist.options import Glass as Glass
+    from materialist.options import Insertion as Insertion
+    from materialist.options import InvertOptions as InvertOptions
+    from materialist.options import MaterialEdit as MaterialEdit
+    from materialist.options import Relight as Relight
+    from materialist.options import Removal as Removal
     from materialist.pipeline import invert as invert
     from materialist.pipeline import render_scene as render_scene
     from materialist.types import Body as Body

@@ -1,0 +1,284 @@
+"""What a field of an options class says of itself (range, unit, help, flag), and how its values are checked.
+
+Values may be given as texts, as a YAML file or a command line has them: "0.3", "310,220", "#ff8800".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from materialist.errors import InputError
+
+if TYPE_CHECKING:
+    from materialist.types import Array
+
+Colour = tuple[float, float, float]
+"""Linear R, G, B in [0, 1]."""
+ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+"""How a text spells a switch."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is known of one field beside its default."""
+
+    help: str
+    kind: str = "number"
+    """A key of `_CHECKS`."""
+    low: float = -math.inf
+    high: float = math.inf
+    ends: str = "[]"
+    """Whether the range includes its ends, as in mathematics."""
+    unit: str = ""
+    choices: tuple[str, ...] = ()
+    """Words that the option takes beside the values of its kind."""
+    count: int = 1
+    """Of `numbers`: how many."""
+    many: bool = False
+    """Several values of this kind, as a tuple."""
+    called: str = ""
+    """Name in messages, where the field's own is not a good one."""
+    hint: str = ""
+    """What a message about the range ends with."""
+    needs: str = ""
+    """Field without which this one says nothing."""
+    flag: str | None = ""
+    """Names on the command line, with spaces; empty for the field's own, None where no command takes it."""
+    metavar: str | None = None
+
+    def checked(self, name: str, value: Any) -> Any:
+        """The value in the type of the field. Raises InputError that names the value and what may be given."""
+        called = self.called or name.replace("_", " ")
+        if isinstance(value, str) and value in self.choices:
+            return value
+        check = _CHECKS[self.kind]
+        if self.many:
+            return tuple(check(self, called, one) for one in several(value))
+        return check(self, called, value)
+
+    def spells(self, name: str) -> list[str]:
+        """The flags of the field on the command line."""
+        return (self.flag or f"--{name.replace('_', '-')}").split()
+
+
+def option(default: Any, help: str, **told: Any) -> Any:
+    """A field of an options class; `told` are the other fields of `Option`."""
+    return field(default=default, metadata={"option": Option(help, **told)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperationOptions:
+    """What all sets of options can do."""
+
+    operation: ClassVar[str]
+    """Name of the function and command."""
+
+    def __post_init__(self) -> None:
+        for name, (declared, default) in declarations(type(self)).items():
+            value = getattr(self, name)
+            if value is not None or default is not None:
+                object.__setattr__(self, name, declared.checked(name, value))
+
+    @classmethod
+    def given(cls, options: Self | None = None, **values: Any) -> Self:
+        """`options`, or the defaults, with these values instead. Raises InputError for a name that is no option."""
+        known = declarations(cls)
+        for name in values:
+            if name not in known:
+                raise InputError(f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.")
+        return replace(options or cls(), **values)
+
+    @classmethod
+    def read(cls, texts: Mapping[str, Any], *, folder: Path = Path(), flags: bool = False, **defaults: Any) -> Self:
+        """The options that a file in `folder` or a command line (`flags`) names: texts, and lists of texts.
+
+        Raises InputError as the class does, and for an option that says nothing without another one.
+        """
+        values, known = dict(texts), declarations(cls)
+        for name, (declared, default) in known.items():
+            if name not in values:
+                continue
+            if declared.needs and declared.needs not in values and values[name] != default:
+                own, other = (known[n][0].spells(n)[0] if flags else n for n in (name, declared.needs))
+                raise InputError(f"{own} says nothing without {other}; give that, too, or leave {own} out.")
+            if declared.kind == "file" and values[name] not in declared.choices:
+                values[name] = beside(folder, name, values[name])
+        return cls.given(cls(**defaults), **values)
+
+
+def declarations(kind: type[OperationOptions]) -> dict[str, tuple[Option, Any]]:
+    """Name of a field -> (what is known of it, its default); the fields of the class itself come first."""
+    inherited = {one.name for base in kind.__bases__ for one in fields(base)}
+    found = sorted(fields(kind), key=lambda one: one.name in inherited)
+    return {one.name: (one.metadata["option"], one.default) for one in found}
+
+
+def beside(folder: Path, name: str, value: Any) -> Path:
+    """A file that an option names, relative to `folder`. Raises InputError unless the value is a text."""
+    if not isinstance(value, str | Path):
+        raise InputError(f"The {name} must be a file name, not {value!r}.")
+    return folder / value
+
+
+def several(value: Any) -> list[Any]:
+    """A single value, or a list of them: of lists, of texts such as 310,220, or of objects."""
+    plural = isinstance(value, list | tuple) and all(
+        not isinstance(one, str | int | float) or "," in str(one) for one in value
+    )
+    return list(value) if plural else [value]
+
+
+def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
+    """`count` numbers from a sequence, or from a text such as 310,220. Raises InputError."""
+    parts = value.split(",") if isinstance(value, str) else value
+    try:
+        found = tuple(float(part) for part in parts)
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) != count:
+        raise InputError(f"The {called} must be {count} numbers, not {value!r}.")
+    return found
+
+
+def parse_colour(colour: Any, name: str = "albedo") -> Array:
+    """[3] float32 linear colour from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB.
+
+    Raises InputError, which says what colour of what `name`.
+    """
+    import numpy as np
+
+    from materialist.color import srgb_to_linear
+
+    if isinstance(colour, str) and colour.startswith("#"):
+        try:
+            if len(colour) != 7:
+                raise ValueError
+            return srgb_to_linear(np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32))
+        except ValueError as error:
+            raise InputError(f"The {name} {colour!r} must look like #ff8800.") from error
+    try:
+        parts = colour.split(",") if isinstance(colour, str) else colour
+        rgb = np.array([float(c) for c in parts], np.float32)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
+    if rgb.shape != (3,) or not (np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()):
+        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
+    return rgb
+
+
+def _number(declared: Option, called: str, value: Any) -> Any:
+    """A finite number in the range; a whole one stays whole."""
+    low, high, ends = declared.low, declared.high, declared.ends
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        number = value if isinstance(value, int) else float(value)
+    except (TypeError, ValueError) as error:
+        or_else = "".join(f", or {word}" for word in declared.choices)
+        raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
+    inside = (low <= number if ends[0] == "[" else low < number) and (
+        number <= high if ends[1] == "]" else number < high
+    )
+    if not (math.isfinite(number) and inside):
+        span = f"it must lie in {ends[0]}{_text(low)}, {_text(high)}{ends[1]} {declared.unit}".rstrip()
+        tail = f"{span} {declared.hint}".rstrip() if math.isfinite(low) else "give a finite number"
+        raise InputError(f"The {called} is {_text(number)}; {tail}.")
+    return number
+
+
+def _text(number: float) -> str:
+    return f"{int(number)}" if math.isfinite(number) and number == int(number) else f"{number:g}"
+
+
+def _whole(declared: Option, called: str, value: Any) -> int:
+    number = _number(declared, called, value)
+    if number != int(number):
+        raise InputError(f"The {called} is {number:g}; give a whole number.")
+    return int(number)
+
+
+def _shift(declared: Option, called: str, value: Any) -> float | str:
+    """A number in the range, or a text with a sign that shifts by as much as the range is wide."""
+    if not (isinstance(value, str) and value.strip()[:1] in ("+", "-")):
+        try:
+            return _number(declared, called, value)
+        except InputError as error:
+            if isinstance(value, str) and "must be a number" in str(error):
+                raise InputError(
+                    f"The {called} must be a number in [0, 1], or a shift such as +0.5, not {value!r}."
+                ) from error
+            raise
+    width = declared.high - declared.low
+    _number(replace(declared, low=-width, high=width), f"{called} shift", value)
+    return value.strip()
+
+
+def _colour(declared: Option, called: str, value: Any) -> Colour:
+    r, g, b = (float(c) for c in parse_colour(value, called))
+    return r, g, b
+
+
+def _paint(declared: Option, called: str, value: Any) -> str:
+    """A text that names a colour, for what takes other words as well."""
+    text = ",".join(str(part) for part in value) if isinstance(value, list | tuple) else str(value)
+    try:
+        parse_colour(text)
+    except InputError as error:
+        known = ", ".join(declared.choices)
+        raise InputError(f"The {called} is {text!r}; give {known}, R,G,B in [0, 1], or #rrggbb.") from error
+    return text
+
+
+def _switch(declared: Option, called: str, value: Any) -> bool:
+    text = str(value).lower()
+    if text not in (*ON, *OFF):
+        or_else = "".join(f", or {word}" for word in declared.choices)
+        raise InputError(f"The {called} must be true or false{or_else}, not {value!r}.")
+    return text in ON
+
+
+def _word(declared: Option, called: str, value: Any) -> str:
+    raise InputError(f"The {called} is '{value}'; choose one of {', '.join(map(repr, declared.choices))}.")
+
+
+def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
+    """(width, height) of an environment map, from a pair or a text such as 512x256."""
+    parts = re.split("[xX×]", value) if isinstance(value, str) else value
+    try:
+        width, height = (int(part) for part in parts)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {called} must look like 512x256, not {value!r}.") from error
+    if width != 2 * height or not 8 <= height <= 4096:
+        raise InputError(f"The {called} is {width}x{height}; it must be twice as wide as high, from 16x8 to 8192x4096.")
+    return width, height
+
+
+def _lamp(declared: Option, called: str, value: Any) -> Any:
+    """A lamp itself, or what `materialist.lamp` makes one of."""
+    return numbers(value, 5, called) if isinstance(value, str | list | tuple) else value
+
+
+def _anything(declared: Option, called: str, value: Any) -> Any:
+    return value
+
+
+_CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
+    "number": _number,
+    "whole": _whole,
+    "shift": _shift,
+    "numbers": lambda declared, called, value: numbers(value, declared.count, called),
+    "colour": _colour,
+    "paint": _paint,
+    "switch": _switch,
+    "word": _word,
+    "size": _size,
+    "lamp": _lamp,
+    "file": _anything,
+    "any": _anything,
+}
+"""Kind of an option -> (option, its name in messages, value) -> checked value."""

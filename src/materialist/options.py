@@ -1,0 +1,200 @@
+"""The options of each operation, declared once for Python, the command line, `edits.yaml` and the studio.
+
+A new option is one field here and its use in the operation; flags, YAML keys, types, ranges and help follow from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from materialist.option_kinds import Colour, OperationOptions, option
+
+if TYPE_CHECKING:
+    from materialist.types import Array, Lamp, Prediction
+
+_SHARE: dict[str, Any] = {"low": 0, "high": 1}
+_SEED: dict[str, Any] = {"kind": "whole", "low": 0, "high": 2**31 - 1, "flag": None}
+_DEVICE: dict[str, Any] = {"kind": "word", "choices": ("auto", "cpu", "cuda"), "flag": None}
+_SHIFT: dict[str, Any] = {"kind": "shift", **_SHARE, "metavar": "V|±D"}
+_PAINT: dict[str, Any] = {"kind": "paint", "choices": ("as-is", "glass", "mirror")}
+_UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": "axis that points up"}
+_SCALE: dict[str, Any] = {"low": 0, "high": 1e3, "ends": "(]"}
+_PREDICTOR: dict[str, Any] = {"kind": "any", "metavar": "PREDICTOR"}
+
+# fmt: off
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaterialEdit(OperationOptions):
+    """Another material inside a region."""
+
+    operation = "edit"
+    hue: float = option(0.0, "Turn the albedo's hue, degrees.", low=-3600, high=3600, unit="degrees")
+    saturation: float = option(0.0, "-1 (grey) to 1.", low=-1, high=1)
+    value: float = option(0.0, "-1 (black) to 1 (white).", low=-1, high=1)
+    albedo: Colour | str | None = option(None, "One linear colour, or #rrggbb in sRGB.", kind="colour", metavar="R,G,B")
+    texture: Array | str | Path | None = option(None, "A picture laid on the surface.", kind="file", metavar="PNG")
+    """[h, w, 3] linear, or a file."""
+    texture_scale: float = option(
+        1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture")
+    roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **_SHIFT)
+    metallic: float | str | None = option(None, "The same for metallic.", **_SHIFT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Removal(OperationOptions):
+    """An object taken away, and what fills its place."""
+
+    operation = "remove"
+    background: Array | str | Path | None = option(
+        None, "The same view without the object, in place of inpainting.", kind="file", metavar="PNG")
+    """[h, w, 3] linear at working or native size and the exposure of the photo, or a file of the photo's aspect."""
+    inpaint: str | Callable[[Array, Array], Array] | None = option(
+        None, "A diffusion model: a folder, or owner/name.", kind="any", metavar="sd:MODEL")
+    """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
+    shadow: float | None = option(
+        None,
+        "Fill its shadow and reflection on the ground, too: where they are found, or by this share of its size.",
+        low=0, high=2, choices=("auto",), metavar="auto|S")
+    """None and `auto` look for the shadow."""
+    grow: float = option(
+        0.006, "Rim of the object that is filled as well, share of the picture's longer side.", low=0, high=0.2,
+        called="rim", flag=None)
+    seed: int = option(0, "Of the patch search.", **_SEED)
+    device: str = option("auto", "Where a diffusion model runs.", **_DEVICE)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if str(self.shadow) == "auto":
+            object.__setattr__(self, "shadow", None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glass(Removal):
+    """An object turned to glass, before what it hid."""
+
+    operation = "glass"
+    ior: float = option(
+        1.5, "Index of refraction, 1 to 3: water 1.33, glass 1.5.", low=1, high=3, called="index of refraction",
+        hint="(water 1.33, glass 1.5, diamond 2.4)")
+    transmission: float = option(1.0, "Share of light that enters; the rest is the old surface.", **_SHARE)
+    tint: Colour = option((1.0, 1.0, 1.0), "Its colour, linear, or #rrggbb.", kind="colour", metavar="R,G,B")
+    """Of white light after a way in and a way out."""
+    roughness: float = option(0.0, "0 is clear, 0.3 frosted.", **_SHARE)
+    hollow: bool | str = option(False, "A wall around air.", kind="switch", choices=("open",))
+    """`open`: and without a lid, for what is a surface of revolution."""
+    model: str = option(
+        "closed", "closed: path-traced; two-interface: as in the paper.", kind="word",
+        choices=("closed", "two-interface"))
+    thickness: Array | str | Path = option(
+        "auto", "How thick it is; a file has scene units.", kind="file",
+        choices=("auto", "half-turn", "network", "symmetry"), metavar="auto|half-turn|network|symmetry|FILE")
+    """One of the methods, or [H, W] along the camera rays, or a file of that."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relight(OperationOptions):
+    """Other light; the changes happen in the order of the fields."""
+
+    operation = "relight"
+    dim: float | None = option(
+        None, "Factor on windows and lamps that the photo shows; they stay put.", low=0, high=10, called="dimming",
+        hint="(1 for as it is, 0 for off)")
+    lights: Array | None = option(None, "The lights that `dim` means.", kind="any", flag=None, needs="dim")
+    """[H, W] bool at working size; None takes those that are found."""
+    envmap: Array | str | Path | None = option(None, "Another light: EXR or HDR, 2:1.", kind="file", metavar="FILE")
+    """[h, 2h, 3] linear radiance >= 0 in the project's convention, or a file."""
+    gain: float | str | None = option(
+        None, "Factor on it; auto keeps the photo's mean light.", low=0, high=1e6, ends="(]", choices=("auto",),
+        needs="envmap", metavar="auto|G")
+    """None: `auto` for a file, whose exposure is not known, and 1 for an array."""
+    rotate: float = option(0.0, "Turn the light to the right.", called="rotation", unit="degrees", metavar="DEG")
+    sun: tuple[float, float] | None = option(
+        None, "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, metavar="AZ,EL")
+    sun_power: float = option(
+        1.0, "Its light, relative to the mean light of the photo.", low=0, high=1e4, needs="sun")
+    ambient: float = option(1.0, "Factor on the light that was there.", low=0, high=1e4)
+    lamps: tuple[Lamp | tuple[float, float, float, float, float], ...] = option(
+        (), "A lamp at a pixel and depth.", kind="lamp", many=True, called="lamp", flag="--lamp",
+        metavar="X,Y,DEPTH,KELVIN,POWER")
+    """What `materialist.lamp` makes, or its arguments."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Insertion(OperationOptions):
+    """How a mesh is put into the photo."""
+
+    operation = "insert"
+    scale: float = option(1.0, "Factor on its size; 1 is a sixth of the picture's width there.", **_SCALE)
+    turn: float = option(0.0, "Turn about its up axis.", unit="degrees", metavar="DEG")
+    material: str = option("as-is", "as-is, glass, mirror, R,G,B (linear) or #rrggbb.", **_PAINT)
+    size: float | None = option(
+        None, "Its longest side in scene units, in place of the sixth.", low=0, high=1e9, ends="(]")
+    up: str = option("auto", "Axis of the file that points up: y, z; auto: z for STL.", **_UP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drop(OperationOptions):
+    """How meshes fall."""
+
+    operation = "drop"
+    height: float = option(1.5, "Over the ground, in longest sides.", low=0, high=100)
+    spin: float = option(0.3, "Turns per second about an axis that the seed chooses.", low=-20, high=20)
+    scale: float = option(1.0, "Factor on the size; 1 is a sixth of the picture's width there.", **_SCALE)
+    material: str = option("as-is", "as-is, glass, mirror, R,G,B (linear) or #rrggbb.", **_PAINT)
+    gravity: tuple[float, float, float] | None = option(
+        None, "Its direction in the camera frame: X right, Y up, Z back.", kind="numbers", count=3, metavar="X,Y,Z")
+    metres: float = option(0.2, "What the longest side is taken for; small things fall fast.", low=1e-3, high=100)
+    seed: int = option(0, "Of the axes that things spin about.", **_SEED)
+    up: str = option("auto", "Axis of the files that points up: y, z; auto: z for STL.", **_UP)
+
+
+@dataclass(frozen=True, kw_only=True)
+class InvertOptions(OperationOptions):
+    """How a photo is decomposed into geometry, materials and light."""
+
+    operation = "invert"
+    predictor: str = option(
+        "auto", "auto, bundled, classical, matnet[:FILE], marigold or maps:DIR; for every map not named below.",
+        kind="any", flag="--predictor --rest")
+    albedo: str | None = option(None, "Where the albedo comes from.", **_PREDICTOR)
+    roughness: str | None = option(None, "The same for roughness,", **_PREDICTOR)
+    metallic: str | None = option(None, "metallic,", **_PREDICTOR)
+    normal: str | None = option(None, "normals (also moge:DIR),", **_PREDICTOR)
+    depth: str | None = option(None, "depth (also depth-anything, moge:DIR).", **_PREDICTOR)
+    engine: str = option(
+        "transport", "Cached light transport, or the paper's path tracing.", kind="word",
+        choices=("transport", "path"))
+    preset: str = option(
+        "default", "Our schedule, or the paper's to the letter.", kind="word", choices=("default", "paper"))
+    """The path engine always follows the paper."""
+    fov: float | str | None = option(
+        "auto", "Horizontal field of view in degrees, or auto: EXIF, else 35.", low=1, high=170, ends="()",
+        unit="degrees", choices=("auto",), called="field of view", metavar="TEXT")
+    """`auto`: from the predictor of the depth where it knows one (MoGe), else from EXIF, else 35."""
+    size: int = option(
+        512, "Working size: longer side, pixels.", kind="whole", low=8, high=8192, called="working size", unit="pixels")
+    """Of the working picture; a Photo keeps the size that it was read at."""
+    envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
+    """(width, height), with width = 2 * height."""
+    completion: str = option(
+        "auto", "Continue planes beyond what is seen, give objects backs; auto: unless that ruins the fit.",
+        kind="word", choices=("auto", "planes,backs", "floors,backs", "planes", "none"))
+    """`planes,backs` continues dominant planes beyond what the photo shows and gives objects backs, `floors,backs` ends
+    walls at the frame, `planes` leaves objects open behind, `none` adds nothing. `auto` is the first with walls that
+    end where light explains the photo best, or `none` where that shuts out light that the photo shows."""
+    tau: float = option(
+        6.0, "Grazing angle below which the surface is cut, degrees.", low=0, high=90, ends="()", unit="degrees")
+    mask: Array | str | Path | None = option(
+        None, "Region with one roughness and metallic.", kind="file", metavar="PNG")
+    """[H, W] bool at working size, or a file."""
+    strategy: str = option(
+        "default", "The paper's per-image strategies.", kind="word", choices=("default", "white-light-first"))
+    seed: int = option(0, "Equal seeds give equal scenes on one machine.", **_SEED)
+    device: str = option("auto", "Where to compute.", **_DEVICE)
+    settings: Any = option(None, "FitSettings in place of the preset.", kind="any", flag=None)
+    prior: Prediction | None = option(None, "A Prediction in place of the predictor.", kind="any", flag=None)
+    spp: int | None = option(None, "Paths a pixel of the final re-rendering.", kind="whole", low=1, flag=None)
