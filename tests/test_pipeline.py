@@ -204,12 +204,12 @@ def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, t
     moge.mkdir()
     write_exr(moge / "depth.exr", read_exr(folder / "depth.exr") * 1.5)
     (moge / "fov.json").write_text('{"fov_x": 51.0, "fov_y": 39.0}')
-    mixed = options(folder, fov="auto", depth=f"moge:{moge}", metallic="classical")
+    mixed = options(folder, fov="auto", depth=f"moge:{moge}", metallic="constant")
     scene = invert(**mixed)
     assert scene.camera.fov == scene.provenance["fov"] == 51.0 and scene.photo.fov_source == "predictor"
     assert np.allclose(scene.depth, read_exr(folder / "depth.exr") * 1.5)
     assert scene.provenance["sources"] == {
-        "albedo": f"maps:{folder}", "roughness": f"maps:{folder}", "metallic": "classical",
+        "albedo": f"maps:{folder}", "roughness": f"maps:{folder}", "metallic": "constant",
         "normal": f"maps:{folder}", "depth": f"moge:{moge}",
     }  # fmt: skip
     assert invert(**{**mixed, "fov": 45.0}).camera.fov == 45.0

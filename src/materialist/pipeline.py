@@ -55,7 +55,7 @@ def invert(
 
     Args:
         photo: a file, `example:NAME`, or a Photo already read.
-        predictor: `auto`, `classical`, `matnet`, `maps:DIR`, ...; see docs/predictors.md.
+        predictor: `auto`, `bundled`, `matnet`, `maps:DIR`, ...; see docs/predictors.md.
         albedo, roughness, metallic, normal, depth: another predictor for this map alone.
         engine: `transport` (cached transport) or `path` (Mitsuba PRB, as the paper).
         preset: `default` or `paper`; the path engine always follows the paper.
@@ -244,7 +244,7 @@ def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> P
 
 
 def _predictor(spec: str, parts: dict[str, str | None], device: str):
-    from materialist.predict.base import get_predictor
+    from materialist.predict import get_predictor
 
     return get_predictor(spec, device=device, **parts)
 

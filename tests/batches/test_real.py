@@ -15,7 +15,7 @@ from materialist.io.examples import example_path
 from materialist.io.package import load_scene
 
 pytest.importorskip("mitsuba")
-OPTIONS = {"size": 64, "envmap_size": [64, 32], "spp": 2, "device": "cpu", "predictor": "classical"}
+OPTIONS = {"size": 64, "envmap_size": [64, 32], "spp": 2, "device": "cpu", "predictor": "constant"}
 
 
 def test_a_photo_becomes_a_scene_and_an_edited_photo(tmp_path):

@@ -42,9 +42,9 @@ def folder(tmp_path):
 
 def test_a_perfect_predictor_scores_perfectly(folder, tmp_path):
     maps = folder / "plane" / "maps"
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},classical", procedural=0)
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},constant", procedural=0)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
-    best, guess = report["means"][f"maps:{maps}"], report["means"]["classical"]
+    best, guess = report["means"][f"maps:{maps}"], report["means"]["constant"]
     assert best["albedo_psnr"] == best["roughness_psnr_pooled"] == 100
     assert best["depth_si_log_rmse"] == 0 and best["depth_order"] == 1 and best["normal_angle"] < 0.1
     assert guess["albedo_psnr"] < 60 and guess["roughness_psnr"] == pytest.approx(20, abs=0.1)
@@ -55,7 +55,7 @@ def test_maps_that_are_not_there_are_no_truth(folder, tmp_path):
     """What stands in their place (0.5, 0.1, normals of the depth) is scored against by nobody."""
     for name in ("roughness", "metallic", "normal"):
         (folder / "plane" / "maps" / f"{name}.exr").unlink()
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor="classical", procedural=0)
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor="constant", procedural=0)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     (row,) = report["rows"]
     assert {"albedo_psnr", "depth_order"} <= set(row)
@@ -68,7 +68,7 @@ def test_a_picture_that_cannot_be_read_costs_only_itself(folder, tmp_path):
     (broken / "maps").mkdir(parents=True)
     (broken / "photo.png").write_bytes(b"no picture")
     (broken / "maps" / "albedo.exr").write_bytes(b"no map")
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor="classical, classical", procedural=0)
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor="constant, constant", procedural=0)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     assert len(report["rows"]) == 1 and "photo.png" in report["settings"]["left out"]
 
@@ -99,18 +99,16 @@ def test_what_cannot_be_scored(tmp_path):
     with pytest.raises(InputError, match="nothing to score"):
         bench.run("materials", output=tmp_path / "report", procedural=0)
     with pytest.raises(InputError, match="neither 'samples'"):
-        bench.run("materials", data=tmp_path, output=tmp_path / "report2", predictor="classical", procedural=0)
+        bench.run("materials", data=tmp_path, output=tmp_path / "report2", predictor="constant", procedural=0)
 
 
 def test_held_out_procedural_pictures_are_made_for_it(folder, tmp_path):
     maps = f"maps:{folder / 'plane' / 'maps'}"
-    bench.run(
-        "materials", data=folder, output=tmp_path / "report", predictor=f"classical,{maps}", procedural=2, size=64
-    )
+    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"constant,{maps}", procedural=2, size=64)
     report = json.loads((tmp_path / "report" / "report.json").read_text())
     rows = report["rows"]
     assert report["settings"]["procedural content"] == CONTENT["heldout"], "which version of the scenes they are"
-    assert [row["method"] for row in rows] == ["classical", maps, *["classical, procedural"] * 2]
+    assert [row["method"] for row in rows] == ["constant", maps, *["constant, procedural"] * 2]
     assert all(np.isfinite(row["normal_angle"]) and row["roughness_psnr"] < 100 for row in rows[2:])
 
 
@@ -148,8 +146,8 @@ def test_the_forward_pass_alone():
 
 
 def test_the_benchmark_of_time(tmp_path):
-    bench.run("predictor", output=tmp_path / "report", predictor="classical", size=48, warmups=1, runs=2)
+    bench.run("predictor", output=tmp_path / "report", predictor="constant", size=48, warmups=1, runs=2)
     rows = json.loads((tmp_path / "report" / "report.json").read_text())["rows"]
-    assert [row["method"] for row in rows] == ["classical predict"] and rows[0]["median_ms"] > 0
+    assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["median_ms"] > 0
     with pytest.raises(InputError, match=r"runs (is )?0"):
         bench.run("predictor", output=tmp_path / "report2", runs=0)

@@ -10,7 +10,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.marigold import Marigold, appearance, unit_normals
-from materialist.predict.mix import MAPS
+from materialist.predict.protocol import MAPS
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 os.environ.setdefault("HF_HUB_OFFLINE", "1")
@@ -104,19 +104,19 @@ def test_marigold_sees_srgb_and_only_the_wanted_models_run(marigold, monkeypatch
 
     monkeypatch.setattr(module, "_pipeline", spy)
     photo = made_photo()
-    prediction = get_predictor("classical", albedo="marigold", device="cpu").predict(photo)
+    prediction = get_predictor("constant", albedo="marigold", device="cpu").predict(photo)
     assert kinds == ["MarigoldIntrinsicsPipeline"]
     assert np.allclose(seen[0][0], linear_to_srgb(photo.linear))
-    assert prediction.sources["depth"] == prediction.sources["metallic"] == "classical"
+    assert prediction.sources["depth"] == prediction.sources["metallic"] == "constant"
 
 
 def test_one_marigold_model_from_a_folder(marigold):
     folder = marigold / "prs-eth--marigold-normals-v1-1"
-    prediction = get_predictor("classical", normal=f"marigold:{folder}", device="cpu").predict(made_photo())
+    prediction = get_predictor("constant", normal=f"marigold:{folder}", device="cpu").predict(made_photo())
     check_normals = np.linalg.norm(prediction.normal, axis=-1)
     assert np.allclose(check_normals, 1, atol=1e-5) and prediction.sources["normal"].startswith("marigold (prs-eth--")
     with pytest.raises(InputError, match="gives only normal"):
-        get_predictor("classical", albedo=f"marigold:{folder}")
+        get_predictor("constant", albedo=f"marigold:{folder}")
 
 
 def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
@@ -127,7 +127,7 @@ def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
     state = load_file(weights)
     del state["conv_in.bias"]
     save_file(state, weights)
-    ask = lambda: get_predictor("classical", normal="marigold", device="cpu").predict(made_photo())  # noqa: E731
+    ask = lambda: get_predictor("constant", normal="marigold", device="cpu").predict(made_photo())  # noqa: E731
     with pytest.raises(WeightsError, match=r"unet.*is damaged.*expected"):
         ask()
     list_files(folder)
@@ -139,21 +139,21 @@ def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
         ask()
     (folder / "model_index.json").write_text('{"_class_name": "StableDiffusionPipeline"}')
     with pytest.raises(WeightsError, match="StableDiffusionPipeline"):
-        get_predictor("classical", normal=f"marigold:{folder}")
+        get_predictor("constant", normal=f"marigold:{folder}")
     (folder / "model_index.json").write_text("no json")
     with pytest.raises(WeightsError, match=r"model_index\.json"):
-        get_predictor("classical", normal=f"marigold:{folder}")
+        get_predictor("constant", normal=f"marigold:{folder}")
 
 
 def test_depth_anything_relative_and_metric(hub, models, tmp_path):
     list_files(hub.save_depth_anything(models / "depth-anything--Depth-Anything-V2-Small-hf"))
     photo = made_photo(30, 40)
-    prediction = get_predictor("classical", depth="depth-anything", device="cpu").predict(photo)
+    prediction = get_predictor("constant", depth="depth-anything", device="cpu").predict(photo)
     assert prediction.depth.shape == (30, 40) and prediction.depth.min() > 0 and np.ptp(prediction.depth) > 0
     assert "Depth-Anything" in prediction.sources["depth"] or "V2 Small" in prediction.sources["depth"]
     assert any("far / near = 4.0 was assumed" in note for note in prediction.warnings)
     metric = hub.save_depth_anything(tmp_path / "metric", depth_estimation_type="metric", max_depth=20)
-    part = get_predictor("classical", depth=f"depth-anything:{metric}", device="cpu").predict(photo)
+    part = get_predictor("constant", depth=f"depth-anything:{metric}", device="cpu").predict(photo)
     assert part.depth.min() > 0 and part.depth.max() < 20 and part.sources["depth"].endswith("metric")
     with pytest.raises(InputError, match=r"gives only depth.*--depth"):
         get_predictor("depth-anything")
@@ -175,7 +175,7 @@ def test_depth_anything_sees_what_its_own_processor_would_show_it(hub, tmp_path,
     smooth = np.add.outer(np.linspace(0, 0.5, 518), np.linspace(0, 0.4, 700))[..., None] * [1, 0.8, 0.6]
     photo = made_photo(518, 700)
     photo.linear[:] = srgb_to_linear(np.round(smooth * 255) / 255)
-    get_predictor("classical", depth=f"depth-anything:{folder}", device="cpu").predict(photo)
+    get_predictor("constant", depth=f"depth-anything:{folder}", device="cpu").predict(photo)
     processor = DPTImageProcessorPil(  # as the published preprocessor_config.json has it
         size={"height": 518, "width": 518}, ensure_multiple_of=14, keep_aspect_ratio=True,
         image_mean=[0.485, 0.456, 0.406], image_std=[0.229, 0.224, 0.225],
@@ -190,7 +190,7 @@ def test_a_damaged_depth_anything_is_refused(hub, tmp_path):
 
     folder = hub.save_depth_anything(tmp_path / "model")
     weights = folder / "model.safetensors"
-    ask = lambda: get_predictor("classical", depth=f"depth-anything:{folder}", device="cpu").predict(made_photo())  # noqa: E731
+    ask = lambda: get_predictor("constant", depth=f"depth-anything:{folder}", device="cpu").predict(made_photo())  # noqa: E731
     state = load_file(weights)
     name = next(iter(state))
     save_file({k: v for k, v in state.items() if k != name}, weights)
@@ -209,9 +209,9 @@ def test_absent_models_say_how_to_get_them():
         ("marigold:someone/theirs", "normal", "someone/theirs"),
     ):
         with pytest.raises(WeightsError, match=f"models download {name}.*maps:DIR"):
-            get_predictor("classical", **{part: spec})
+            get_predictor("constant", **{part: spec})
     with pytest.raises(WeightsError, match="no folder"):
-        get_predictor("classical", depth="depth-anything:nowhere")
+        get_predictor("constant", depth="depth-anything:nowhere")
 
 
 def test_absent_libraries_say_how_to_get_them(models, monkeypatch):
@@ -222,7 +222,7 @@ def test_absent_libraries_say_how_to_get_them(models, monkeypatch):
     (folder / "SHA256SUMS").write_text("")
     monkeypatch.setitem(sys.modules, "diffusers", None)
     with pytest.raises(SetupError, match=r"needs diffusers.*materialist\[hub\]"):
-        get_predictor("classical", normal="marigold")
+        get_predictor("constant", normal="marigold")
 
 
 def test_appearance_reads_the_order_and_the_colour_space_of_the_targets():

@@ -181,17 +181,6 @@ def test_damaged_files_are_named(tmp_path):
         get_predictor(spec).predict(photo())
 
 
-def test_the_spec_is_checked(tmp_path):
-    with pytest.raises(InputError, match="no folder"):
-        get_predictor(f"maps:{tmp_path / 'none'}")
-    with pytest.raises(InputError, match="needs a folder"):
-        get_predictor("maps:")
-    with pytest.raises(InputError, match="no predictor 'nonsense'"):
-        get_predictor("nonsense")
-    with pytest.raises(InputError, match="no predictor 'classical:x'"):
-        get_predictor("classical:x")
-
-
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
 def test_published_maps_are_read():
     linear = np.full((512, 512, 3), 0.3, np.float32)

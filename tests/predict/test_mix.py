@@ -8,8 +8,8 @@ from test_moge import write as write_moge
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict import get_predictor
-from materialist.predict.mix import MAPS
 from materialist.predict.normals import normals_from_depth
+from materialist.predict.protocol import MAPS
 
 H, W = 20, 32
 
@@ -21,7 +21,7 @@ def photo():
 
 @pytest.fixture
 def other(tmp_path):
-    """maps:DIR with every map, all unlike those of `classical`."""
+    """maps:DIR with every map, all unlike those of `constant`."""
     folder = tmp_path / "other"
     folder.mkdir()
     rng = np.random.default_rng(8)
@@ -43,27 +43,25 @@ def all_maps(prediction):
 @pytest.mark.parametrize("name", ["albedo", "roughness", "metallic", "normal", "depth"])
 def test_the_named_map_comes_from_its_source_and_the_rest_from_the_rest(name, photo, other):
     spec, theirs = other
-    mixed = get_predictor("classical", **{name: spec}).predict(photo)
-    plain = all_maps(get_predictor("classical").predict(photo))
+    mixed = get_predictor("constant", **{name: spec}).predict(photo)
+    plain = all_maps(get_predictor("constant").predict(photo))
     for key, values in all_maps(mixed).items():
         if key == "normal" and name == "depth":
             continue
         assert np.allclose(values, theirs[key] if key == name else plain[key], atol=1e-6), key
     assert list(mixed.sources) == list(MAPS)
-    assert (
-        mixed.sources[name] == spec and mixed.sources["roughness" if name != "roughness" else "albedo"] == "classical"
-    )
-    assert mixed.predictor == f"{name}: {spec}; " + ", ".join(k for k in MAPS if k != name) + ": classical" or (
+    assert mixed.sources[name] == spec and mixed.sources["roughness" if name != "roughness" else "albedo"] == "constant"
+    assert mixed.predictor == f"{name}: {spec}; " + ", ".join(k for k in MAPS if k != name) + ": constant" or (
         name != "albedo" and mixed.predictor.endswith(f"{name}: {spec}")
     )
 
 
 def test_normals_that_follow_a_depth_follow_the_chosen_one(photo, other):
     spec, theirs = other
-    mixed = get_predictor("classical", depth=spec).predict(photo)
+    mixed = get_predictor("constant", depth=spec).predict(photo)
     assert np.allclose(mixed.normal, normals_from_depth(theirs["depth"], photo.camera, radius=2), atol=1e-6)
     assert mixed.sources["normal"] == f"derived from the depth of {spec}"
-    kept = get_predictor(spec, depth="classical").predict(photo)
+    kept = get_predictor(spec, depth="constant").predict(photo)
     assert np.allclose(kept.normal, theirs["normal"], atol=1e-6) and kept.sources["normal"] == spec
 
 
@@ -81,12 +79,12 @@ def test_each_source_runs_once_and_unused_ones_never_open(photo, other, monkeypa
 def test_moge_gives_depth_normals_and_the_field_of_view(photo, tmp_path):
     depth, _, seen = write_moge(tmp_path / "moge")
     spec = f"moge:{tmp_path / 'moge'}"
-    predictor = get_predictor("classical", depth=spec, normal=spec)
+    predictor = get_predictor("constant", depth=spec, normal=spec)
     prediction = predictor.predict(photo)
     assert predictor.field_of_view == 61.23
     assert np.array_equal(prediction.depth, np.where(seen, depth, 0))
     assert prediction.sources["depth"] == prediction.sources["normal"] == spec
-    assert get_predictor("classical", normal=spec).field_of_view is None
+    assert get_predictor("constant", normal=spec).field_of_view is None
 
 
 def test_bad_mixtures_are_refused(other, tmp_path):
@@ -94,22 +92,22 @@ def test_bad_mixtures_are_refused(other, tmp_path):
     for parts, word in (
         ({"albedo": f"moge:{tmp_path / 'moge'}"}, "gives only normal, depth, not albedo"),
         ({"depth": "nonsense"}, "no predictor 'nonsense'"),
-        ({"colour": "classical"}, "no map 'colour'.*albedo"),
+        ({"colour": "constant"}, "no map 'colour'.*albedo"),
         ({"depth": "maps:nowhere"}, "no folder"),
     ):
         with pytest.raises(InputError, match=word):
-            get_predictor("classical", **parts)
-    assert get_predictor("classical", albedo=None, depth=None).name == "classical"
+            get_predictor("constant", **parts)
+    assert get_predictor("constant", albedo=None, depth=None).name == "constant"
 
 
 def test_a_folder_needs_only_the_maps_that_are_wanted(photo, tmp_path):
     albedo = np.full((H, W, 3), 0.25, np.float32)
     write_exr(tmp_path / "albedo.exr", albedo)
-    mixed = get_predictor("classical", albedo=f"maps:{tmp_path}").predict(photo)
-    assert np.array_equal(mixed.materials.albedo, albedo) and mixed.sources["depth"] == "classical"
+    mixed = get_predictor("constant", albedo=f"maps:{tmp_path}").predict(photo)
+    assert np.array_equal(mixed.materials.albedo, albedo) and mixed.sources["depth"] == "constant"
     assert not any("There is no" in note for note in mixed.warnings)
     with pytest.raises(InputError, match="no depth"):
-        get_predictor("classical", depth=f"maps:{tmp_path}").predict(photo)
+        get_predictor("constant", depth=f"maps:{tmp_path}").predict(photo)
 
 
 def test_normals_that_will_be_derived_need_no_depth_of_their_own(photo, other, tmp_path):
@@ -120,15 +118,6 @@ def test_normals_that_will_be_derived_need_no_depth_of_their_own(photo, other, t
     assert np.allclose(mixed.materials.albedo, theirs["albedo"], atol=1e-6)
     assert np.allclose(mixed.normal, normals_from_depth(theirs["depth"], photo.camera, radius=2), atol=1e-6)
     assert mixed.sources["normal"] == f"derived from the depth of {spec}"
-
-
-def test_the_built_in_predictor_warns_of_its_own_maps_only(photo, other):
-    (note,) = get_predictor(other[0], roughness="classical").predict(photo).warnings
-    assert "roughness" in note and "geometry" not in note and "albedo" not in note
-    (note,) = get_predictor(other[0], depth="classical").predict(photo).warnings
-    assert "geometry" in note and "neutral" not in note
-    (note,) = get_predictor(other[0], metallic="classical").predict(photo).warnings
-    assert "metallic is neutral" in note and "roughness" not in note
 
 
 def test_normals_that_are_unknown_come_from_the_chosen_depth(photo, other, tmp_path):
@@ -146,8 +135,8 @@ def test_normals_that_are_unknown_come_from_the_chosen_depth(photo, other, tmp_p
 
 def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeypatch):
     """Where the rest saw sky, and the depth is someone else's, its placeholder is no normal, and its note is void."""
-    from materialist.predict.base import SKY_NOTE
     from materialist.predict.bundled.predictor import BundledPredictor
+    from materialist.predict.protocol import SKY_NOTE
     from materialist.types import Materials, Prediction
 
     spec, theirs = other

@@ -86,7 +86,7 @@ def test_what_is_no_result_is_refused(tmp_path):
         ("moge:", "needs"),
     ):
         with pytest.raises(InputError, match=word):
-            get_predictor("classical", depth=spec)
+            get_predictor("constant", depth=spec)
     write(tmp_path)
     with pytest.raises(InputError, match=r"gives only normal, depth.*--depth moge:"):
         get_predictor(f"moge:{tmp_path}")

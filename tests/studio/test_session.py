@@ -269,7 +269,7 @@ def test_edits_are_in_what_the_commands_export(typed):
     [
         ({}, []),
         ({"predictor": "matnet vitb matnet.pth sha256:01"}, ["--predictor", "matnet"]),
-        ({"predictor": "classical", "size": 384}, ["--predictor", "classical", "--size", "384"]),
+        ({"predictor": "matnet", "size": 384}, ["--predictor", "matnet", "--size", "384"]),
         ({"fov": 61.25, "fov_source": "option", "seed": 3}, ["--fov", "61.25", "--seed", "3"]),
         ({"fov": 61.25, "fov_source": "exif"}, []),
     ],

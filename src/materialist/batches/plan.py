@@ -19,7 +19,7 @@ from materialist.batches.remote import is_url, version
 from materialist.errors import InputError, MaterialistError
 from materialist.io.decoded import MIN_SIDE
 from materialist.pipeline import check_overrides
-from materialist.predict.base import CHOICES
+from materialist.predict import CHOICES
 
 LARGEST = 8192
 """Longer side of the working image, as `invert` takes it."""

@@ -228,7 +228,7 @@ def _step_row(case: Case, size: int, folder: Path, seed: int, device: str) -> di
     from dataclasses import replace
 
     from materialist.bench.steps import step_costs
-    from materialist.predict.base import get_predictor
+    from materialist.predict import get_predictor
 
     photo = _photo(replace(case, photo=_at_least(case, size, folder)), size)
     prior = get_predictor(case.predictor).predict(photo, seed=seed)

@@ -18,7 +18,7 @@ import numpy as np
 from materialist import metrics
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.errors import InputError
-from materialist.predict.base import NEUTRAL_METALLIC
+from materialist.predict import NEUTRAL_METALLIC
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from materialist.bench.report import Column, Pace, Report, write
 from materialist.errors import InputError
-from materialist.predict.mix import MAPS
+from materialist.predict.protocol import MAPS
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 COLUMNS = (

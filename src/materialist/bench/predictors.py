@@ -19,7 +19,7 @@ def specs_of(text: str) -> list[str]:
 
 def opened(spec: str, device: str = "auto") -> Any:
     """The predictor of that name; raises as `get_predictor`."""
-    from materialist.predict.base import get_predictor
+    from materialist.predict import get_predictor
 
     return get_predictor(spec, device=device)
 

@@ -41,7 +41,7 @@ def invert(
         typer.Option(
             "--predictor",
             "--rest",
-            help="auto, bundled, classical, matnet[:FILE], marigold or maps:DIR; for every map not named below.",
+            help="auto, bundled[:FILE], matnet[:FILE], marigold, maps:DIR or constant; for every map not named below.",
         ),
     ] = "auto",
     albedo: Annotated[str | None, typer.Option(metavar="PREDICTOR", help="Where the albedo comes from.")] = None,

@@ -10,7 +10,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.mix import Part
+from materialist.predict.protocol import Part
 from materialist.predict.relative import from_inverse
 from materialist.types import Array, Photo
 

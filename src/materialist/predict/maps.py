@@ -10,9 +10,8 @@ import numpy as np
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.predict import resample
-from materialist.predict.base import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS
-from materialist.predict.mix import Part
 from materialist.predict.normals import normals_from_depth
+from materialist.predict.protocol import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part
 from materialist.types import Array, Materials, Photo, Prediction
 
 SLIGHT = 0.1

@@ -12,7 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.mix import MAPS, Part, whole
+from materialist.predict.protocol import MAPS, Part, whole
 from materialist.predict.relative import from_affine, from_inverse
 from materialist.types import Array, Photo, Prediction
 

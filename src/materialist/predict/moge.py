@@ -13,8 +13,8 @@ from materialist.errors import InputError
 from materialist.io.exr import read_exr
 from materialist.predict import resample
 from materialist.predict.maps import check_aspect, read_map
-from materialist.predict.mix import Part
 from materialist.predict.normals import normals_from_depth
+from materialist.predict.protocol import Part
 from materialist.types import Array, Photo
 
 HOW = "write it with: moge infer -i PHOTO -o DIR --maps"

@@ -24,7 +24,6 @@ from materialist.studio.work import Project, write_card
 
 PREDICTORS = (
     ("Automatic", "auto"),
-    ("Built in", "classical"),
     ("MatNet", "matnet"),
     ("Marigold", "marigold"),
 )

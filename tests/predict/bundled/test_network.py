@@ -1,7 +1,6 @@
 """The bundled network and what happens around it, with random weights."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ from safetensors.torch import load_file, save_file
 from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
 from materialist.errors import WeightsError
-from materialist.predict import bundled
-from materialist.predict.base import get_predictor
 from materialist.predict.bundled import inference, weights
 from materialist.predict.bundled.network import Architecture, BundledNetwork, encode
 from materialist.predict.bundled.predictor import BundledPredictor
@@ -104,50 +101,6 @@ def test_large_photos_and_their_mirror_images_are_seen_small(network, monkeypatc
     assert seen == [(64, 96)] * 2 and prediction.depth.shape == (100, 150)
 
 
-def test_a_crowded_photo_is_seen_larger_than_a_bare_one(network, monkeypatch):
-    seen, run = [], inference._run
-    monkeypatch.setattr(inference, "_run", lambda n, photo, *r: seen.append(max(photo.shape)) or run(n, photo, *r))
-    rays = inference.rays_of(Camera(448, 32, 60.0))
-    bars = np.broadcast_to(((np.arange(448) // 8) % 2)[None, :, None], (32, 448, 3)).astype(np.float32)
-    inference.infer(network, bars, rays)
-    assert set(seen) == {336, 448}
-    seen.clear()
-    inference.infer(network, np.full_like(bars, 0.5), rays)
-    assert set(seen) == {192, 384}
-
-
-def test_what_is_seen_larger_than_the_photo_is_taken_from_the_finer_one(network, monkeypatch):
-    seen = []
-    run = inference._run
-    monkeypatch.setattr(inference, "_run", lambda n, *given: seen.append(given[:2]) or run(n, *given))
-    fine = np.random.default_rng(0).random((96, 192, 3), dtype=np.float32) * 1.4
-    linear = inference.resample.values(fine, (48, 96))
-    camera = Camera(96, 48, 60.0)
-    found = inference.infer(network, linear, inference.rays_of(camera), original=fine, sides=(64, 192))
-    assert found.depth.shape == (48, 96)
-    assert [photo.shape[:2] for photo, _ in seen] == [(32, 64)] * 2 + [(96, 192)] * 2
-    photo, rays = seen[2]
-    np.testing.assert_array_equal(photo, np.clip(fine, 0, 1))
-    np.testing.assert_allclose(rays, pixel_rays(Camera(192, 96, 60.0))[..., :2], atol=1e-6)
-    seen.clear()
-    inference.infer(network, linear, inference.rays_of(camera), sides=(64, 192))
-    assert [photo.shape[:2] for photo, _ in seen] == [(32, 64)] * 2 + [(48, 96)] * 2
-
-
-def test_the_predictor_looks_at_the_original(file, monkeypatch):
-    seen = []
-    monkeypatch.setattr(inference.views, "sides", lambda *_: (64, 128))
-    run = inference._run
-    monkeypatch.setattr(inference, "_run", lambda n, photo, *r: seen.append(photo.shape[:2]) or run(n, photo, *r))
-    photo = replace(_photo(32, 64), original=np.full((100, 200, 3), 0.5, np.float32))
-    assert BundledPredictor(file).predict(photo).depth.shape == (32, 64)
-    assert set(seen) == {(32, 64), (64, 128)}
-    seen.clear()
-    photo = replace(photo, original=np.full((10, 20, 3), np.nan))  # smaller than the photo itself
-    assert BundledPredictor(file).predict(photo).depth.shape == (32, 64)
-    assert set(seen) == {(32, 64)}
-
-
 def test_rays_go_on_into_the_padding(network):
     """A picture of 40 columns is padded to 64, where the rays must be those of a wider camera."""
     captured = {}
@@ -223,23 +176,6 @@ def test_bad_weights_are_refused(file, tmp_path):
     save_file(tensors, broken, {**meta, "architecture": '{"widths": [1]}'})
     with pytest.raises(WeightsError, match="describes no usable network"):
         BundledPredictor(broken)
-
-
-def test_without_weights_auto_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(bundled, "WEIGHTS", tmp_path / "weights.safetensors")
-    prediction = get_predictor("auto").predict(_photo(40, 40))
-    assert prediction.predictor == "classical" and "no weights of the bundled network" in prediction.warnings[0]
-    with pytest.raises(WeightsError, match="use --predictor classical"):
-        BundledPredictor(tmp_path / "weights.safetensors")
-
-
-def test_auto_is_bundled_where_its_weights_are(monkeypatch, file):
-    import materialist.predict.bundled.predictor as module
-
-    monkeypatch.setattr(bundled, "WEIGHTS", file)
-    monkeypatch.setattr(module, "WEIGHTS", file)
-    assert get_predictor("auto").name.startswith("bundled step 7")
-    assert get_predictor(f"bundled:{file}").name.startswith("bundled")
 
 
 def test_the_same_photo_gives_the_same_maps(file):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -13,12 +13,13 @@ from materialist.camera import pixel_rays, rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import membrane
 from materialist.predict import resample
-from materialist.predict.bundled import views
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.predict.bundled.relief import smooth_relief, with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
+SIDES = (192, 384)
+"""Longest sides, pixels, at which the network sees a photo: the whole, and details."""
 EDGE_SIDE = 768
 """Longest side at which edges of depth and normals are sought in the photo."""
 EDGE_REACH = 0.03
@@ -41,33 +42,27 @@ LEAST_ISLAND = 0.0005
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, original: Array | None = None, device: Any = "cpu",
-    sides: Sequence[int] | None = None,
-) -> Prediction:  # fmt: skip
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = SIDES
+) -> Prediction:
     """Maps of a photo at its own size.
 
-    The network sees the photo, and its mirror image, at some sizes (`views`); its answers are averaged, and brought to
-    the photo's size with the photo as the guide.
+    The network sees the photo and its mirror image at each of `sides`; its answers are averaged, and brought to the
+    photo's size with the photo as the guide.
 
     Args:
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-        original: [H0, W0, 3] float32 the same photo with more pixels, if there is one, for sizes that `linear` has not;
-            clipped likewise, once it is brought to such a size.
-        sides: longest sides, in pixels, at which the network sees the photo; by default those that suit what is in it.
+        sides: longest sides, pixels, at which the network sees the photo; at most the photo's own.
 
     Returns:
         A Prediction without a name: albedo linear, depth with median MEDIAN_DEPTH, 0 where the network sees no surface.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    larger = linear if original is None or max(original.shape[:2]) <= max(size) else original
-    judged = larger if max(size) < views.JUDGED else linear
-    sides = sides or views.sides(judged, max(larger.shape[:2]))
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
-    maps = _mean_answer(network, linear, rays, sides, device, larger)
+    maps = _mean_answer(network, linear, rays, sides, device)
     surface = _without_specks(_surface(maps["mask"]) | _detailed(photo, rays))
     if not surface.any():
         surface[:] = True
@@ -139,13 +134,13 @@ def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float
 
 
 def _mean_answer(
-    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any, larger: Array
+    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any
 ) -> dict[str, Array]:
-    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes that
-    `linear` has; `larger` is the photo with the most pixels."""
-    target = _network_size(linear.shape[:2], max(sides))
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes."""
+    sizes = sorted({_network_size(linear.shape[:2], side) for side in sides})
     answers = []
-    for photo in _seen(linear, larger, sides):
+    for size in sizes:
+        photo = resample.values(linear, size)
         seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
         mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
@@ -153,18 +148,7 @@ def _mean_answer(
         answers.append(found | {"normal": found["normal"] * _MIRROR})
     for answer in answers:  # what depth is relative to is every answer's own
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
-    return {n: np.mean([resample.values(a[n], target) for a in answers], axis=0) for n in answers[0]}
-
-
-def _seen(linear: Array, larger: Array, sides: Sequence[int]) -> Iterator[Array]:
-    """The photo at each size at which the network sees it, the smallest first; sizes that it does not have, once."""
-    done = set()
-    for side in sorted(sides):
-        source = linear if side <= max(linear.shape[:2]) else larger
-        size = _network_size(source.shape[:2], side)
-        if size not in done:
-            done.add(size)
-            yield np.nan_to_num(np.clip(resample.values(source, size), 0, 1)).astype(np.float32)
+    return {n: np.mean([resample.values(a[n], sizes[-1]) for a in answers], axis=0) for n in answers[0]}
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:

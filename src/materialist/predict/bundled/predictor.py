@@ -8,10 +8,10 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
-from materialist.predict.base import SKY_NOTE
 from materialist.predict.bundled import WEIGHTS, weights
 from materialist.predict.bundled.inference import infer, rays_of
 from materialist.predict.device import on_gpu
+from materialist.predict.protocol import SKY_NOTE
 from materialist.predict.weights import sha256
 from materialist.types import Photo, Prediction
 
@@ -32,8 +32,8 @@ class BundledPredictor:
         path = Path(where).expanduser() if str(where) else WEIGHTS
         if not path.is_file():
             raise WeightsError(
-                f"There are no weights of the bundled network at {path}; train and export some (materialist train "
-                "matnet, materialist train export), or use --predictor classical."
+                f"There are no weights of the bundled network at {path}; install materialist again, or train and "
+                "export some (materialist train matnet, materialist train export)."
             )
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
         network, self.facts = weights.load(path)
@@ -53,7 +53,7 @@ class BundledPredictor:
         sky. Raises WeightsError when the weights give values that are not finite.
         """
         rays = rays_of(photo.camera)
-        found = infer(self.network, photo.linear, rays, original=photo.original, device=self.device)
+        found = infer(self.network, photo.linear, rays, device=self.device)
         m = found.materials
         if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")

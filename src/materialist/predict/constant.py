@@ -1,0 +1,41 @@
+"""The predictor `constant`: the same neutral maps for every photo, as a baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
+from materialist.types import Array, Photo, Prediction
+
+VALUES = {
+    "albedo": (0.5, 0.5, 0.5),
+    "roughness": NEUTRAL_ROUGHNESS,
+    "metallic": NEUTRAL_METALLIC,
+    "normal": (0.0, 0.0, 1.0),
+    "depth": 3.0,
+}
+"""Grey paint, the paper's neutral roughness and metallic, and a plane that faces the camera (depth in scene units)."""
+
+
+class ConstantPredictor:
+    """Neutral materials on a plane that faces the camera."""
+
+    gives = MAPS
+    name = "constant"
+    normals_follow_depth = True
+
+    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
+        """All maps; the picture and `seed` change nothing."""
+        return whole(self, photo)
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted maps, with a warning that names them."""
+        size = photo.linear.shape[:2]
+        maps = {}
+        for name in wanted:
+            value = np.asarray(VALUES[name], np.float32)
+            maps[name] = np.broadcast_to(value, (*size, *value.shape)).copy()
+        note = f"The constant predictor knows nothing of the photo: {', '.join(wanted)} are neutral everywhere."
+        return Part(maps, dict.fromkeys(wanted, self.name), (note,))
