@@ -74,7 +74,7 @@ def test_unknown_benchmarks_and_options_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [({"scenes": "abc"}, "--scenes is 'abc'; give a whole number"), ({"scenes": 2.5}, "--scenes is 2.5"),
-     ({"scenes": -1}, "--scenes is -1; give at least 0"), ({"size": 0}, "--size is 0; give at least 1"),
+     ({"scenes": -1}, "--scenes is -1; give at least 1"), ({"size": 0}, "--size is 0; give at least 64"),
      ({"seed": -1}, "--seed is -1; give at least 0"),
      ({"photographic": 3}, "--photographic is 3; give true or false"),
      ({"scenes": float("nan")}, "--scenes is nan; give a whole number"), ({"size": float("inf")}, "--size is inf"),

@@ -2,13 +2,14 @@
 
 import pytest
 
+from materialist import bench
 from materialist.bench import studio
 from materialist.errors import InputError, SetupError
 
 
-def test_options():
+def test_options(tmp_path):
     with pytest.raises(InputError, match="moves is 1"):
-        studio.run(output="x", moves=1)
+        bench.run("studio", output=tmp_path / "x", moves=1)
     with pytest.raises(InputError, match="two shares"):
         studio._share("middle")
     assert studio._share("0.25,0.5") == (0.25, 0.5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from materialist import metrics
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
 from materialist.fit.attempt import FULL, Job
@@ -55,62 +56,55 @@ SHORT, EARLY = 200, {"patience": 20, "min_improvement": 0.05}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
 
 
-def run(
-    *,
-    data: Path | None,
-    output: Path,
-    tables: str = "delta,steps,init,field,fov,light",
-    scenes: int = 3,
-    size: int = 64,
-    predictor: str = "bundled",
-    longest: int = 1000,
-    goal: float = 0.03,
-    spp: int = 128,
-    seed: int = 0,
-    device: str = "auto",
-) -> Report:
+@dataclass(frozen=True, kw_only=True)
+class AblationBench(Benchmark):
     """The `tables` (names separated by commas) on `scenes` photos of `size` pixels.
 
     `predictor` makes the first materials and the depth; `truth` takes the true ones. `longest` is how many steps the
     smallest L_re is looked for (the paper: 3000), `goal` the L_re of the `light` table. With `data`, objects come from
     DATA/meshes and light from DATA/envmaps. Raises InputError for a table that is not there.
     """
-    from materialist.render.variant import setup
 
-    wanted = [name.strip() for name in tables.split(",") if name.strip()]
-    for name in wanted:
-        if name not in TABLES:
-            raise InputError(f"There is no table '{name}'; choose from {', '.join(TABLES)}.")
-    if not wanted:
-        raise InputError(f"--tables is empty; choose from {', '.join(TABLES)}.")
-    setup(device)
-    settings = {
-        "tables": ",".join(wanted), "scenes": scenes, "size": size, "predictor": predictor, "longest": longest,
-        "goal": goal, "spp": spp, "seed": seed, "device": device, "data": None if data is None else data.name,
-    }  # fmt: skip
-    rows: list[dict[str, Any]] = []
-    report = Report("Ablations", NOTE, settings, COLUMNS, rows, ("psnr", "loss"))
-    for k in range(scenes):
-        sample = make_sample(k, 0, k, size=size, data=data, seed=seed)
-        bench = _Bench(sample, predictor, k, data, spp=spp, longest=longest, goal=goal, seed=seed, device=device)
+    least = {"scenes": 1, "size": 16, "spp": 1, "longest": 1}
+
+    tables: str = "delta,steps,init,field,fov,light"
+    scenes: int = 3
+    size: int = 64
+    predictor: str = "bundled"
+    longest: int = 1000
+    goal: float = 0.03
+    spp: int = 128
+
+    def run(self, data: Path | None, output: Path) -> None:
+        from materialist.render.variant import setup
+
+        wanted = [name.strip() for name in self.tables.split(",") if name.strip()]
         for name in wanted:
-            for row in TABLES[name](bench):
-                rows.append({**row, "sample": sample.name})
-                write(report, output)
-    return report
+            if name not in TABLES:
+                raise InputError(f"There is no table '{name}'; choose from {', '.join(TABLES)}.")
+        if not wanted:
+            raise InputError(f"--tables is empty; choose from {', '.join(TABLES)}.")
+        setup(self.device)
+        rows: list[dict[str, Any]] = []
+        report = Report("Ablations", NOTE, self.settings(data), COLUMNS, rows, ("psnr", "loss"))
+        for k in range(self.scenes):
+            sample = make_sample(k, 0, k, size=self.size, data=data, seed=self.seed)
+            bench = _Photo(self, sample, k, data)
+            for name in wanted:
+                for row in TABLES[name](bench):
+                    rows.append({**row, "sample": sample.name})
+                    write(report, output)
 
 
-class _Bench:
+class _Photo:
     """One photo: its prior, and the paper's light for it."""
 
-    def __init__(
-        self, sample: SyntheticSample, predictor: str, number: int, data: Path | None, *, spp: int, longest: int,
-        goal: float, seed: int, device: str,
-    ):  # fmt: skip
-        self.sample, self.predictor, self.number, self.data = sample, predictor, number, data
-        self.spp, self.longest, self.goal, self.seed, self.device = spp, longest, goal, seed, device
+    def __init__(self, bench: AblationBench, sample: SyntheticSample, number: int, data: Path | None):
         import torch
 
+        self.sample, self.number, self.data = sample, number, data
+        self.predictor, self.longest, self.goal = bench.predictor, bench.longest, bench.goal
+        self.spp, self.seed, self.device = bench.spp, bench.seed, bench.device
         self.camera = sample.photo.camera
         self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
 
@@ -187,72 +181,72 @@ def _stages(names: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tup
     return tuple(MaterialStage(targets, schedule) for targets in names)
 
 
-def _delta(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _delta(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table delta_ab."""
     for name, targets in (("ARM", EACH[1:]), ("RM&A", (EACH[0], ("albedo",)))):
         for delta in DELTAS:
             settings = replace(PAPER.materials, delta=delta, stages=_stages(targets, SHORT, **EARLY))
-            yield bench.materials(f"delta {delta:g}, {name}", settings)
+            yield photo.materials(f"delta {delta:g}, {name}", settings)
 
 
-def _steps(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _steps(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table steps_ab."""
     for steps in STEPS:
-        yield bench.materials(f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps)))
+        yield photo.materials(f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps)))
 
 
-def _init(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _init(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Figure ab_init: first weights of the material network."""
     for seed in range(INITS):
-        yield bench.materials(f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, SHORT)), seed=seed)
+        yield photo.materials(f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, SHORT)), seed=seed)
 
 
-def _field(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _field(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Figure net_ab and table min_L_re."""
     for field, name in FIELDS.items():
         settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], SHORT))
-        yield bench.materials(f"{name}, {SHORT} steps", settings)
+        yield photo.materials(f"{name}, {SHORT} steps", settings)
     for field in ("maps", "mlp"):
-        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], bench.longest))
-        yield bench.materials(f"{FIELDS[field]} w/o R, M", settings, blind=True)
+        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.longest))
+        yield photo.materials(f"{FIELDS[field]} w/o R, M", settings, blind=True)
 
 
-def _fov(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _fov(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table fov_syn_ab."""
     from materialist.geometry.build import build_geometry
     from materialist.render.scene import RenderScene
 
-    sample, truth = bench.sample, bench.sample.truth
+    sample, truth = photo.sample, photo.sample.truth
     size = truth.depth.shape
-    other = make_sample(bench.number, 0, bench.number + 1, size=size, data=bench.data, seed=bench.seed).envmap
-    relit = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
+    other = make_sample(photo.number, 0, photo.number + 1, size=size, data=photo.data, seed=photo.seed).envmap
+    relit = sample.render(other, spp=photo.spp, seed=photo.seed + 3)
     for factor in FOVS:
-        camera = replace(bench.camera, fov=factor * bench.camera.fov)
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=bench.seed)
-        mesh = RenderScene(geometry, camera, device=bench.device)
+        camera = replace(photo.camera, fov=factor * photo.camera.fov)
+        geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=photo.seed)
+        mesh = RenderScene(geometry, camera, device=photo.device)
         mesh.set_materials(truth.materials)
         mesh.set_envmap(sample.envmap)
-        row = bench.against_photo(f"fov x {factor:g}", mesh.render(spp=bench.spp, seed=bench.seed + 1))
+        row = photo.against_photo(f"fov x {factor:g}", mesh.render(spp=photo.spp, seed=photo.seed + 1))
         mesh.set_envmap(other)
-        picture = mesh.render(spp=bench.spp, seed=bench.seed + 1)
+        picture = mesh.render(spp=photo.spp, seed=photo.seed + 1)
         yield {**row, "relit_psnr": metrics.psnr(picture, relit)}
 
 
-def _light(bench: _Bench) -> Iterator[dict[str, Any]]:
+def _light(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table sh: how fast the light explains the photo, true materials given."""
-    engine = bench.begun(bench.sample.truth).fit.engine
-    problem = engine.light_problem(bench.sample.truth.materials)
-    schedule = Schedule(max_steps=max(SHORT, bench.longest), patience=0)
+    engine = photo.begun(photo.sample.truth).fit.engine
+    problem = engine.light_problem(photo.sample.truth.materials)
+    schedule = Schedule(max_steps=max(SHORT, photo.longest), patience=0)
     for field, name in LIGHTS.items():
         settings = replace(PAPER.light, field=field, height=256 if field == "mlp" else 32, schedule=schedule)
-        light = envmap_field(settings, seed=bench.seed)
-        result = fit_light(problem, bench.photo, light, settings, seed=bench.seed)
-        under = next((k for k, loss in enumerate(result.losses, 1) if loss <= bench.goal), None)
+        light = envmap_field(settings, seed=photo.seed)
+        result = fit_light(problem, photo.photo, light, settings, seed=photo.seed)
+        under = next((k for k, loss in enumerate(result.losses, 1) if loss <= photo.goal), None)
         row = {"method": f"light: {name}", "loss": min(result.losses), "steps": under or result.steps}
         yield row if under is None else {**row, "reached": result.seconds * under / result.steps}
 
 
-TABLES: dict[str, Callable[[_Bench], Iterator[dict[str, Any]]]] = {
+TABLES: dict[str, Callable[[_Photo], Iterator[dict[str, Any]]]] = {
     "delta": _delta, "steps": _steps, "init": _init, "field": _field, "fov": _fov, "light": _light
 }  # fmt: skip
 

@@ -9,12 +9,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from materialist.batches.listing import list_photos
 from materialist.batches.packages import package_hash, together
 from materialist.batches.work import ONE_THREAD
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError
 
@@ -38,49 +40,46 @@ COLUMNS = (
 )
 
 
-def run(
-    *,
-    output: str | Path,
-    data: str | Path | None = None,
-    seed: int = 0,
-    device: str = "auto",
-    photos: int = 4,
-    size: int = 128,
-    workers: str | int = "1,2",
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class BatchBench(Benchmark):
     """Invert `photos` photos at `size` pixels each way; write the report into `output`.
 
     `data` is a folder of photos (those of data/photos where there is one), else the built-in examples are used.
     Raises InputError for bad options, MaterialistError where the ways give different results.
     """
-    counts = _counts(workers)
-    chosen = _chosen(None if data is None else Path(data), photos, Path(output))
-    rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        listing = place / "photos.txt"
-        listing.write_text("\n".join(chosen) + "\n", "utf-8")
-        options = ["--size", str(size), "--seed", str(seed), "--device", device, "--json"]
-        begin = _usage()
-        hashes = {}
-        for k, photo in enumerate(chosen):
-            _command("invert", photo, "-o", str(place / f"single/{k}.scene"), *options)
-            hashes[photo] = package_hash(place / f"single/{k}.scene")
-        rows.append(_row(SINGLE, begin, len(chosen), None))
-        for count in counts:
-            begin, runs = _usage(), place / f"runs-{count}"
-            _command("batch", str(listing), "-o", str(runs), "--workers", str(count), *options)
-            rows.append(_row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(chosen), rows[0]))
-            summary = json.loads((runs / "summary.json").read_text("utf-8"))
-            rows[-1]["peak_mb"] = max(row["peak_rss_mb"] for row in summary["rows"])
-            if together((row["id"], row["scene_hash"]) for row in summary["rows"]) != together(hashes.items()):
-                raise MaterialistError(f"A batch with {count} workers gave other scenes than single inversions.")
-            _write(rows, output, {"photos": len(chosen), "size": size, "seed": seed, "device": device})
 
+    least = {"photos": 1, "size": 16}
 
-def _write(rows: list[dict[str, Any]], output: str | Path, settings: dict[str, Any]) -> None:
-    report = Report("Many photos", NOTE, settings, COLUMNS, rows, ("seconds", "cpu_seconds"))
-    write(report, Path(output))
+    photos: int = 4
+    size: int = 128
+    workers: str | int = "1,2"
+
+    def run(self, data: Path | None, output: Path) -> None:
+        counts = _counts(self.workers)
+        chosen = _chosen(data, self.photos, output)
+        rows: list[dict[str, Any]] = []
+        with tempfile.TemporaryDirectory() as folder:
+            place = Path(folder)
+            listing = place / "photos.txt"
+            listing.write_text("\n".join(chosen) + "\n", "utf-8")
+            options = ["--size", str(self.size), "--seed", str(self.seed), "--device", self.device, "--json"]
+            begin = _usage()
+            hashes = {}
+            for k, photo in enumerate(chosen):
+                _command("invert", photo, "-o", str(place / f"single/{k}.scene"), *options)
+                hashes[photo] = package_hash(place / f"single/{k}.scene")
+            rows.append(_row(SINGLE, begin, len(chosen), None))
+            for count in counts:
+                begin, runs = _usage(), place / f"runs-{count}"
+                _command("batch", str(listing), "-o", str(runs), "--workers", str(count), *options)
+                rows.append(_row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(chosen), rows[0]))
+                summary = json.loads((runs / "summary.json").read_text("utf-8"))
+                rows[-1]["peak_mb"] = max(row["peak_rss_mb"] for row in summary["rows"])
+                if together((row["id"], row["scene_hash"]) for row in summary["rows"]) != together(hashes.items()):
+                    raise MaterialistError(f"A batch with {count} workers gave other scenes than single inversions.")
+                write(
+                    Report("Many photos", NOTE, self.settings(data), COLUMNS, rows, ("seconds", "cpu_seconds")), output
+                )
 
 
 def _counts(workers: str | int) -> list[int]:
@@ -95,8 +94,6 @@ def _counts(workers: str | int) -> list[int]:
 
 def _chosen(data: Path | None, photos: int, output: Path) -> list[str]:
     """Photos as texts for the command line, spread over those there are."""
-    if not isinstance(photos, int) or photos < 1:
-        raise InputError(f"photos is {photos}; give at least 1.")
     if data is None:
         return list(EXAMPLES[:photos])
     below = data / "photos"

@@ -5,15 +5,15 @@ The paper shows its edits (sections "Material Editing", "Object insertion and re
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from materialist import metrics
+from materialist.bench.benchmark import Benchmark, Clock
 from materialist.bench.edits import Edit, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.color import linear_to_srgb
@@ -44,94 +44,84 @@ is the photo as it was. `preview` rows: seconds of one preview by cached transpo
 hardly depend on what else the computer does."""
 
 
-def run(
-    *,
-    data: Path | None,
-    output: Path,
-    scenes: int = 3,
-    size: int = 96,
-    kinds: str = ",".join(KINDS),
-    predictor: str = "",
-    spp: int = 256,
-    truth_spp: int = 576,
-    latency: int = 512,
-    seed: int = 0,
-    device: str = "auto",
-) -> Report:
+@dataclass(frozen=True, kw_only=True)
+class EditBench(Benchmark):
     """Edit `scenes` synthetic photos of `size` pixels in the `kinds` of ways (separated by commas).
 
     `predictor` adds a row fitted with that predictor's maps;
     `latency` is the size of the picture that previews and the final edit are timed on, 0 for no such rows. The report
     is written after every row.
     """
-    chosen = tuple(kind.strip() for kind in str(kinds).split(","))
-    for kind in chosen:
-        if kind not in KINDS:
-            raise InputError(f"There is no edit '{kind}' in bench edit; choose of: {', '.join(KINDS)}.")
-    if scenes < 0 or size < 32 or spp < 2 or not (latency == 0 or latency >= 64):
-        raise InputError(
-            f"scenes {scenes}, size {size}, spp {spp}, latency {latency}: give 0, 32 pixels, 2, and 0 or 64, or more."
-        )
-    from rich.console import Console
-    from rich.progress import track
 
-    from materialist.render.variant import setup
+    least = {"size": 32, "spp": 2, "truth_spp": 1}
 
-    setup(device)
-    settings = {
-        "scenes": scenes, "size": size, "kinds": ",".join(chosen), "predictor": predictor or None,
-        "spp": spp, "truth_spp": truth_spp, "latency": latency, "seed": seed,
-        "data": None if data is None else data.name,
-    }  # fmt: skip
-    rows: list[dict[str, Any]] = []
-    strips: list[list[Array]] = []
-    report = Report("Edits", NOTE, settings, COLUMNS, rows, draw=lambda _, path: _sheet(strips, path))
-    for scene in track(range(scenes), "bench edit", console=Console(stderr=True)):
-        sample, other = (make_sample(scene, 0, k, size=size, data=data, seed=seed) for k in (scene, scene + 1))
-        options: dict[str, Any] = {"spp": spp, "truth_spp": truth_spp, "seed": seed, "device": device}
-        for row in _edited(sample, other.envmap, chosen, predictor, strips, options):
-            rows.append({**row, "sample": sample.name})
-            write(report, output)
-    if latency:
-        for row in _latencies(data, latency, seed, device):
-            rows.append(row)
-            write(report, output)
-    return report
+    scenes: int = 3
+    size: int = 96
+    kinds: str = ",".join(KINDS)
+    predictor: str = ""
+    spp: int = 256
+    truth_spp: int = 576
+    latency: int = 512
+
+    def run(self, data: Path | None, output: Path) -> None:
+        chosen = tuple(kind.strip() for kind in str(self.kinds).split(","))
+        for kind in chosen:
+            if kind not in KINDS:
+                raise InputError(f"There is no edit '{kind}' in bench edit; choose of: {', '.join(KINDS)}.")
+        from rich.console import Console
+        from rich.progress import track
+
+        from materialist.render.variant import setup
+
+        setup(self.device)
+        rows: list[dict[str, Any]] = []
+        strips: list[list[Array]] = []
+        report = Report("Edits", NOTE, self.settings(data), COLUMNS, rows, draw=lambda _, path: _sheet(strips, path))
+        for scene in track(range(self.scenes), "bench edit", console=Console(stderr=True)):
+            sample, other = (
+                make_sample(scene, 0, k, size=self.size, data=data, seed=self.seed) for k in (scene, scene + 1)
+            )
+            for row in _edited(self, sample, other.envmap, chosen, strips):
+                rows.append({**row, "sample": sample.name})
+                write(report, output)
+        if self.latency:
+            for row in _latencies(data, self.latency, self.seed, self.device):
+                rows.append(row)
+                write(report, output)
 
 
 def _edited(
-    sample: SyntheticSample, light: Array, kinds: tuple[str, ...], predictor: str,
-    strips: list[list[Array]], options: dict[str, Any],
-) -> Iterator[dict[str, Any]]:  # fmt: skip
+    bench: EditBench, sample: SyntheticSample, light: Array, kinds: tuple[str, ...], strips: list[list[Array]]
+) -> Iterator[dict[str, Any]]:
     """Rows of all edits of one sample."""
     from materialist import pipeline
 
-    shared = {"seed": options["seed"], "device": options["device"]}
-    clock = _Clock()
-    fitted = {"edit": (pipeline.invert(sample.photo, prior=sample.truth, **shared), clock.read()["seconds"])}
-    if predictor:
-        clock = _Clock()
-        found = pipeline.invert(sample.photo, predictor=predictor, **shared)
-        fitted["edit, predicted"] = (found, clock.read()["seconds"])
+    def inverted(**options: Any) -> tuple[Scene, float]:
+        clock = Clock()
+        found = pipeline.invert(sample.photo, seed=bench.seed, device=bench.device, **options)
+        return found, clock.read()["seconds"]
+
+    fitted = {"edit": inverted(prior=sample.truth)}
+    if bench.predictor:
+        fitted["edit, predicted"] = inverted(predictor=bench.predictor)
     perfect = true_scene(sample)
     for edit in edits(sample, light, kinds):
-        yield from _compared(edit, sample, perfect, fitted, strips, options)
+        yield from _compared(bench, edit, sample, perfect, fitted, strips)
 
 
 def _compared(
-    edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: dict[str, tuple[Scene, float]],
-    strips: list[list[Array]], options: dict[str, Any],
+    bench: EditBench, edit: Edit, sample: SyntheticSample, perfect: Scene,
+    fitted: dict[str, tuple[Scene, float]], strips: list[list[Array]],
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Rows of one edit: untouched, the ceilings, and each fit."""
     from materialist.edits.composite.composite import composite
 
-    spp, seed = options["spp"], options["seed"]
-    before = sample.render(sample.envmap, spp=options["truth_spp"], seed=seed + 5)
-    after = edit.render(edit.envmap, spp=options["truth_spp"], seed=seed + 5)
+    before = sample.render(sample.envmap, spp=bench.truth_spp, seed=bench.seed + 5)
+    after = edit.render(edit.envmap, spp=bench.truth_spp, seed=bench.seed + 5)
     inside = edit.region(before, after)
     score = lambda picture: _scores(picture, after, inside)  # noqa: E731
     yield {"method": f"{edit.kind}: untouched", **score(sample.photo.linear)}
-    shared = {"spp": spp, "seed": seed, "device": options["device"]}
+    shared: dict[str, Any] = {"spp": bench.spp, "seed": bench.seed, "device": bench.device}
     strip = [linear_to_srgb(p) for p in (sample.photo.linear, after)]
     strips.append(strip)
     truly = edit.change(perfect)
@@ -141,7 +131,7 @@ def _compared(
     brought = composite(perfect, truly, **shared)
     yield {"method": f"{CEILING} {edit.kind}, composite", **score(brought)}
     for name, (scene, fit_seconds) in fitted.items():
-        clock = _Clock()
+        clock = Clock()
         picture = composite(scene, edit.change(scene), **shared)
         strip.append(linear_to_srgb(picture))
         yield {"method": f"{edit.kind}: {name}", **score(picture), "fit_seconds": fit_seconds, **clock.read()}
@@ -167,7 +157,7 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     mask = np.zeros(scene.depth.shape, bool)
     mask[size // 3 : size // 2, size // 3 : size // 2] = True
     mask &= scene.depth > 0
-    clock = _Clock()
+    clock = Clock()
     preview = Preview(scene, seed=seed, device=device)
     sample = f"{size} x {size}"
     yield {"method": "preview: built once", "sample": sample, **clock.read()}
@@ -176,15 +166,15 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     for name, edited in (("preview: material", changes), ("preview: light", turns)):
         preview.render(edited[0])  # the first one compiles
         for one in edited[1:]:
-            clock = _Clock()
+            clock = Clock()
             preview.render(one)
             yield {"method": name, "sample": sample, **clock.read()}
-    clock = _Clock()
+    clock = Clock()
     composite(scene, changes[0], spp=256, seed=seed, device=device)
     yield {"method": "final: material, 256 paths", "sample": sample, **clock.read()}
     layers = render_layers(EditRenderer(scene, device=device), changes[0], spp=16, seed=seed)
     photo = _enlarged(scene.photo)
-    clock = _Clock()
+    clock = Clock()
     into_photo(photo, layers)
     yield {"method": "final: into a large photo", "sample": f"{LARGE} x {LARGE}", **clock.read()}
 
@@ -196,16 +186,6 @@ def _enlarged(photo: Photo) -> Photo:
     large = np.asarray(cv2.resize(photo.original, (LARGE, LARGE), interpolation=cv2.INTER_CUBIC))
     grain = GRAIN * np.random.default_rng(0).standard_normal((LARGE, LARGE, 1), np.float32)
     return replace(photo, original=np.clip(large * (1 + grain), 0, 1))
-
-
-class _Clock:
-    """Wall and processor seconds since it was made."""
-
-    def __init__(self) -> None:
-        self._wall, self._cpu = time.perf_counter(), time.process_time()
-
-    def read(self) -> dict[str, float]:
-        return {"seconds": time.perf_counter() - self._wall, "cpu_seconds": time.process_time() - self._cpu}
 
 
 def _sheet(strips: list[list[Array]], path: Path) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.glass_backdrop import Background, wall_ends
 from materialist.bench.glass_latency import latencies
 from materialist.bench.report import CEILING, Column, Report, write
@@ -73,11 +74,8 @@ class Case:
     name: str
 
 
-def run(
-    *, data: Path | None, output: Path, shapes: int = 2, envmaps: int = 2, iors: str | float = "1.1,1.3",
-    background: str = "room", size: int = 128, spp: int = 144, reference: int = 1024, full: bool = False,
-    draws: int = 10, pictures: int = 6, latency: int = 0, model: str = "", seed: int = 0, device: str = "auto",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class GlassBench(Benchmark):
     """Compare the two-interface model and the closed proxy with true glass.
 
     `shapes` objects of each group, each under `envmaps` lights with each of `iors` (comma-separated); `full` is the
@@ -86,83 +84,90 @@ def run(
     thicknesses a case; `pictures` cases are drawn. `latency` is the size of a picture on which the preview is timed;
     `shapes` may then be 0. `model` 'closed' or 'two-interface' leaves out the rows of the other.
     """
-    from materialist.render.variant import setup
 
-    if full:
-        shapes, envmaps, iors = 10, 30, "1.1,1.3"
-    try:
-        refraction = [float(x) for x in str(iors).split(",")]
-    except ValueError:
-        raise InputError(f"--iors is {iors!r}; give indices of refraction such as 1.1,1.3.") from None
-    if (
-        shapes < (not latency)
-        or min(envmaps, spp, reference) < 1
-        or size < 32
-        or not (latency == 0 or latency >= 64)
-        or not all(1 < x <= 3 for x in refraction)
-    ):
-        raise InputError(
-            f"shapes {shapes}, envmaps {envmaps}, spp {spp}, reference {reference}, size {size}, iors {iors}, latency "
-            f"{latency}: give at least 1, 1, 1, 1, 32 pixels, indices of refraction above 1 up to 3, and a latency of "
-            "0 or 64 pixels or more."
-        )
-    if model not in ("", *MODELS):
-        raise InputError(f"The model is {model!r}; choose {' or '.join(MODELS)}, or leave it out for both.")
-    if background not in scenes.ENVMAP_ROWS:
-        raise InputError(f"The background is {background!r}; choose room or envmap.")
-    setup(device)
-    rows: list[dict[str, Any]] = []
-    drawn: list[Array] = []
-    settings = {"data": None if data is None else str(data), "shapes": shapes, "envmaps": envmaps, "iors": str(iors),
-                "background": background, "size": size, "spp": spp, "reference": reference, "latency": latency,
-                "model": model, "seed": seed}  # fmt: skip
-    report = Report("Glass", NOTE, settings, COLUMNS, rows, plotted=("psnr_symmetric", "psnr_asymmetric"))
-    options: dict[str, Any] = {"background": background, "size": size, "reference": reference, "seed": seed}
-    for case, behind in cases(data, shapes, envmaps, refraction, **options) if shapes else ():
-        found, titles, strip = compared(case, behind, spp=spp, draws=draws, seed=seed, only=model)
-        rows.extend(found)
-        if len(drawn) < pictures:
-            drawn.append(strip)
-            _draw(drawn, titles, output / "sheet.png")
-        write(report, output)  # what is there already is worth having when a long run is stopped
-    if latency:
-        rows.extend(latencies(data, latency, spp=16, seed=seed, device=device))
-        write(report, output)
+    least = {"envmaps": 1, "spp": 1, "reference": 1, "size": 32}
 
+    shapes: int = 2
+    envmaps: int = 2
+    iors: str | float = "1.1,1.3"
+    background: str = "room"
+    size: int = 128
+    spp: int = 144
+    reference: int = 1024
+    full: bool = False
+    draws: int = 10
+    pictures: int = 6
+    latency: int = 0
+    model: str = ""
 
-def cases(
-    data: Path | None,
-    shapes: int,
-    envmaps: int,
-    iors: list[float],
-    *,
-    background: str,
-    size: int,
-    reference: int,
-    seed: int,
-) -> Iterator[tuple[Case, dict[str, Background]]]:  # fmt: skip
-    """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
-    for k, thing in enumerate(scenes.things(data, shapes, seed)):
-        scene = scenes.GlassScene(thing, size, seed, background)
-        for j in range(envmaps):
-            envmap = scenes.environment(k * envmaps + j, scene, data=data, seed=seed)
-            room = scene.render(envmap, "room", spp=reference, seed=1)
-            photo = scene.render(envmap, "diffuse", spp=reference, seed=2)
-            gain = scenes.exposure(room)
-            ends = wall_ends(scene, np.clip(photo * gain, 0, 1))
-            behind = {
-                "true": models.true_background(scene, room, envmap, ends),
-                "inpainted": models.inpainted_background(scene, photo, envmap, gain, ends),
-            }
-            for ior in iors:
-                truth = scene.render(envmap, "glass", ior=ior, spp=reference, seed=3)
-                yield Case(scene, envmap, photo, truth, gain, ior, f"{thing.name} light {j} ior {ior:g}"), behind
+    def run(self, data: Path | None, output: Path) -> None:
+        """Every case by every method; the report and a sheet of the first cases are written after each."""
+        from materialist.render.variant import setup
+
+        if self.full:
+            return replace(self, full=False, shapes=10, envmaps=30, iors="1.1,1.3").run(data, output)
+        self._check()
+        setup(self.device)
+        rows: list[dict[str, Any]] = []
+        drawn: list[Array] = []
+        plotted = ("psnr_symmetric", "psnr_asymmetric")
+        report = Report("Glass", NOTE, self.settings(data), COLUMNS, rows, plotted)
+        for case, behind in self.cases(data) if self.shapes else ():
+            found, titles, strip = compared(self, case, behind)
+            rows.extend(found)
+            if len(drawn) < self.pictures:
+                drawn.append(strip)
+                _draw(drawn, titles, output / "sheet.png")
+            write(report, output)  # what is there already is worth having when a long run is stopped
+        if self.latency:
+            rows.extend(latencies(data, self.latency, spp=16, seed=self.seed, device=self.device))
+            write(report, output)
+
+    @property
+    def indices(self) -> list[float]:
+        """The indices of refraction; raises InputError where they are no numbers above 1 up to 3."""
+        try:
+            found = [float(x) for x in str(self.iors).split(",")]
+        except ValueError:
+            found = []
+        if not found or not all(1 < x <= 3 for x in found):
+            raise InputError(f"--iors is {self.iors!r}; give indices of refraction above 1 up to 3, such as 1.1,1.3.")
+        return found
+
+    def _check(self) -> None:
+        """Raises InputError for options out of range."""
+        if not (self.shapes or self.latency):
+            raise InputError("--shapes is 0; give at least 1, or a --latency.")
+        if self.model not in ("", *MODELS):
+            raise InputError(f"The model is {self.model!r}; choose {' or '.join(MODELS)}, or leave it out for both.")
+        if self.background not in scenes.ENVMAP_ROWS:
+            raise InputError(f"The background is {self.background!r}; choose room or envmap.")
+        _ = self.indices
+
+    def cases(self, data: Path | None) -> Iterator[tuple[Case, dict[str, Background]]]:
+        """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
+        for k, thing in enumerate(scenes.things(data, self.shapes, self.seed)):
+            scene = scenes.GlassScene(thing, self.size, self.seed, self.background)
+            for j in range(self.envmaps):
+                envmap = scenes.environment(k * self.envmaps + j, scene, data=data, seed=self.seed)
+                room = scene.render(envmap, "room", spp=self.reference, seed=1)
+                photo = scene.render(envmap, "diffuse", spp=self.reference, seed=2)
+                gain = scenes.exposure(room)
+                ends = wall_ends(scene, np.clip(photo * gain, 0, 1))
+                behind = {
+                    "true": models.true_background(scene, room, envmap, ends),
+                    "inpainted": models.inpainted_background(scene, photo, envmap, gain, ends),
+                }
+                for ior in self.indices:
+                    truth = scene.render(envmap, "glass", ior=ior, spp=self.reference, seed=3)
+                    yield Case(scene, envmap, photo, truth, gain, ior, f"{thing.name} light {j} ior {ior:g}"), behind
 
 
 def compared(
-    case: Case, behind: dict[str, Background], *, spp: int, draws: int, seed: int, only: str = ""
+    bench: GlassBench, case: Case, behind: dict[str, Background]
 ) -> tuple[list[dict[str, Any]], list[str], Array]:
-    """The rows of the methods for one case, and a strip of pictures with the title of each; `only` one of MODELS."""
+    """The rows of the methods for one case, and a strip of pictures with the title of each."""
+    spp = bench.spp
     scene, shown = case.scene, {}
     seen = np.clip(case.photo * case.gain, 0, 1)
     d = models.thicknesses(scene, seen, behind["true"])
@@ -175,7 +180,7 @@ def compared(
 
     for kind, background in behind.items():
         add(f"background alone, {kind}", models.plain_background(scene, background))
-    chosen = (only,) if only else MODELS
+    chosen = (bench.model,) if bench.model else MODELS
     if "closed" in chosen:
         ceiling = models.before(scene, scene.item.solid, behind["true"], case.envmap, case.ior, spp=spp)
         add(f"{CEILING}, true mesh", ceiling)
@@ -193,7 +198,7 @@ def compared(
     if "two-interface" in chosen:
         same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
         add(f"two_interface, {best} d, back normal = front normal", same, d[best])
-        rows += sensitivity(case, d[best], behind["true"], draws=draws, seed=seed)
+        rows += sensitivity(case, d[best], behind["true"], draws=bench.draws, seed=bench.seed)
     titles = [name for name in DRAWN if name in shown]
     return rows, titles, _strip(case, behind["true"].picture, [shown[name] for name in titles])
 

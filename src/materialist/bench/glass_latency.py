@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Clock
 from materialist.types import Array, Scene
 
 CHANGES: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -49,14 +49,3 @@ def block(scene: Scene) -> Array:
     mask = np.zeros((height, width), bool)
     mask[height // 3 : 2 * height // 3, width // 3 : 2 * width // 3] = True
     return mask & (scene.depth > 0)
-
-
-class Clock:
-    """Wall and processor seconds since it was made."""
-
-    def __init__(self) -> None:
-        self._wall, self._cpu = time.perf_counter(), time.process_time()
-
-    def read(self) -> dict[str, float]:
-        """`seconds` and `cpu_seconds`."""
-        return {"seconds": time.perf_counter() - self._wall, "cpu_seconds": time.process_time() - self._cpu}

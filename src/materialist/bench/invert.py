@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.process import message, watched
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
@@ -71,18 +72,8 @@ class Case:
     fov: str = "auto"
 
 
-def run(
-    *,
-    data: Path | None,
-    output: Path,
-    sizes: str | int = "256,512",
-    photo: str | None = None,
-    step_size: int = 512,
-    preset: str = "default",
-    completion: str = "auto",
-    seed: int = 0,
-    device: str = "auto",
-) -> Report:
+@dataclass(frozen=True, kw_only=True)
+class InvertBench(Benchmark):
     """Invert one photo at every size (longer side, pixels), and compare the cost of a step with the paper's.
 
     The photo is DATA/official_indoor/photo.png (or DATA/photo.png) with the maps beside it as the prior; without
@@ -90,25 +81,37 @@ def run(
     `step_size` is the size of the step comparison; 0 leaves it out. The report is written after every size.
     Raises InputError for sizes that `invert` does not take, data without photo, or when an inversion fails.
     """
-    wanted = _sizes(sizes)
-    settings = {
-        "sizes": ",".join(map(str, wanted)), "step_size": step_size or None, "preset": preset,
-        "completion": completion, "seed": seed, "device": device,
-    }  # fmt: skip
-    rows: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
-        folder = Path(temporary)
-        case = _case(data, photo, folder, min(NATIVE, max(wanted)), seed, device)
-        note = f"{NOTE}\n{STEP_NOTE}" if step_size else NOTE
-        report = Report("Inversion", note, {"photo": case.name, **settings}, COLUMNS, rows, draw=plot)
-        options = ["--preset", preset, "--completion", completion, "--seed", str(seed), "--device", device]
-        for size in wanted:
-            rows.append(inversion(case, size, folder, options))
-            write(report, output)
-        if step_size:
-            rows.append(_step_row(case, step_size, folder, seed, device))
-            write(report, output)
-    return report
+
+    sizes: str | int = "256,512"
+    photo: str | None = None
+    step_size: int = 512
+    preset: str = "default"
+    completion: str = "auto"
+
+    def run(self, data: Path | None, output: Path) -> None:
+        wanted = _sizes(self.sizes)
+        rows: list[dict[str, Any]] = []
+        with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
+            folder = Path(temporary)
+            case = _case(data, self.photo, folder, min(NATIVE, max(wanted)), self.seed, self.device)
+            note = f"{NOTE}\n{STEP_NOTE}" if self.step_size else NOTE
+            report = Report("Inversion", note, self.settings(data, photo=case.name), COLUMNS, rows, draw=plot)
+            options = [
+                "--preset",
+                self.preset,
+                "--completion",
+                self.completion,
+                "--seed",
+                str(self.seed),
+                "--device",
+                self.device,
+            ]
+            for size in wanted:
+                rows.append(inversion(case, size, folder, options))
+                write(report, output)
+            if self.step_size:
+                rows.append(_step_row(case, self.step_size, folder, self.seed, self.device))
+                write(report, output)
 
 
 def _sizes(text: str | int) -> list[int]:

@@ -6,7 +6,6 @@ and "Ablation study on envmap settings"): scenes x viewpoints x lightings; full 
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, product
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics
+from materialist.bench.benchmark import Benchmark, Clock
 from materialist.bench.report import CEILING, Column, Report, write
 from materialist.errors import InputError
 from materialist.predict import NEUTRAL_METALLIC
@@ -89,21 +89,8 @@ METHODS = {
 }
 
 
-def run(
-    *,
-    data: Path | None,
-    output: Path,
-    scenes: int = 3,
-    views: int = 1,
-    lights: int = 2,
-    size: int = 96,
-    methods: str = "default,paper",
-    completion: str = "auto",
-    relight: bool = True,
-    spp: int = 256,
-    seed: int = 0,
-    device: str = "auto",
-) -> Report:
+@dataclass(frozen=True, kw_only=True)
+class LightBench(Benchmark):
     """Fit the light of scenes x views x lights samples of `size` pixels with each of the `methods`.
 
     `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
@@ -111,30 +98,39 @@ def run(
     the paper's, `auto` is `planes`. With `relight`, whole inversions with and without continued planes are relit. `spp`
     are the samples a pixel of all pictures that are compared. The report is written after every row.
     """
-    chosen = _methods(methods)
-    if scenes < 1:
-        raise InputError(f"scenes is {scenes}; give at least 1.")
-    from rich.console import Console
-    from rich.progress import track
 
-    from materialist.render.variant import setup
+    least = {"scenes": 1, "views": 1, "lights": 1, "size": 1, "spp": 1}
 
-    setup(device)
-    settings = {
-        "scenes": scenes, "views": views, "lights": lights, "size": size, "completion": completion, "spp": spp,
-        "seed": seed, "data": None if data is None else data.name,
-    }  # fmt: skip
-    rows: list[dict[str, Any]] = []
-    report = Report("Light", NOTE, settings, COLUMNS, rows, plotted=("sh_error_relative", "render_psnr", "seconds"))
-    indices = list(product(range(scenes), range(views), range(lights)))
-    for scene, view, light in track(indices, "bench light", console=Console(stderr=True)):
-        first = scene + view + light
-        sample, other = (make_sample(scene, view, k, size=size, data=data, seed=seed) for k in (first, first + 1))
-        stage = _Stage(sample, other.envmap, spp, seed, device)
-        for row in chain(stage.relit() if relight else (), stage.fitted(chosen, completion)):
-            rows.append({**row, "sample": sample.name})
-            write(report, output)
-    return report
+    scenes: int = 3
+    views: int = 1
+    lights: int = 2
+    size: int = 96
+    methods: str = "default,paper"
+    completion: str = "auto"
+    relight: bool = True
+    spp: int = 256
+
+    def run(self, data: Path | None, output: Path) -> None:
+        chosen = _methods(self.methods)
+        from rich.console import Console
+        from rich.progress import track
+
+        from materialist.render.variant import setup
+
+        setup(self.device)
+        rows: list[dict[str, Any]] = []
+        plotted = ("sh_error_relative", "render_psnr", "seconds")
+        report = Report("Light", NOTE, self.settings(data), COLUMNS, rows, plotted)
+        indices = list(product(range(self.scenes), range(self.views), range(self.lights)))
+        for scene, view, light in track(indices, "bench light", console=Console(stderr=True)):
+            first = scene + view + light
+            sample, other = (
+                make_sample(scene, view, k, size=self.size, data=data, seed=self.seed) for k in (first, first + 1)
+            )
+            stage = _Stage(sample, other.envmap, self.spp, self.seed, self.device)
+            for row in chain(stage.relit() if self.relight else (), stage.fitted(chosen, self.completion)):
+                rows.append({**row, "sample": sample.name})
+                write(report, output)
 
 
 def _methods(names: str) -> dict[str, Method]:
@@ -149,16 +145,6 @@ def _methods(names: str) -> dict[str, Method]:
 
 ADDED = {"auto": "", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
-
-
-class _Clock:
-    """Wall and processor seconds since it was made; the latter hardly change when other programs run beside."""
-
-    def __init__(self) -> None:
-        self._wall, self._cpu = time.perf_counter(), time.process_time()
-
-    def read(self) -> dict[str, float]:
-        return {"seconds": time.perf_counter() - self._wall, "cpu_seconds": time.process_time() - self._cpu}
 
 
 class _Stage:
@@ -191,7 +177,7 @@ class _Stage:
         truth = self.sample.truth
         for completion, suffix in ADDED.items():
             yield {"method": CEILING + suffix, **self._on_mesh(_all(completion), truth.materials, self.sample.envmap)}
-            clock = _Clock()
+            clock = Clock()
             found = pipeline.invert(
                 self.sample.photo, prior=truth, completion=completion, seed=self.seed, device=self.device
             )
@@ -214,7 +200,7 @@ class _Stage:
             if method.preset == "paper":
                 taken = _all(completion)
                 mesh = self.mesh(taken)[1]
-            clock = _Clock()
+            clock = Clock()
             envmap, steps, mesh = fit(self.sample, method, taken, mesh=mesh, seed=self.seed, device=self.device)
             cost = clock.read()
             on_mesh = self._on(mesh, self.sample.truth.materials, envmap)

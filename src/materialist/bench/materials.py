@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Pace, Report, write
 from materialist.errors import InputError
 from materialist.predict.protocol import MAPS
@@ -61,66 +62,81 @@ FILES = ("maps:", "moge:")
 """Predictors that know one picture's maps."""
 
 
-def run(
-    *, data: Path | None, output: Path, predictor: str = "auto", limit: int = 0, split: str = "test",
-    photographic: bool = True, pictures: int = 8, procedural: int | None = None, meshes: str = "", envmaps: str = "",
-    size: int = 256, seed: int = 0, device: str = "auto",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class MaterialsBench(Benchmark):
     """Score predictors (comma-separated) on `data`, and on so many held-out procedural pictures made for it.
 
     `limit` scores at most so many samples of `data`, spread over the set (0: all); `split` is InteriorVerse's;
     `pictures` of each kind are drawn into sheet.png. `procedural` is HELD_OUT unless `data` is a set of `train data`
     itself; they have `size` pixels a side and use the files of `meshes` and `envmaps` that are kept aside, if given.
     """
-    from materialist.bench.predictors import opened, specs_of
 
-    own_set = data is not None and (data / "samples").is_dir()
-    count = (0 if own_set else HELD_OUT) if procedural is None else procedural
-    if data is None and count < 1:
-        raise InputError("There is nothing to score; give --data DIR (docs/training.md), or --procedural above 0.")
-    specs = specs_of(predictor)
-    sources = {spec: opened(spec, device) for spec in specs}
-    rows: list[dict[str, Any]] = []
-    strips: dict[tuple[str, int], list] = {}
-    settings: dict[str, Any] = {
-        "data": str(data), "split": split, "photographic": photographic, "procedural": count, "seed": seed
-    }  # fmt: skip
+    predictor: str = "auto"
+    limit: int = 0
+    split: str = "test"
+    photographic: bool = True
+    pictures: int = 8
+    procedural: int | None = None
+    meshes: str = ""
+    envmaps: str = ""
+    size: int = 256
 
-    def tell() -> None:
-        report = Report("Predicted maps", NOTE, settings, COLUMNS, _with_pooled(rows), ("albedo_psnr", "normal_angle"))
-        write(report, output)
+    def run(self, data: Path | None, output: Path) -> None:
+        from materialist.bench.predictors import opened, specs_of
 
-    pace = Pace()
+        own_set = data is not None and (data / "samples").is_dir()
+        count = (0 if own_set else HELD_OUT) if self.procedural is None else self.procedural
+        if data is None and count < 1:
+            raise InputError("There is nothing to score; give --data DIR (docs/training.md), or --procedural above 0.")
+        specs = specs_of(self.predictor)
+        sources = {spec: opened(spec, self.device) for spec in specs}
+        rows: list[dict[str, Any]] = []
+        strips: dict[tuple[str, int], list] = {}
+        settings = self.settings(data, procedural=count)
 
-    def add(folder: Path, kind: str, most: int) -> None:
-        for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
-            unreadable: list[str] = []
-            samples = labelled(folder, split=split, limit=most, photographic=photographic, unreadable=unreadable)
-            for k, (name, photo, truth) in enumerate(samples):
-                prediction, row = _scored(sources[spec], photo, truth, seed)
-                rows.append({"method": spec + kind, "sample": name, **row})
-                if k < pictures:
-                    strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
-                absent = absent_maps(truth)
-                settings.update({f"no true {which}": True for which in absent})
-                if pace.due():
-                    tell()
-            if unreadable:
-                settings["left out"] = "; ".join(unreadable)
-        if not rows:
-            raise InputError(settings.get("left out") or f"{folder} holds nothing to score.")
+        def tell() -> None:
+            report = Report(
+                "Predicted maps", NOTE, settings, COLUMNS, _with_pooled(rows), ("albedo_psnr", "normal_angle")
+            )
+            write(report, output)
 
-    if data is not None:
-        add(data, "", limit)
-        settings |= lost(data, split)
-    if count:
-        from materialist.procedural.dataset import CONTENT
+        pace = Pace()
 
-        settings["procedural content"] = CONTENT["heldout"]
-        with tempfile.TemporaryDirectory() as place:
-            add(held_out(Path(place) / "set", count, size, seed, meshes, envmaps, device), ", procedural", 0)
-    tell()
-    _draw(list(strips.values()), output / "sheet.png")
+        def add(folder: Path, kind: str, most: int) -> None:
+            for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
+                unreadable: list[str] = []
+                samples = labelled(
+                    folder, split=self.split, limit=most, photographic=self.photographic, unreadable=unreadable
+                )
+                for k, (name, photo, truth) in enumerate(samples):
+                    prediction, row = _scored(sources[spec], photo, truth, self.seed)
+                    rows.append({"method": spec + kind, "sample": name, **row})
+                    if k < self.pictures:
+                        strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
+                    absent = absent_maps(truth)
+                    settings.update({f"no true {which}": True for which in absent})
+                    if pace.due():
+                        tell()
+                if unreadable:
+                    settings["left out"] = "; ".join(unreadable)
+            if not rows:
+                raise InputError(settings.get("left out") or f"{folder} holds nothing to score.")
+
+        if data is not None:
+            add(data, "", self.limit)
+            settings |= lost(data, self.split)
+        if count:
+            from materialist.procedural.dataset import CONTENT
+
+            settings["procedural content"] = CONTENT["heldout"]
+            with tempfile.TemporaryDirectory() as place:
+                add(
+                    held_out(Path(place) / "set", count, self.size, self.seed, self.meshes, self.envmaps, self.device),
+                    ", procedural",
+                    0,
+                )
+        tell()
+        _draw(list(strips.values()), output / "sheet.png")
 
 
 def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmaps: str, device: str) -> Path:

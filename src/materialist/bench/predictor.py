@@ -9,14 +9,15 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
-from materialist.errors import InputError
 from materialist.types import Camera, Photo
 
 COLUMNS = (
@@ -31,36 +32,41 @@ NOTE = (
 )
 
 
-def run(
-    *, data: Path | None, output: Path, predictor: str = "auto", size: int = 512, warmups: int = 50, runs: int = 500,
-    threads: int = 0, seed: int = 0, device: str = "auto",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class PredictorBench(Benchmark):
     """Time predictors (comma-separated) on a square of `size` pixels; `threads` 0 leaves their number as it is."""
-    if runs < 1 or warmups < 0 or size < 32:
-        raise InputError(f"runs {runs}, warmups {warmups}, size {size}: give at least 1 run, 0 warm-ups and 32 pixels.")
-    import torch
 
-    if threads:
-        torch.set_num_threads(threads)
-    from materialist.bench.predictors import opened, specs_of
+    least = {"runs": 1, "size": 32}
 
-    noise = np.random.default_rng(seed).random((size, size, 3), dtype=np.float32)
-    photo = Photo(linear=noise, camera=Camera(size, size), original=noise)
-    rows = []
-    for spec in specs_of(predictor):
-        source = opened(spec, device)
-        network = getattr(source, "network", None)
-        weights = {} if network is None else {"parameters_m": sum(p.numel() for p in network.parameters()) / 1e6}
-        work: dict[str, Callable[[], Any]] = {"predict": partial(source.predict, photo, seed=seed)}
-        if network is not None:
-            work = {"network": forward(network, size), **work}
-        for name, call in work.items():
-            rows.append({"method": f"{spec} {name}", "sample": 0, **weights, **timed(call, warmups, runs)})
-    settings = {
-        "size": size, "warmups": warmups, "runs": runs, "threads": torch.get_num_threads(), "cores": os.cpu_count(),
-        "device": device,
-    }  # fmt: skip
-    write(Report("Time of a prediction", NOTE, settings, COLUMNS, rows, plotted=("median_ms",)), output)
+    predictor: str = "auto"
+    size: int = 512
+    warmups: int = 50
+    runs: int = 500
+    threads: int = 0
+
+    def run(self, data: Path | None, output: Path) -> None:
+        import torch
+
+        if self.threads:
+            torch.set_num_threads(self.threads)
+        from materialist.bench.predictors import opened, specs_of
+
+        noise = np.random.default_rng(self.seed).random((self.size, self.size, 3), dtype=np.float32)
+        photo = Photo(linear=noise, camera=Camera(self.size, self.size), original=noise)
+        rows = []
+        for spec in specs_of(self.predictor):
+            source = opened(spec, self.device)
+            network = getattr(source, "network", None)
+            weights = {} if network is None else {"parameters_m": sum(p.numel() for p in network.parameters()) / 1e6}
+            work: dict[str, Callable[[], Any]] = {"predict": partial(source.predict, photo, seed=self.seed)}
+            if network is not None:
+                work = {"network": forward(network, self.size), **work}
+            for name, call in work.items():
+                rows.append(
+                    {"method": f"{spec} {name}", "sample": 0, **weights, **timed(call, self.warmups, self.runs)}
+                )
+        settings = self.settings(data, threads=torch.get_num_threads(), cores=os.cpu_count())
+        write(Report("Time of a prediction", NOTE, settings, COLUMNS, rows, plotted=("median_ms",)), output)
 
 
 def timed(call: Callable[[], Any], warmups: int, runs: int) -> dict[str, float]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.edits.select.boxes import Box, grown
-from materialist.errors import InputError
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Prediction, Scene
@@ -36,33 +37,36 @@ SPP = 100
 """Samples a pixel of the pictures."""
 
 
-def run(
-    *, data: Path | None, output: Path, scenes: int = 12, size: int = 256, seed: int = 0, device: str = "auto"
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class SelectBench(Benchmark):
     """Score one click on the objects of `scenes` pictures, and of as many with captured meshes where DATA is given.
 
     Raises InputError for counts below 1.
     """
-    if scenes < 1 or not 64 <= size <= 2048:
-        raise InputError(f"scenes is {scenes} and the size {size}; give at least 1, and 64 to 2048.")
-    from materialist.predict.bundled.predictor import BundledPredictor
-    from materialist.render.variant import setup
 
-    setup(device)
-    if data is not None:
-        arrangement(0, seed=seed, data=data)  # that there are meshes
-    rows: list[dict[str, Any]] = []
-    settings = {"scenes": scenes, "size": size, "seed": seed, "data": data is not None}
-    report = Report("Objects by one click, or a box", NOTE, settings, COLUMNS, rows, plotted=("iou",))
-    predictor = BundledPredictor()
-    for folder in (None,) if data is None else (None, data):
-        for k in range(scenes):
-            sample = make_sample(k, 1, k, size=size, data=folder, seed=seed, spp=SPP)
-            kind = "captured" if folder else "procedural"
-            for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
-                for method in METHODS:
-                    rows += _rows(sample, _scene(sample, found), maps, method, f"{kind} {sample.name}", k)
-            write(report, output)
+    least = {"scenes": 1, "size": 64}
+
+    scenes: int = 12
+    size: int = 256
+
+    def run(self, data: Path | None, output: Path) -> None:
+        from materialist.predict.bundled.predictor import BundledPredictor
+        from materialist.render.variant import setup
+
+        setup(self.device)
+        if data is not None:
+            arrangement(0, seed=self.seed, data=data)  # that there are meshes
+        rows: list[dict[str, Any]] = []
+        report = Report("Objects by one click, or a box", NOTE, self.settings(data), COLUMNS, rows, plotted=("iou",))
+        predictor = BundledPredictor()
+        for folder in (None,) if data is None else (None, data):
+            for k in range(self.scenes):
+                sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=SPP)
+                kind = "captured" if folder else "procedural"
+                for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
+                    for method in METHODS:
+                        rows += _rows(sample, _scene(sample, found), maps, method, f"{kind} {sample.name}", k)
+                write(report, output)
 
 
 def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[int, int]]:

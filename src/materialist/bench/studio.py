@@ -11,12 +11,14 @@ import tempfile
 import time
 import urllib.request
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import psutil
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError, SetupError
 
@@ -80,32 +82,39 @@ _GLASS_VALUES = (
 _RANGES = {"hue": (-170, 170), "saturation": (-0.8, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
 
 
-def run(
-    *, output: str | Path, data: str | Path | None = None, seed: int = 0, device: str = "auto",
-    photo: str = "example:astronaut", size: int = 512, moves: int = 60, click: str = "0.3,0.8", scene: str = "",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class StudioBench(Benchmark):
     """Measure the studio on one photo (a file, or example:NAME), or on a `scene` that is there, without the drop.
 
     `click` is where in the photo an object is selected, as shares of its width and height. Raises SetupError where
     Playwright or Chromium are missing. `data` and `device` are not used.
     """
-    if not 5 <= moves <= 10_000:
-        raise InputError(f"moves is {moves}; give 5 to 10000.")
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        _server(Path(folder), scene) as (server, address),
-        _browser() as chromium,
-    ):
-        row = _measured(server, address, chromium, _photo(photo), size, moves, _share(click), bool(scene), seed)
-    settings = {"photo": Path(scene).name if scene else photo, "size": size, "moves": moves, "seed": seed}
-    write(Report("The studio", NOTE, settings, COLUMNS, [{"method": "studio", "sample": photo, **row}]), Path(output))
+
+    photo: str = "example:astronaut"
+    size: int = 512
+    moves: int = 60
+    click: str = "0.3,0.8"
+    scene: str = ""
+
+    def run(self, data: Path | None, output: Path) -> None:
+        if not 5 <= self.moves <= 10_000:
+            raise InputError(f"moves is {self.moves}; give 5 to 10000.")
+        photo, click = _photo(self.photo), _share(self.click)
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            _browser() as chromium,
+            _server(Path(folder), self.scene) as (server, address),
+        ):
+            row = _measured(self, server, address, chromium, photo, click)
+        row |= {"method": "studio", "sample": self.photo}
+        write(Report("The studio", NOTE, self.settings(data), COLUMNS, [row]), output)
 
 
 def _measured(
-    server: psutil.Process, address: str, browser: Any, photo: Path, size: int, moves: int, click: tuple[float, float],
-    open_already: bool, seed: int,
-) -> dict[str, float]:  # fmt: skip
-    row = {"idle_mb": _resident(server)}
+    bench: StudioBench, server: psutil.Process, address: str, browser: Any, photo: Path, click: tuple[float, float]
+) -> dict[str, Any]:
+    open_already = bool(bench.scene)
+    row: dict[str, Any] = {"idle_mb": _resident(server)}
     if not open_already:  # else every page would open the scene
         row["load_s"] = float(np.median([_load(browser, address) for _ in range(5)]))
         row["idle_mb"] = max(row["idle_mb"], _resident(server))
@@ -114,14 +123,14 @@ def _measured(
     start = time.perf_counter()
     page.goto(address)
     if not open_already:
-        start = _dropped(page, photo, size)
+        start = _dropped(page, photo, bench.size)
     page.wait_for_selector(READY)
     _select(page, click)
     page.evaluate(_MOVE, ["hue", 40])
     row["reopen_s" if open_already else "drop_s"] = time.perf_counter() - start
-    row |= _moved(server, page, moves, seed)
+    row |= _moved(server, page, bench.moves, bench.seed)
     row["scene_mb"] = _resident(server) - row["idle_mb"]
-    row |= _glass(server, page, moves, click, seed)
+    row |= _glass(server, page, bench.moves, click, bench.seed)
     page.close()
     time.sleep(5)
     row["after_mb"] = _resident(server) - row["idle_mb"]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
 from materialist.types import Array
@@ -24,37 +26,43 @@ COLUMNS = (
 )
 
 
-def run(
-    *, data: Path | None, output: Path, shapes: int = 64, views: int = 8, mesh_views: int = 4, weights: str = "",
-    seed: int = 0, device: str = "auto",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class ThicknessBench(Benchmark):
     """Score RefractionNet on `shapes` held-out shapes and the meshes of DATA, each seen `views` or `mesh_views` times.
 
     `weights`: a .safetensors file instead of those in the package. Raises InputError for counts below 1, WeightsError
     where there are no weights. `device` is not used: the network is small.
     """
-    if min(shapes, views, mesh_views) < 1:
-        raise InputError(f"shapes is {shapes}, views {views}, mesh_views {mesh_views}; give at least 1 each.")
-    if data is not None and not (data / "meshes").is_dir():
-        raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
-    from materialist.predict.refraction import WEIGHTS
-    from materialist.predict.refraction.weights import load
-    from materialist.procedural.thickness.dataset import Plan
-    from materialist.procedural.thickness.dataset import views as lessons_of
-    from materialist.procedural.thickness.errors import of_meshes
-    from materialist.render.variant import setup
 
-    setup("cpu")
-    network, _ = load(Path(weights) if weights else WEIGHTS)
-    rows: list[dict[str, Any]] = []
-    settings = {"shapes": shapes, "views": views, "mesh_views": mesh_views, "seed": seed}
-    report = Report("Thickness and back of objects", NOTE, settings, COLUMNS, rows, plotted=("solid", "back"))
-    for k in range(shapes):
-        rows += _rows("held-out", f"shape {k}", network, lessons_of(k, Plan(shapes, views, "heldout", seed)))
-    for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
-        for name, found in of_meshes(group, mesh_views, seed).items():
-            rows += _rows(f"{group.name} meshes", name, network, found)
-    write(report, output)
+    least = {"shapes": 1, "views": 1, "mesh_views": 1}
+
+    shapes: int = 64
+    views: int = 8
+    mesh_views: int = 4
+    weights: str = ""
+
+    def run(self, data: Path | None, output: Path) -> None:
+        if data is not None and not (data / "meshes").is_dir():
+            raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
+        from materialist.predict.refraction import WEIGHTS
+        from materialist.predict.refraction.weights import load
+        from materialist.procedural.thickness.dataset import Plan
+        from materialist.procedural.thickness.dataset import views as lessons_of
+        from materialist.procedural.thickness.errors import of_meshes
+        from materialist.render.variant import setup
+
+        setup("cpu")
+        network, _ = load(Path(self.weights) if self.weights else WEIGHTS)
+        rows: list[dict[str, Any]] = []
+        report = Report("Thickness and back of objects", NOTE, self.settings(data), COLUMNS, rows, ("solid", "back"))
+        for k in range(self.shapes):
+            rows += _rows(
+                "held-out", f"shape {k}", network, lessons_of(k, Plan(self.shapes, self.views, "heldout", self.seed))
+            )
+        for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
+            for name, found in of_meshes(group, self.mesh_views, self.seed).items():
+                rows += _rows(f"{group.name} meshes", name, network, found)
+        write(report, output)
 
 
 def _rows(group: str, name: str, network: Any, lessons: dict[str, Array]) -> list[dict[str, Any]]:

@@ -9,11 +9,13 @@ an albedo that is the same everywhere only agrees with the 'E's.
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Pace, Report, write
 from materialist.errors import InputError
 from materialist.types import Array
@@ -36,41 +38,47 @@ NOTE = (
 )
 
 
-def run(
-    *, data: Path | None, output: Path, predictor: str = "auto", size: int = 512, limit: int = 0, every: int = 1,
-    delta: float = DELTA, seed: int = 0, device: str = "auto",
-) -> None:  # fmt: skip
+@dataclass(frozen=True, kw_only=True)
+class WhdrBench(Benchmark):
     """Score predictors (comma-separated) on the pictures in `data`.
 
     `every` takes every how-manieth picture in the order of names, from the first on (5 is the usual test split of
     Narihira et al.), `limit` at most so many (0: all), `size` is the longer side that the predictor works at.
     """
-    if data is None:
-        raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
-    pairs = find(data)[:: max(1, every)]
-    pairs = pairs[:limit] if limit else pairs
-    from materialist.bench.predictors import opened, specs_of
 
-    sources = {spec: opened(spec, device) for spec in specs_of(predictor)}
-    rows: list[dict[str, Any]] = []
-    lost: dict[str, str] = {}
-    pace = Pace()
-    settings: dict[str, Any] = {"pictures": len(pairs), "size": size, "delta": delta, "every": every, "seed": seed}
-    report = Report("WHDR", NOTE.format(delta=delta), settings, COLUMNS, rows, plotted=("whdr",))
-    for spec in (*BASELINES, *sources):
-        for picture, judged in pairs:
-            if picture.name in lost:
-                continue
-            try:
-                rows.append(_row(spec, sources.get(spec), picture, judged, size, delta, seed))
-            except InputError as error:
-                lost[picture.name] = str(error)
-                settings |= {"pictures": len(pairs) - len(lost), "unreadable": "; ".join(lost.values())}
-            if pace.due():
-                write(report, output)
-    if not rows:
-        raise InputError(next(iter(lost.values())))
-    write(report, output)
+    predictor: str = "auto"
+    size: int = 512
+    limit: int = 0
+    every: int = 1
+    delta: float = DELTA
+
+    def run(self, data: Path | None, output: Path) -> None:
+        if data is None:
+            raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
+        pairs = find(data)[:: max(1, self.every)]
+        pairs = pairs[: self.limit] if self.limit else pairs
+        from materialist.bench.predictors import opened, specs_of
+
+        sources = {spec: opened(spec, self.device) for spec in specs_of(self.predictor)}
+        rows: list[dict[str, Any]] = []
+        lost: dict[str, str] = {}
+        pace = Pace()
+        settings = self.settings(data, pictures=len(pairs))
+        report = Report("WHDR", NOTE.format(delta=self.delta), settings, COLUMNS, rows, plotted=("whdr",))
+        for spec in (*BASELINES, *sources):
+            for picture, judged in pairs:
+                if picture.name in lost:
+                    continue
+                try:
+                    rows.append(_row(spec, sources.get(spec), picture, judged, self.size, self.delta, self.seed))
+                except InputError as error:
+                    lost[picture.name] = str(error)
+                    settings |= {"pictures": len(pairs) - len(lost), "unreadable": "; ".join(lost.values())}
+                if pace.due():
+                    write(report, output)
+        if not rows:
+            raise InputError(next(iter(lost.values())))
+        write(report, output)
 
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
