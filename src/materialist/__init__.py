@@ -10,10 +10,15 @@ Everything public is named here and loaded on first use, so that `import materia
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+# Torch's OpenMP threads otherwise spin while they wait, and take the processors from whatever runs beside them. OpenMP
+# reads this when torch is loaded; a choice of the user's own stays.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {
     "invert": "pipeline",

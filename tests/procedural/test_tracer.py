@@ -61,7 +61,7 @@ def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     image, shading = traced(world, spp=100)
     theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
     wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    from materialist.bsdf.disney import diffuse_coefficients, specular_split
+    from disney_reference import diffuse_coefficients, specular_split
 
     up = np.array([0.0, 0.0, 1.0])
     c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])

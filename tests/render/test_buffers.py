@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.render.buffers import WIDEST, floats, integers, tensor
+from materialist.buffers import WIDEST, floats, integers, tensor
 from materialist.render.variant import setup
 
 
@@ -18,7 +18,7 @@ def test_values_arrive_and_the_memory_goes_on(count):
 
 
 def test_a_borrowed_array_can_be_read_a_vector_beyond_its_end():
-    from materialist.render.buffers import _padded
+    from materialist.buffers import _padded
 
     padded = _padded(np.ones((7, 3)), np.float32)
     assert padded.shape == (21,) and padded.base.nbytes >= 4 * (21 + WIDEST)

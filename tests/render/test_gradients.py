@@ -1,11 +1,11 @@
 """Gradients of the differentiable rendering against quadrature of the formula and the linearity of light."""
 
+import disney_reference as brdf
 import numpy as np
 import pytest
 import torch
 from render_scenes import uniform, wall, with_floor
 
-from materialist.bsdf import disney as brdf
 from materialist.camera import pixel_rays
 from materialist.render.scene import RenderScene
 from materialist.types import Camera, Materials

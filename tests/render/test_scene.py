@@ -1,10 +1,10 @@
 """The Mitsuba scene says what the project's conventions say: camera, maps, light, planes, seeds."""
 
+import disney_reference as brdf
 import numpy as np
 import pytest
 from render_scenes import empty, uniform, wall, with_floor
 
-from materialist.bsdf import disney as brdf
 from materialist.camera import pixel_rays, unproject
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from disney_reference import diffuse_coefficients, specular_split
 
-from materialist.bsdf.disney import diffuse_coefficients, specular_split
 from materialist.envmap import texel_directions
 from materialist.geometry.build import build_geometry
 from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, TransportCache

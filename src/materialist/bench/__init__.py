@@ -12,6 +12,7 @@ from materialist.errors import InputError
 
 BENCHMARKS = {
     "invert": "InvertBench",
+    "beside": "BesideBench",
     "batch": "BatchBench",
     "light": "LightBench",
     "ablation": "AblationBench",

@@ -96,8 +96,8 @@ def suppress_missing():
 
 def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array, ends: tuple[Ends, ...]) -> dict[str, Any]:
     """The maps' surfaces, planes going on beyond the picture with their mean albedo."""
+    from materialist.buffers import tensor
     from materialist.geometry.build import build_geometry
-    from materialist.render.buffers import tensor
     from materialist.render.scene import part
 
     if not depth.any():

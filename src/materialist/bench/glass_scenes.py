@@ -308,7 +308,7 @@ def _paint(mi, albedo: Array) -> dict[str, Any]:
 
 def _mesh(mi, solid: Any, bsdf: dict[str, Any], emitter: dict[str, Any] | None = None) -> Any:
     """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
-    from materialist.render.buffers import floats, integers
+    from materialist.buffers import floats, integers
 
     props = mi.Properties()
     props["bsdf"] = mi.load_dict(bsdf)

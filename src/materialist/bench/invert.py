@@ -93,7 +93,7 @@ class InvertBench(Benchmark):
         rows: list[dict[str, Any]] = []
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
             folder = Path(temporary)
-            case = _case(data, self.photo, folder, min(NATIVE, max(wanted)), self.seed, self.device)
+            case = photo_case(data, self.photo, folder, min(NATIVE, max(wanted)), self.seed, self.device)
             note = f"{NOTE}\n{STEP_NOTE}" if self.step_size else NOTE
             report = Report("Inversion", note, self.settings(data, photo=case.name), COLUMNS, rows, draw=plot)
             options = [
@@ -125,7 +125,7 @@ def _sizes(text: str | int) -> list[int]:
     return sizes
 
 
-def _case(data: Path | None, photo: str | None, folder: Path, size: int, seed: int, device: str) -> Case:
+def photo_case(data: Path | None, photo: str | None, folder: Path, size: int, seed: int, device: str) -> Case:
     """What to invert, by the options; a synthetic photo is written into `folder`."""
     if photo is not None:
         return Case(Path(photo).name, photo, "auto")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.bsdf import ggx
 from materialist.types import Array
 
 
@@ -63,23 +64,13 @@ def visible_facet(direction: Array, normal: Array, alpha: float, u: float, v: fl
         return normal
     right, up = _tangents(normal)
     back = -direction
-    local = np.stack([np.sum(back * t, -1) for t in (right, up, normal)], -1)
-    stretched = local * [alpha, alpha, 1]
-    stretched /= np.linalg.norm(stretched, axis=-1, keepdims=True)
-    z = (1 - v) * (1 + stretched[..., 2]) - stretched[..., 2]
-    sine = np.sqrt(np.maximum(1 - z * z, 0))
-    half = np.stack([sine * np.cos(2 * np.pi * u), sine * np.sin(2 * np.pi * u), z], -1) + stretched
-    half *= [alpha, alpha, 1]
-    half[..., 2] = np.maximum(half[..., 2], 1e-6)
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    return half[..., :1] * right + half[..., 1:2] * up + half[..., 2:] * normal
+    x, y, z = ggx.visible_normal([np.sum(back * t, -1) for t in (right, up, normal)], alpha, u, v)
+    return x[..., None] * right + y[..., None] * up + z[..., None] * normal
 
 
 def masking(direction: Array, normal: Array, alpha: float) -> Array:
-    """Smith's G1 [...] of GGX: the part of a rough surface not hidden along a direction; 0 below the surface."""
-    cosine = np.abs(np.sum(direction * normal, -1))
-    tangent2 = (1 - cosine**2) / np.maximum(cosine**2, 1e-12)
-    return np.where(cosine > 0, 2 / (1 + np.sqrt(1 + alpha**2 * tangent2)), 0)
+    """Smith's G1 [...] of GGX: the part of a rough surface not hidden along a direction."""
+    return ggx.smith_g1(np.sum(direction * normal, -1), alpha)
 
 
 def _tangents(normal: Array) -> tuple[Array, Array]:

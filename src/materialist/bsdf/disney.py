@@ -1,14 +1,12 @@
-"""The paper's simplified Disney BRDF (section Preliminary) in plain numpy: slow, and the measure of everything faster.
+"""The formulas of the paper's simplified Disney BRDF (section Preliminary), written once for numpy, torch and Dr.Jit.
 
-Choices the paper leaves open (see docs/rendering.md): the Smith term is separable, G = G1(wi) G1(wo), as in Mitsuba;
-alpha = R^2 is at least `MIN_ALPHA`, so R below 0.032 shines like 0.032; both sides of a surface shade alike.
+f_r = f_s + (1 - M) f_d. Choices that the paper leaves open (docs/rendering.md): the Smith term is separable, as in
+Mitsuba; alpha = R^2 is at least `ggx.MIN_ALPHA`; both sides of a surface shade alike.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from materialist.types import Array
+from materialist.bsdf.ggx import distribution, library, smith_g1
 
 ETA = 1.5
 """Relative index of refraction of the dielectric part."""
@@ -16,80 +14,53 @@ ETA = 1.5
 DIELECTRIC_R0 = ((ETA - 1) / (ETA + 1)) ** 2
 """R_0(eta): Fresnel reflectance at normal incidence, 0.04."""
 
-MIN_ALPHA = 1e-3
-"""Lower clamp of alpha = roughness**2."""
 
-
-def evaluate(albedo: Array, roughness: Array, metallic: Array, n: Array, wi: Array, wo: Array) -> Array:
-    """f_r = f_s + (1 - M) f_d, without the cosine of the rendering equation.
-
-    Args:
-        albedo: [..., 3] A in [0, 1].
-        roughness: [...] R in [0, 1]; metallic: [...] M in [0, 1].
-        n: [..., 3] unit shading normal; wi, wo: [..., 3] unit directions away from the surface. All broadcast.
-
-    Returns:
-        [..., 3] float64, 1 / sr; 0 where wi and wo lie on different sides of the surface.
-    """
-    albedo, roughness, metallic = (np.asarray(x, np.float64) for x in (albedo, roughness, metallic))
-    c0, c1, c2 = np.moveaxis(diffuse_coefficients(n, wi, wo), -1, 0)
-    diffuse = albedo / np.pi * (c0 + c1 * roughness + c2 * roughness**2)[..., None]
-    s0, s1 = specular_split(roughness, n, wi, wo)
-    base = base_reflectance(albedo, metallic)
-    above = (_dot(n, wi) * _dot(n, wo) > 0)[..., None]
-    return np.where(above, base * s0[..., None] + s1[..., None] + (1 - metallic)[..., None] * diffuse, 0)
-
-
-def base_reflectance(albedo: Array, metallic: Array) -> Array:
-    """C_0 = R_0 (1 - M) + M A, [..., 3], of albedo [..., 3] and metallic [...]."""
-    metallic = np.asarray(metallic)[..., None]
+def base_reflectance(albedo, metallic):
+    """C_0 = R_0 (1 - M) + M A."""
     return DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
 
 
-def diffuse_coefficients(n: Array, wi: Array, wo: Array) -> Array:
-    """[..., 3] (c0, c1, c2) with pi f_d / A = F_d(wi) F_d(wo) = c0 + c1 R + c2 R^2, unit directions [..., 3].
+def schlick(cosine):
+    """(1 - cos)^5 of Schlick's approximation."""
+    m = library(cosine).clip(1 - cosine, 0, 1)
+    m2 = m * m
+    return m2 * m2 * m
+
+
+def diffuse_coefficients(cos_i, cos_o, cos_d):
+    """(c0, c1, c2) with pi f_d / A = F_d(wi) F_d(wo) = c0 + c1 R + c2 R^2; `cos_d` is h.wi.
 
     F_d(w) = 1 + (F_D90 - 1)(1 - n.w)^5 is linear in F_D90 = 0.5 + 2 R (h.w)^2, hence in R.
     """
-    cos_i, cos_o, _, cos_d = _cosines(n, wi, wo)
-    fi, fo, slope = _schlick(cos_i), _schlick(cos_o), 2 * cos_d**2
+    fi, fo = schlick(cos_i), schlick(cos_o)
+    slope = 2 * cos_d * cos_d
     at_zero_i, at_zero_o = 1 - 0.5 * fi, 1 - 0.5 * fo
-    return np.stack([at_zero_i * at_zero_o, slope * (at_zero_i * fo + at_zero_o * fi), slope**2 * fi * fo], -1)
+    return at_zero_i * at_zero_o, slope * (at_zero_i * fo + at_zero_o * fi), slope * slope * fi * fo
 
 
-def specular_split(roughness: Array, n: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
-    """(s0, s1), each [...], with f_s = C_0 s0(R) + s1(R): the modified Schlick F_s split by its C_0.
-
-    Args:
-        roughness: [...] R in [0, 1]; n, wi, wo: [..., 3] unit.
-    """
-    cos_i, cos_o, sin2_h, cos_d = _cosines(n, wi, wo)
-    alpha = np.maximum(np.asarray(roughness, np.float64) ** 2, MIN_ALPHA)
-    # D = a^2 / (pi (cos^2 (a^2 - 1) + 1)^2), with 1 - cos^2 = sin^2 written out so that nothing cancels.
-    d = alpha**2 / (np.pi * (alpha**2 * (1 - sin2_h) + sin2_h) ** 2)
-    g = _smith_g1(cos_i, alpha) * _smith_g1(cos_o, alpha)
-    shape = d * g / np.maximum(4 * cos_i * cos_o, 1e-12)
-    fresnel = _schlick(cos_d)
-    return shape * (1 - fresnel), shape * fresnel
+def quadratic(coefficients, roughness):
+    """c0 + c1 R + c2 R^2."""
+    c0, c1, c2 = coefficients
+    return c0 + roughness * (c1 + roughness * c2)
 
 
-def _cosines(n, wi, wo):
-    """|n.wi|, |n.wo|, squared sine of h to n, and h.wo; each [...]."""
-    n, wi, wo = (np.asarray(x, np.float64) for x in (n, wi, wo))
-    h = wi + wo
-    h = h / np.maximum(np.linalg.norm(h, axis=-1, keepdims=True), 1e-12)
-    sin2_h = (np.cross(np.broadcast_to(n, h.shape), h) ** 2).sum(-1)
-    return np.abs(_dot(n, wi)), np.abs(_dot(n, wo)), sin2_h, _dot(h, wo)
+def combine(albedo, metallic, diffuse, s0, s1):
+    """A (1 - M) diffuse + C_0 s0 + s1: radiance by lobe, for the light that each lobe's factors have gathered."""
+    return albedo * (1 - metallic) * diffuse + base_reflectance(albedo, metallic) * s0 + s1
 
 
-def _dot(a, b):
-    return (np.asarray(a, np.float64) * np.asarray(b, np.float64)).sum(-1)
+def fresnel(base, cosine):
+    """F_s: Schlick's reflectance of base reflectance C_0."""
+    return base + (1 - base) * schlick(cosine)
 
 
-def _schlick(cosine):
-    return np.clip(1 - cosine, 0, 1) ** 5
+def half_vector_density(cos_wo, sin2_h, alpha):
+    """Density, per solid angle of the mirrored direction, of mirroring `wo` at its visible normals."""
+    return distribution(sin2_h, alpha) * smith_g1(cos_wo, alpha) / (4 * library(cos_wo).clip(cos_wo, 1e-6, 1))
 
 
-def _smith_g1(cosine, alpha):
-    tan2 = (1 - np.clip(cosine, 1e-6, 1) ** 2) / np.clip(cosine, 1e-6, 1) ** 2
-    return 2 / (1 + np.sqrt(1 + alpha**2 * tan2))
+def specular_probability(cosine, luminance, metallic):
+    """With which probability to sample the specular lobe: its share of the reflectance, 0.1 at least."""
+    specular, diffuse = fresnel(base_reflectance(luminance, metallic), cosine), (1 - metallic) * luminance
+    xp = library(cosine)
+    return xp.clip(specular / xp.clip(specular + diffuse, 1e-6, 4), 0.1, 1)

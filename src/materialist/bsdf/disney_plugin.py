@@ -5,18 +5,9 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from materialist.bsdf.disney import DIELECTRIC_R0
-from materialist.transport.sampling import (
-    MIN_ALPHA,
-    cosine_direction,
-    diffuse_polynomial,
-    face_towards,
-    ggx,
-    lifted,
-    schlick,
-    smith_g1,
-    visible_normal,
-)
+from materialist.bsdf import lobes
+from materialist.bsdf.disney import base_reflectance, specular_probability
+from materialist.bsdf.ggx import alpha_of
 
 PLUGIN = "materialist_disney"
 
@@ -27,7 +18,7 @@ def _define():
 
         A ray meets the back only where face and shading normal both say so: where the latter turns away from a ray
         that meets the front, it is still the front's light that is seen. Where the shading normal sees below the face,
-        light comes from as far above the face instead (see `transport.sampling.lifted`): nothing passes through the
+        light comes from as far above the face instead (see `lobes.lifted`): nothing passes through the
         surface, and nothing is lost.
 
         Textures: base_color (RGB), roughness (perceptual, alpha = r^2), metallic.
@@ -54,62 +45,32 @@ def _define():
             albedo = mi.Color3f(self.base_color.eval(si, active))
             return albedo, self.roughness.eval_1(si, active), self.metallic.eval_1(si, active)
 
-        def _specular_share(self, cos_i, albedo, metallic):
-            """Probability of the specular lobe: its share of the reflectance at normal-mirror incidence."""
-            luma = mi.luminance(albedo)
-            c0 = DIELECTRIC_R0 * (1 - metallic) + metallic * luma
-            specular = c0 + (1 - c0) * schlick(cos_i)
-            diffuse = (1 - metallic) * luma
-            return dr.detach(dr.clip(specular / dr.maximum(specular + diffuse, 1e-6), 0.1, 1))
-
-        def _share(self, ctx, cos_i, albedo, metallic):
+        def _specular_probability(self, ctx, cos_i, albedo, metallic):
             """Probability of the specular lobe: 0 or 1 where the context asks for one component."""
             if ctx.component in (0, 1):
                 return mi.Float(ctx.component)
-            return self._specular_share(cos_i, albedo, metallic)
+            return dr.detach(specular_probability(cos_i, mi.luminance(albedo), metallic))
 
         def _value(self, ctx, wi, wo, albedo, roughness, metallic):
             """f_r cos(theta_o) for directions above the surface, or the component of it that the context asks for."""
             value = mi.Color3f(0)
             if ctx.component != 1:
-                value += self._diffuse(wi, wo, albedo, roughness, metallic)
+                value += albedo * (1 - metallic) * lobes.diffuse(wi, wo, roughness)
             if ctx.component != 0:
-                value += self._specular(wi, wo, albedo, roughness, metallic)
+                value += lobes.specular(wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic))
             return value
-
-        def _diffuse(self, wi, wo, albedo, roughness, metallic):
-            cos_d = dr.dot(dr.normalize(wi + wo), wo)
-            c0, c1, c2 = diffuse_polynomial(wo.z, wi.z, cos_d)
-            return albedo * (1 - metallic) * dr.inv_pi * (c0 + roughness * (c1 + roughness * c2)) * wo.z
-
-        def _specular(self, wi, wo, albedo, roughness, metallic):
-            alpha = dr.maximum(roughness * roughness, MIN_ALPHA)
-            h = dr.normalize(wi + wo)
-            cos_d = dr.dot(h, wo)
-            base = DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
-            fresnel = base + (1 - base) * schlick(cos_d)
-            shape = ggx(h, alpha) * smith_g1(wi.z, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
-            return fresnel * shape
-
-        def _pdf(self, wi, wo, share, roughness):
-            alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
-            h = dr.normalize(wi + wo)
-            specular = ggx(h, alpha) * smith_g1(wi.z, alpha) / (4 * dr.maximum(wi.z, 1e-6))
-            return share * specular + (1 - share) * wo.z * dr.inv_pi
 
         def sample(self, ctx, si, sample1, sample2, active=True):
             albedo, roughness, metallic = self._materials(si, active)
             wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-            share = self._share(ctx, wi.z, albedo, metallic)
-            alpha = dr.detach(dr.maximum(roughness * roughness, MIN_ALPHA))
-            take_specular = sample1 < share
-            mirrored = mi.reflect(wi, visible_normal(wi, alpha, sample2))
-            wo = dr.select(take_specular, mirrored, cosine_direction(sample2))
+            probability = self._specular_probability(ctx, wi.z, albedo, metallic)
+            take_specular = sample1 < probability
+            wo = lobes.sample(wi, dr.detach(alpha_of(roughness)), take_specular, sample2)
             active = active & (wi.z > 0) & (wo.z > 0)
             bs = mi.BSDFSample3f()
             side = self._side(si)
-            bs.wo = lifted(mi.Vector3f(wo.x, wo.y, wo.z * side), self._face(si, side))
-            value, pdf = self._both(ctx, si, bs.wo, share, albedo, roughness, metallic)
+            bs.wo = lobes.lifted(mi.Vector3f(wo.x, wo.y, wo.z * side), self._face(si, side))
+            value, pdf = self._both(ctx, si, bs.wo, probability, albedo, roughness, metallic)
             bs.pdf = dr.select(active, pdf, 0)
             active = active & (bs.pdf > 0)
             bs.eta = 1.0
@@ -121,8 +82,8 @@ def _define():
 
         def eval_pdf(self, ctx, si, wo, active=True):
             albedo, roughness, metallic = self._materials(si, active)
-            share = self._share(ctx, dr.abs(si.wi.z), albedo, metallic)
-            value, pdf = self._both(ctx, si, wo, share, albedo, roughness, metallic)
+            probability = self._specular_probability(ctx, dr.abs(si.wi.z), albedo, metallic)
+            value, pdf = self._both(ctx, si, wo, probability, albedo, roughness, metallic)
             return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
 
         def _side(self, si):
@@ -133,23 +94,24 @@ def _define():
 
         def _face(self, si, side):
             """The face's normal in the shading frame, on that side of it; 0 where it is not believed."""
-            return face_towards(si.to_local(si.n), mi.Vector3f(0, 0, side))
+            return lobes.face_towards(si.to_local(si.n), mi.Vector3f(0, 0, side))
 
-        def _both(self, ctx, si, wo, share, *materials):
+        def _both(self, ctx, si, wo, probability, *materials):
             """Value and density of `wo`: its own, and those of the direction that is lifted to it."""
             side = self._side(si)
             face = self._face(si, side)
             height = dr.dot(face, wo)
             below = wo - 2 * height * face
-            found = [self._one(ctx, si.wi, w, share, *materials, seen & (side * w.z > 0))
+            found = [self._one(ctx, si.wi, w, probability, *materials, seen & (side * w.z > 0))
                      for w, seen in ((wo, height >= 0), (below, height > 0))]  # fmt: skip
             return found[0][0] + found[1][0], found[0][1] + found[1][1]
 
-        def _one(self, ctx, wi, wo, share, albedo, roughness, metallic, active):
+        def _one(self, ctx, wi, wo, probability, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
             value = dr.select(active, self._value(ctx, wi, wo, albedo, roughness, metallic), mi.Color3f(0))
-            return value, dr.select(active, self._pdf(wi, wo, share, roughness), 0)
+            density = lobes.density(wi, wo, dr.detach(alpha_of(roughness)), probability)
+            return value, dr.select(active, density, 0)
 
         def eval(self, ctx, si, wo, active=True):
             return self.eval_pdf(ctx, si, wo, active)[0]

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from materialist.bsdf.dielectric import fresnel_dielectric, refract
+from materialist.bsdf.ggx import smith_g1, visible_normal
 from materialist.types import Array
 
 PLUGIN = "materialist_frosted"
@@ -19,7 +21,7 @@ COSINES = 32
 """Directions of the table of albedos, even in the cosine."""
 FACETS = 64
 """Facets along each of the two axes of the sum over visible normals."""
-LEAST = 0.05
+MIN_ALBEDO = 0.05
 """Albedo below which it is not made up for: hardly anything passes at so flat an angle."""
 
 
@@ -34,41 +36,16 @@ def directional_albedo(ior: float, alpha: float) -> Array:
     u, v = np.meshgrid(u, u)
     cosine = ((np.arange(COSINES) + 0.5) / COSINES)[:, None, None]
     wi = np.stack(np.broadcast_arrays(np.sqrt(1 - cosine**2), 0 * cosine, cosine), -1)
-    m = _visible_normal(wi, alpha, u, v)  # [N, FACETS, FACETS, 3]
+    m = np.stack(visible_normal(np.moveaxis(wi, -1, 0), alpha, u, v), -1)  # [N, FACETS, FACETS, 3]
     along = (wi * m).sum(-1)
     found = []
     for relative in (ior, 1 / ior):
-        from_grating = 1 - (1 - along**2) / relative**2
-        into = np.sqrt(np.maximum(from_grating, 0))
-        s, p = (
-            ((along - relative * into) / (along + relative * into)),
-            ((relative * along - into) / (relative * along + into)),
-        )
-        fresnel = np.where(from_grating > 0, (s**2 + p**2) / 2, 1.0)
-        mirrored = 2 * along[..., None] * m - wi
-        refracted = (along / relative - into)[..., None] * m - wi / relative
-        shares = [
-            np.where(sign * w[..., 2] > 0, _smith_g1(w[..., 2], alpha), 0)
-            for sign, w in ((1, mirrored), (-1, refracted))
-        ]
-        found.append((fresnel * shares[0] + (1 - fresnel) * shares[1]).mean((1, 2)))
+        reflected = fresnel_dielectric(along, relative)
+        upward = (2 * along[..., None] * m - wi)[..., 2]
+        downward = refract(-wi, m, 1 / relative)[0][..., 2]
+        shares = [np.where(sign * z > 0, smith_g1(z, alpha), 0) for sign, z in ((1, upward), (-1, downward))]
+        found.append((reflected * shares[0] + (1 - reflected) * shares[1]).mean((1, 2)))
     return np.stack(found)
-
-
-def _visible_normal(wi: Array, alpha: float, u: Array, v: Array) -> Array:
-    """Visible GGX normals from directions [..., 1, 1, 3], as `transport.sampling.visible_normal`."""
-    stretched = wi * [alpha, alpha, 1]
-    stretched = stretched / np.linalg.norm(stretched, axis=-1, keepdims=True)
-    z = (1 - v) * (1 + stretched[..., 2]) - stretched[..., 2]
-    sine = np.sqrt(np.maximum(1 - z**2, 0))
-    h = np.stack([sine * np.cos(2 * np.pi * u), sine * np.sin(2 * np.pi * u), z], -1) + stretched
-    h = np.stack([alpha * h[..., 0], alpha * h[..., 1], np.maximum(h[..., 2], 1e-6)], -1)
-    return h / np.linalg.norm(h, axis=-1, keepdims=True)
-
-
-def _smith_g1(cosine: Array, alpha: float) -> Array:
-    squared = np.maximum(cosine**2, 1e-12)
-    return 2 / (1 + np.sqrt(1 + alpha**2 * (1 - squared) / squared))
 
 
 def register() -> None:
@@ -90,7 +67,7 @@ def register() -> None:
         def _tabulate(self):
             params = mi.traverse(self.interface)
             ior, alpha = (float(np.array(params[name]).ravel()[0]) for name in ("eta", "alpha.value"))
-            self.table = mi.Float(np.maximum(directional_albedo(ior, alpha), LEAST).ravel())
+            self.table = mi.Float(np.maximum(directional_albedo(ior, alpha), MIN_ALBEDO).ravel())
 
         def traverse(self, cb):
             cb.put("interface", self.interface, mi.ParamFlags.NonDifferentiable)
@@ -104,7 +81,7 @@ def register() -> None:
             first = dr.minimum(mi.UInt32(at), COSINES - 2)
             start = first + dr.select(si.wi.z > 0, mi.UInt32(0), mi.UInt32(COSINES))
             low, high = (dr.gather(mi.Float, self.table, start + k, active) for k in (0, 1))
-            return dr.rcp(dr.maximum(dr.lerp(low, high, at - mi.Float(first)), LEAST))
+            return dr.rcp(dr.maximum(dr.lerp(low, high, at - mi.Float(first)), MIN_ALBEDO))
 
         def sample(self, ctx, si, sample1, sample2, active=True):
             found, weight = self.interface.sample(ctx, si, sample1, sample2, active)

@@ -35,7 +35,7 @@ class OtherLight:
 
     def shaded(self, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
         """[P, 3] radiance of all surface pixels; albedo [P, 3], roughness and metallic [P]."""
-        from materialist.bsdf.disney import DIELECTRIC_R0
+        from materialist.bsdf.disney import combine
         from materialist.transport.filter import filter_tables
         from materialist.transport.shading import shade
 
@@ -43,9 +43,7 @@ class OtherLight:
         if self._lobes is None and self._tables is None:
             self._lobes = (known, self._filtered(roughness))
         if self._lobes is not None and np.array_equal(known, self._lobes[0]):
-            diffuse, s0, s1 = self._lobes[1].split(3, -1)
-            m = metallic[:, None]
-            return albedo * (1 - m) * diffuse + (DIELECTRIC_R0 * (1 - m) + m * albedo) * s0 + s1
+            return combine(albedo, metallic[:, None], *self._lobes[1].split(3, -1))
         if self._tables is None:
             self._tables = filter_tables(self._engine.cache, self._raw, self._engine.guide, self._taps)
         return shade(self._tables, albedo, roughness, metallic)

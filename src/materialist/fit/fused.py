@@ -13,12 +13,12 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.bsdf.disney import DIELECTRIC_R0
+from materialist.bsdf.disney import DIELECTRIC_R0, base_reflectance, combine, quadratic
+from materialist.buffers import floats, integers
 from materialist.fit.losses import CLIPPED, Encoding, encode
 from materialist.fit.materials import prices, pure_dielectric
 from materialist.fit.neighbours import Neighbours
 from materialist.fit.settings import MaterialSettings
-from materialist.render.buffers import floats, integers
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 
@@ -93,10 +93,9 @@ def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     rough, metal = value[3], value[4]
     d0, d1, d2 = (dr.gather(mi.Color3f, diffuse, lane * 3 + k) for k in range(3))
     s0, s1, slope0, slope1 = _specular(specular, lane, rough, objective.count)
-    body = d0 + rough * (d1 + rough * d2)
-    base = DIELECTRIC_R0 * (1 - metal) + metal * albedo
+    body, base = quadratic((d0, d1, d2), rough), base_reflectance(albedo, metal)
     scale: Any = dr.gather(mi.Color3f, factor, lane)
-    radiance = scale * (albedo * (1 - metal) * body + base * s0 + s1)
+    radiance = scale * combine(albedo, metal, body, s0, s1)
 
     encoded, slope = _encode(radiance, objective.encoding)
     error = encoded - dr.gather(mi.Color3f, target, lane)

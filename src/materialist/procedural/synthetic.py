@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from materialist.buffers import floats, integers, tensor
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
-from materialist.render.buffers import floats, integers, tensor
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from materialist.buffers import floats, integers
 from materialist.errors import InputError
 from materialist.procedural import scatter, tiles
 from materialist.procedural.packing import Packed
 from materialist.procedural.shading import Hit, Lights, Surfaces
-from materialist.render.buffers import floats, integers
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 

@@ -8,10 +8,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.bsdf.lobes import face_towards, lifted
+from materialist.buffers import floats
 from materialist.camera import pixel_rays
 from materialist.envmap import row_solid_angle
-from materialist.render.buffers import floats
-from materialist.transport.sampling import face_towards, lifted
 from materialist.types import Array, Camera
 
 ROWS = 32

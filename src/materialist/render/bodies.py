@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bsdf.rough_dielectric import PLUGIN as FROSTED
-from materialist.render.buffers import tensor
+from materialist.buffers import tensor
 from materialist.types import Array, Surface
 
 OUTSIDE = "materialist_outside"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.buffers import floats, integers, tensor
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf, body_emitter
-from materialist.render.buffers import floats, integers, tensor
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, is_sunny, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh

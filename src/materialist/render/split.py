@@ -15,8 +15,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.buffers import integers
 from materialist.render.aim import Aim
-from materialist.render.buffers import integers
 from materialist.render.share import Share
 from materialist.transport.sampling import R2, point
 from materialist.types import Array, Camera

@@ -15,20 +15,12 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.render.buffers import floats, integers
+from materialist.bsdf.disney import diffuse_coefficients, schlick
+from materialist.bsdf.ggx import alpha_of, smith_g1
+from materialist.bsdf.lobes import face_towards, lifted, visible_normal
+from materialist.buffers import floats, integers
 from materialist.transport.environment import EnvmapPyramid
-from materialist.transport.sampling import (
-    MIN_ALPHA,
-    cosine_direction,
-    diffuse_polynomial,
-    face_towards,
-    lifted,
-    pixel_shift,
-    point,
-    schlick,
-    smith_g1,
-    visible_normal,
-)
+from materialist.transport.sampling import pixel_shift, point
 from materialist.types import Array, Camera, Geometry, Mesh
 
 ROUGHNESS_LEVELS = (0.04, 0.12, 0.2, 0.3, 0.42, 0.56, 0.75, 1.0)
@@ -125,7 +117,7 @@ class TransportCache:
         return self.diffuse_samples if k == 0 else max(1, round(LEVEL_SHARE[k - 1] * self.specular_samples))
 
     def _alpha(self, k: int) -> float:
-        return 1.0 if k == 0 else max(ROUGHNESS_LEVELS[k - 1] ** 2, MIN_ALPHA)
+        return 1.0 if k == 0 else float(alpha_of(ROUGHNESS_LEVELS[k - 1]))
 
     # -- tracing -------------------------------------------------------------------------------------------------------
 
@@ -228,7 +220,7 @@ def spawn(position, geometric_normal, direction):
 
 def _direction(diffuse: bool, wo, alpha, sample):
     if diffuse:
-        return cosine_direction(sample)
+        return mi.warp.square_to_cosine_hemisphere(sample)
     return mi.reflect(wo, visible_normal(wo, alpha, sample))
 
 
@@ -262,10 +254,10 @@ def _gather_diffuse(hits, slots, env, lane, face, frame, wo, shift, count, alpha
     i = dr.zeros(mi.UInt32, dr.width(lane))
     d0, d1, d2 = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     while i < count:
-        wi = cosine_direction(point(i, count, shift))
+        wi = _direction(True, wo, alpha, point(i, count, shift))
         h = dr.normalize(wi + wo)
         light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
-        c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(h, wi))
+        c0, c1, c2 = diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))
         d0 += c0 * light
         d1 += c1 * light
         d2 += c2 * light

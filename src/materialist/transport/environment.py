@@ -6,8 +6,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from materialist.buffers import floats
 from materialist.envmap import row_solid_angle
-from materialist.render.buffers import floats
 from materialist.types import Array
 
 

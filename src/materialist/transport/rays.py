@@ -15,20 +15,18 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.bsdf.disney import DIELECTRIC_R0
-from materialist.render.buffers import floats, integers
-from materialist.transport.cache import TransportCache, spawn
-from materialist.transport.sampling import (
-    MIN_ALPHA,
-    R2,
-    diffuse_polynomial,
-    ggx,
-    lifted,
-    point,
+from materialist.bsdf.disney import (
+    base_reflectance,
+    diffuse_coefficients,
+    half_vector_density,
+    quadratic,
     schlick,
-    smith_g1,
-    visible_normal,
 )
+from materialist.bsdf.ggx import alpha_of, smith_g1
+from materialist.bsdf.lobes import half_vector, lifted, visible_normal
+from materialist.buffers import floats, integers
+from materialist.transport.cache import TransportCache, spawn
+from materialist.transport.sampling import R2, point
 from materialist.types import Array
 
 STEPS = tuple(round(g * 2**32) for g in R2)
@@ -82,7 +80,7 @@ class _Lobes:
         self.count = len(rows)
         self._rows = integers(mi, rows)
         self._rough, self._metallic = floats(mi, rough), floats(mi, metallic)
-        self._alpha = floats(mi, np.maximum(rough**2, MIN_ALPHA))
+        self._alpha = floats(mi, alpha_of(rough))
 
     def through_texels(self, first: int) -> Rays:
         """A ray of every row through some place of every part of every texel; uniform in solid angle there."""
@@ -92,11 +90,9 @@ class _Lobes:
         world, row = self._texel(lane), lane % self.count
         wi = mi.Frame3f(self._take(self.cache.normal, row)).to_local(world)
         wo = self._take(self.cache.wo, row)
-        h = dr.normalize(wi + wo)
-        c0, c1, c2 = diffuse_polynomial(wi.z, wo.z, dr.dot(h, wi))
-        rough = dr.gather(mi.Float, self._rough, row)
-        diffuse = (c0 + rough * (c1 + rough * c2)) * wi.z * dr.inv_pi / self._density(world)
-        return self._rays(world, row, first, diffuse, self._reflected(world, wi, wo, h, row))
+        rough, cos_d = dr.gather(mi.Float, self._rough, row), half_vector(wi, wo)[2]
+        diffuse = quadratic(diffuse_coefficients(wi.z, wo.z, cos_d), rough) * wi.z * dr.inv_pi / self._density(world)
+        return self._rays(world, row, first, diffuse, self._reflected(world, wi, wo, row))
 
     def along_normals(self, first: int) -> Rays:
         """`specular` rays of every row, mirrored at its visible normals."""
@@ -104,10 +100,9 @@ class _Lobes:
         row = lane % self.count
         wo, shift = self._take(self.cache.wo, row), self._take(self.cache.shift, row)
         sample = point(lane // self.count, dr.opaque(mi.UInt32, self.specular), shift)
-        h = visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample)
-        wi = mi.reflect(wo, h)
+        wi = mi.reflect(wo, visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample))
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
-        base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, h, row))
+        base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, row))
         return self._rays(world, row, first, None, (base, grazing))
 
     def _texel(self, lane: Any) -> Any:
@@ -132,19 +127,20 @@ class _Lobes:
         y = dr.cos(row * (dr.pi / height)) - dr.cos((row + 1) * (dr.pi / height))
         return self.per_texel * width / (dr.two_pi * dr.maximum(y, 1e-9))
 
-    def _reflected(self, world: Any, wi: Any, wo: Any, h: Any, row: Any) -> tuple[Any, Any]:
+    def _reflected(self, world: Any, wi: Any, wo: Any, row: Any) -> tuple[Any, Any]:
         """What C_0 multiplies of the specular lobe, and the rest of it, for rays of either kind."""
         alpha = dr.gather(mi.Float, self._alpha, row)
-        along = ggx(h, alpha) * smith_g1(wo.z, alpha) / (4 * dr.maximum(wo.z, 1e-4))  # density of mirrored rays
+        _, sin2, cos_d = half_vector(wi, wo)
+        along = half_vector_density(wo.z, sin2, alpha)  # of mirrored rays
         value = smith_g1(wi.z, alpha) * along / (self._density(world) + self.specular * along)
-        fresnel = schlick(dr.dot(h, wo))
+        fresnel = schlick(cos_d)
         return (1 - fresnel) * value, fresnel * value
 
     def _rays(self, world: Any, row: Any, first: int, diffuse: Any | None, specular: tuple[Any, Any]) -> Rays:
-        """A (1 - M) diffuse + C_0 base + grazing, with C_0 = 0.04 (1 - M) + M A, as A times something and the rest."""
+        """A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A, as A times something and the rest."""
         cache, m = self.cache, dr.gather(mi.Float, self._metallic, row)
         base, grazing = specular
-        weights = m * base + (1 - m) * (0 if diffuse is None else diffuse), DIELECTRIC_R0 * (1 - m) * base + grazing
+        weights = m * base + (1 - m) * (0 if diffuse is None else diffuse), base_reflectance(0, m) * base + grazing
         origin = self._take(cache.position, row), self._take(cache.geometric_normal, row)
         ray = spawn(*origin, lifted(world, self._take(cache.face, row)))
         dr.eval(ray, row, *weights)

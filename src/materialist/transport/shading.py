@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from materialist.bsdf.disney import DIELECTRIC_R0
+from materialist.bsdf.disney import combine, quadratic
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 
@@ -20,10 +20,8 @@ def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metalli
         A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
     """
     r, m = roughness[:, None], metallic[:, None]
-    d0, d1, d2 = tables.diffuse.split(3, -1)
-    diffuse = albedo * (1 - m) * (d0 + r * (d1 + r * d2))
-    s0, s1 = specular_at(tables, roughness).split(3, -1)
-    return diffuse + (DIELECTRIC_R0 * (1 - m) + m * albedo) * s0 + s1
+    diffuse = quadratic(tables.diffuse.split(3, -1), r)
+    return combine(albedo, m, diffuse, *specular_at(tables, roughness).split(3, -1))
 
 
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:

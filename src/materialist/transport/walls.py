@@ -15,8 +15,8 @@ import mitsuba as mi
 import numpy as np
 import torch
 
+from materialist.buffers import integers
 from materialist.geometry.ends import Ends, axes
-from materialist.render.buffers import integers
 from materialist.transport.cache import MISS, TransportCache
 from materialist.transport.light import (
     LightMatrix,

@@ -65,7 +65,7 @@ class Surroundings:
 
     def _trace(self, start: Array, sign: float) -> tuple[Array, Array]:
         """(metres to what rays up (1) or down (-1) from [n, 3] meet first, NaN for nothing; whether from behind)."""
-        from materialist.render.buffers import floats
+        from materialist.buffers import floats
 
         mi = self.target.mi
         origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))

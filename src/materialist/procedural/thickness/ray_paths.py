@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.buffers import floats, integers
 from materialist.procedural.objects.shapes import Solid
-from materialist.render.buffers import floats, integers
 from materialist.types import Array
 
 MOST = 24

@@ -1,19 +1,11 @@
 """`materialist_disney` against the paper's formulas in numpy, Mitsuba's chi-squared test, and finite differences."""
 
+import disney_reference as brdf
 import numpy as np
 import pytest
-from disney import ALBEDO, NORMAL, directions, evaluate, interaction, make, mi, pairs, tilted, vector
+from surfaces import ALBEDO, NORMAL, directions, evaluate, interaction, make, mi, pairs, tilted, vector
 
-from materialist.bsdf import disney as brdf
-from materialist.bsdf import disney_plugin as bsdf
-from materialist.transport import sampling
-
-GRID = [(r, m) for r in (0.04, 0.1, 0.2, 0.5, 1.0) for m in (0.0, 0.4, 1.0)]
-
-
-def test_constants_are_the_papers():
-    assert pytest.approx(0.04) == brdf.DIELECTRIC_R0
-    assert brdf.MIN_ALPHA == sampling.MIN_ALPHA
+GRID = [(0.04, 0.0), (0.1, 1.0), (0.2, 0.4), (0.5, 0.0), (0.5, 1.0), (1.0, 0.4)]
 
 
 @pytest.mark.parametrize(("roughness", "metallic"), GRID)
@@ -28,7 +20,7 @@ def test_eval_is_the_papers_formula(roughness, metallic):
     assert (through == 0).all()
 
 
-@pytest.mark.parametrize(("roughness", "metallic"), [(0.02, 0.5), *GRID])
+@pytest.mark.parametrize(("roughness", "metallic"), [(0.02, 0.5), (0.2, 0.4), (0.5, 1.0), (1.0, 0.0)])
 def test_sample_and_eval_pdf_agree(roughness, metallic):
     surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
     rng = np.random.default_rng(0)
@@ -50,10 +42,9 @@ def test_sample_and_eval_pdf_agree(roughness, metallic):
     assert np.isfinite(np.array(weight)).all() and np.array(weight).max() < 12
 
 
-@pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(
-    ("roughness", "metallic", "degrees"),
-    [(0.3, 0, 5), (0.3, 1, 40), (0.45, 0.5, 60), (0.6, 0, 80), (0.6, 1, 80), (1, 0, 0), (1, 0.5, 40), (1, 1, 80)],
+    ("roughness", "metallic", "degrees", "side"),
+    [(0.3, 0, 5, 1), (0.3, 1, 40, -1), (0.45, 0.5, 60, 1), (0.6, 0, 80, -1), (0.6, 1, 80, 1), (1, 0.5, 40, -1)],
 )
 def test_chi_squared(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
     """Mitsuba's own test that directions are drawn with the density that `pdf` states."""
@@ -92,8 +83,9 @@ def _leaning(wi, count=1):
     return si
 
 
-@pytest.mark.parametrize(("roughness", "metallic", "degrees"), [(0.4, 0.5, 30), (1, 0, 60), (0.6, 1, 70)])
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("roughness", "metallic", "degrees", "side"), [(0.4, 0.5, 30, 1), (1, 0, 60, -1), (0.6, 1, 70, 1)]
+)
 def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness, metallic, degrees, side):
     surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
     wi, count = tilted(degrees, side), 1 << 17
@@ -111,8 +103,7 @@ def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness,
     assert (without * (wi @ face) < 0).mean() > 0.01  # which would pass
 
 
-@pytest.mark.parametrize("side", [1, -1])
-@pytest.mark.parametrize(("roughness", "metallic", "degrees"), [(0.5, 0.5, 30), (1, 0.2, 60)])
+@pytest.mark.parametrize(("roughness", "metallic", "degrees", "side"), [(0.5, 0.5, 30, 1), (1, 0.2, 60, -1)])
 def test_chi_squared_on_a_face_that_leans(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
     from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
@@ -212,10 +203,8 @@ def white_furnace(roughness, metallic, degrees, count=200_000):
 FURNACE = {
     # metallic, roughness: reflectance at 0, 45, 75 degrees
     (0, 0.05): (1.019, 1.021, 1.137),
-    (0, 0.3): (1.034, 1.036, 1.160),
     (0, 0.6): (1.045, 1.046, 1.131),
     (0, 1.0): (1.049, 1.050, 1.213),
-    (1, 0.05): (1.000, 1.000, 1.000),
     (1, 0.3): (0.991, 0.985, 0.934),
     (1, 0.6): (0.824, 0.793, 0.785),
     (1, 1.0): (0.306, 0.359, 0.487),
@@ -240,6 +229,12 @@ def test_white_furnace_equals_quadrature():
     assert white_furnace(0.6, 0.4, 45) == pytest.approx(value.mean() * 2 * np.pi, rel=3e-3)
 
 
-def test_it_prints_its_parameters():
-    assert bsdf.PLUGIN == "materialist_disney"
-    assert "SimplifiedDisney" in str(make())
+def test_principled_is_another_model():
+    """Why there is a BSDF of our own: Mitsuba's dielectric reflects by Fresnel's equations, and its back is black."""
+    wi, wo = pairs(4000, 11, 0.2)
+    paper = (brdf.evaluate(np.array(ALBEDO), 0.2, 0.0, NORMAL, wi, wo) * wo[:, 2:])[:, 1]
+    theirs = evaluate(make(roughness=0.2, plugin="principled"), wi, wo)[:, 1]
+    assert np.percentile(np.abs(theirs - paper) / (paper + 0.01), 95) > 0.02
+    back = [tilted(30, -1)], [tilted(50, -1)]
+    assert (evaluate(make(plugin="principled"), *back) == 0).all()
+    assert (evaluate(make(), *back) > 0).all()

@@ -1,0 +1,56 @@
+"""GGX microfacets, written once for numpy, torch and Dr.Jit: distribution, masking and visible normals.
+
+Directions are components (x, y, z) in the local shading frame, z along the normal; alpha = roughness^2.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+MIN_ALPHA = 1e-3
+"""Lower clamp of alpha; the lobe of a perceptual roughness below 0.032 is that of 0.032."""
+
+
+def library(values: Any) -> Any:
+    """numpy, torch or drjit: the module whose functions take these values."""
+    root = type(values).__module__.partition(".")[0]
+    return import_module({"torch": "torch", "drjit": "drjit", "mitsuba": "drjit"}.get(root, "numpy"))
+
+
+def alpha_of(roughness):
+    """alpha of perceptual roughness."""
+    return library(roughness).clip(roughness * roughness, MIN_ALPHA, 1)
+
+
+def distribution(sin2, alpha):
+    """D(h) of a half vector with squared sine `sin2` to the normal.
+
+    The sine is asked for because 1 - cos^2 loses all digits where alpha is small.
+    """
+    alpha2 = alpha * alpha
+    d = sin2 + alpha2 * (1 - sin2)
+    return alpha2 / (3.141592653589793 * d * d)
+
+
+def smith_g1(cosine, alpha):
+    """Smith masking of a direction with this cosine to the normal; the same for both sides."""
+    c, c2 = abs(cosine), cosine * cosine
+    return 2 * c / (c + library(c).sqrt(c2 + alpha * alpha * (1 - c2)))
+
+
+def visible_normal(wo, alpha, u, v) -> tuple[Any, Any, Any]:
+    """(x, y, z) of a GGX normal distributed as those visible from `wo` (spherical caps, Dupuy and Benyoub 2023).
+
+    u, v: in [0, 1).
+    """
+    x, y, z = wo
+    xp = library(z)
+    x, y = alpha * x, alpha * y
+    scale = 1 / xp.sqrt(x * x + y * y + z * z)
+    x, y, z = x * scale, y * scale, z * scale
+    cap = (1 - v) * (1 + z) - z
+    sine, phi = xp.sqrt(xp.clip(1 - cap * cap, 0, 1)), 6.283185307179586 * u
+    x, y, z = alpha * (sine * xp.cos(phi) + x), alpha * (sine * xp.sin(phi) + y), xp.clip(cap + z, 1e-6, 2)
+    scale = 1 / xp.sqrt(x * x + y * y + z * z)
+    return x * scale, y * scale, z * scale

@@ -1,0 +1,66 @@
+"""The two lobes of the BRDF for Dr.Jit: values, sampling, and normals that see below the face they belong to.
+
+Directions are unit vectors in the local shading frame, above the surface.
+"""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from materialist.bsdf import ggx
+from materialist.bsdf.disney import diffuse_coefficients, fresnel, half_vector_density, quadratic
+
+AGREEING = 0.7
+"""Least cosine between a shading normal and its face for the face to hold back light: where a predicted depth slopes
+and the predicted normal does not, the slope is an outline that was smeared, and what it hides was never hidden."""
+
+
+def half_vector(wi, wo):
+    """h, its squared sine to the normal, and h.wo."""
+    h = dr.normalize(wi + wo)
+    return h, h.x * h.x + h.y * h.y, dr.dot(h, wo)
+
+
+def diffuse(wi, wo, roughness):
+    """f_d cos(theta_o) of a white dielectric."""
+    cos_d = half_vector(wi, wo)[2]
+    return quadratic(diffuse_coefficients(wo.z, wi.z, cos_d), roughness) * wo.z * dr.inv_pi
+
+
+def specular(wi, wo, alpha, base):
+    """f_s cos(theta_o) of base reflectance C_0."""
+    _, sin2, cos_d = half_vector(wi, wo)
+    return fresnel(base, cos_d) * (half_vector_density(wi.z, sin2, alpha) * ggx.smith_g1(wo.z, alpha))
+
+
+def density(wi, wo, alpha, probability):
+    """Density with which `sample` draws `wo` when it takes the specular lobe with this probability."""
+    mirrored = half_vector_density(wi.z, half_vector(wi, wo)[1], alpha)
+    return probability * mirrored + (1 - probability) * wo.z * dr.inv_pi
+
+
+def sample(wi, alpha, specular, point):
+    """A direction of the specular lobe where `specular`, else of the cosine lobe, for a point of the unit square."""
+    mirrored = mi.reflect(wi, visible_normal(wi, alpha, point))
+    return dr.select(specular, mirrored, mi.warp.square_to_cosine_hemisphere(point))
+
+
+def visible_normal(wi, alpha, point):
+    """`ggx.visible_normal` as a vector."""
+    return mi.Vector3f(*ggx.visible_normal(wi, alpha, point.x, point.y))
+
+
+def face_towards(face, normal):
+    """The normal of a face on the side of a shading normal; 0 where they differ too much for both to be true."""
+    cos = dr.dot(face, normal)
+    return dr.select(dr.abs(cos) > AGREEING, face * dr.sign(cos), 0)
+
+
+def lifted(direction, face):
+    """The direction, mirrored at the plane with the normal `face` where it lies below it.
+
+    A shading normal sees below the face it belongs to, and a ray from there would come through an opaque surface.
+    Mirrored, nothing passes and nothing is lost.
+    """
+    return direction - 2 * dr.minimum(dr.dot(direction, face), 0) * face
