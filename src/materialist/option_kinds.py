@@ -10,12 +10,9 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from materialist.errors import InputError
-
-if TYPE_CHECKING:
-    from materialist.types import Array
 
 Colour = tuple[float, float, float]
 """Linear R, G, B in [0, 1]."""
@@ -145,30 +142,27 @@ def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
     return found
 
 
-def parse_colour(colour: Any, name: str = "albedo") -> Array:
-    """[3] float32 linear colour from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB.
+def parse_colour(colour: Any, name: str = "albedo") -> Colour:
+    """Linear (R, G, B) from three linear numbers, a text "R,G,B" of them, or "#rrggbb" in sRGB.
 
     Raises InputError, which says what colour of what `name`.
     """
-    import numpy as np
-
-    from materialist.color import srgb_to_linear
-
     if isinstance(colour, str) and colour.startswith("#"):
-        try:
-            if len(colour) != 7:
-                raise ValueError
-            return srgb_to_linear(np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32))
-        except ValueError as error:
-            raise InputError(f"The {name} {colour!r} must look like #ff8800.") from error
+        import numpy as np
+
+        from materialist.color import srgb_to_linear
+
+        if not re.fullmatch("#[0-9a-fA-F]{6}", colour):
+            raise InputError(f"The {name} {colour!r} must look like #ff8800.")
+        levels = np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32)
+        colour = srgb_to_linear(levels)
     try:
-        parts = colour.split(",") if isinstance(colour, str) else colour
-        rgb = np.array([float(c) for c in parts], np.float32)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
-    if rgb.shape != (3,) or not (np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()):
+        r, g, b = (float(c) for c in (colour.split(",") if isinstance(colour, str) else colour))
+    except (TypeError, ValueError):
+        r = g = b = math.nan
+    if not all(0 <= c <= 1 for c in (r, g, b)):
         raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
-    return rgb
+    return r, g, b
 
 
 def _number(declared: Option, called: str, value: Any) -> Any:
@@ -219,8 +213,7 @@ def _shift(declared: Option, called: str, value: Any) -> float | str:
 
 
 def _colour(declared: Option, called: str, value: Any) -> Colour:
-    r, g, b = (float(c) for c in parse_colour(value, called))
-    return r, g, b
+    return parse_colour(value, called)
 
 
 def _paint(declared: Option, called: str, value: Any) -> str:
@@ -234,8 +227,10 @@ def _paint(declared: Option, called: str, value: Any) -> str:
     return text
 
 
-def _switch(declared: Option, called: str, value: Any) -> bool:
+def _switch(declared: Option, called: str, value: Any) -> bool | str:
     text = str(value).lower()
+    if text in declared.choices:
+        return text
     if text not in (*ON, *OFF):
         or_else = "".join(f", or {word}" for word in declared.choices)
         raise InputError(f"The {called} must be true or false{or_else}, not {value!r}.")

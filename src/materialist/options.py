@@ -181,11 +181,11 @@ class InvertOptions(OperationOptions):
     envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
     """(width, height), with width = 2 * height."""
     completion: str = option(
-        "auto", "Continue planes beyond what is seen, give objects backs; auto: unless that ruins the fit.",
-        kind="word", choices=("auto", "planes,backs", "floors,backs", "planes", "none"))
-    """`planes,backs` continues dominant planes beyond what the photo shows and gives objects backs, `floors,backs` ends
-    walls at the frame, `planes` leaves objects open behind, `none` adds nothing. `auto` is the first with walls that
-    end where light explains the photo best, or `none` where that shuts out light that the photo shows."""
+        "auto", "Continue planes beyond what is seen; auto: unless that ruins the fit; planes,backs means planes.",
+        kind="word", choices=("auto", "planes", "floors", "none", "planes,backs", "floors,backs"))
+    """`planes` continues dominant planes beyond what the photo shows, `floors` ends walls at the frame, `none` adds
+    nothing; `planes,backs` and `floors,backs` are accepted for `planes` and `floors`. `auto` is `planes` with walls
+    that end where light explains the photo best, or `none` where that shuts out light that the photo shows."""
     tau: float = option(
         6.0, "Grazing angle below which the surface is cut, degrees.", low=0, high=90, ends="()", unit="degrees")
     mask: Array | str | Path | None = option(

@@ -5,9 +5,9 @@ import pytest
 from edit_scenes import block_mask, flat_scene
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.core.surfaces import parse_colour
 from materialist.edits.material.material import edit, shifted_hsv
 from materialist.errors import InputError
+from materialist.option_kinds import parse_colour
 
 SCENE = flat_scene()
 MASK = block_mask(36, 48)
@@ -74,7 +74,7 @@ def test_an_albedo_may_be_an_array():
     colour = np.array([0.1, 0.2, 0.3])
     changed = edit(SCENE, MASK, albedo=colour)
     assert np.array_equal(changed.materials.albedo, edit(SCENE, MASK, albedo=(0.1, 0.2, 0.3)).materials.albedo)
-    assert changed.provenance["edits"][-1]["albedo"] == (0.1, 0.2, 0.3)
+    assert tuple(changed.provenance["edits"][-1]["albedo"]) == (0.1, 0.2, 0.3)
 
 
 @pytest.mark.parametrize(("lean", "wanted"), [(1.0, [0, 0, -1]), (-1.0, [0, 0, 1]), (0.0, [0, 1, 0])])

@@ -60,7 +60,7 @@ def edit(
 ) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
     from materialist.edits.material.material import edit as change
-    from materialist.edits.recipe import read_texture
+    from materialist.edits.material.texture import read_texture
     from materialist.io.package import load_scene
 
     wanted = (hue, saturation, value, albedo, roughness, metallic, texture)

@@ -79,12 +79,12 @@ def glass(
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
-    from materialist.edits.core.surfaces import parse_colour
     from materialist.edits.glass.glass import OPEN, check_glass
     from materialist.edits.glass.glass import glass as change
     from materialist.edits.remove.hole import told_shadow
     from materialist.errors import InputError
     from materialist.io.package import load_scene
+    from materialist.option_kinds import parse_colour
 
     if model is Model.two_interface and full_render:
         raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edits.core.surfaces import parse_colour
 from materialist.edits.drop.drop_rest import settle
 from materialist.edits.glass.glass import OPEN, glass
 from materialist.edits.glass.thickness import METHODS
@@ -17,12 +16,12 @@ from materialist.edits.remove.background import without
 from materialist.edits.remove.hole import told_shadow
 from materialist.edits.select.select import select
 from materialist.errors import InputError, OutputError
+from materialist.option_kinds import OperationOptions, declarations, parse_colour
+from materialist.options import MaterialEdit
 from materialist.types import Array, Scene
 
 REGION = ("mask", "click", "box", "with")
-MATERIAL = (
-    "hue", "saturation", "value", "albedo", "texture", "texture_scale", "roughness", "metallic",
-)  # fmt: skip
+MATERIAL = tuple(declarations(MaterialEdit))
 LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps", *REGION)
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
 DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
@@ -33,6 +32,7 @@ KINDS = {
     "remove": (*REGION, *REMOVE),
 }  # fmt: skip
 """Kind of step -> what it may say."""
+OPTIONS: dict[str, type[OperationOptions]] = {"edit": MaterialEdit}
 
 
 ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
@@ -185,19 +185,13 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
 
 
 def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
-    given = step.options
-    region = _left(scene, edited, region_of(scene, step))
-    options: dict[str, Any] = {
-        k: _number(given[k], k) for k in ("hue", "saturation", "value", "texture_scale") if k in given
-    }
-    options |= {k: given[k] for k in ("roughness", "metallic") if k in given}
-    if "albedo" in given:
-        options["albedo"] = (
-            given["albedo"] if isinstance(given["albedo"], str) else _numbers(given["albedo"], 3, "albedo")
-        )
-    if "texture" in given:
-        options["texture"] = read_texture(_file(step, "texture"))
-    return edit(edited, region, **options)
+    return edit(edited, _left(scene, edited, region_of(scene, step)), _options(step))
+
+
+def _options(step: Step) -> Any:
+    """The dataclass of the step's options, of what the file says beside the region."""
+    said = {name: value for name, value in step.options.items() if name not in (*REGION, "skip")}
+    return OPTIONS[step.kind].read(said, folder=step.folder)
 
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -321,15 +315,6 @@ _MAKERS = {
     "edit": _edit, "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
 }  # fmt: skip
 """Kind of step -> (original scene, scene so far, step) -> scene."""
-
-
-def read_texture(path: str | Path):
-    """[h, w, 3] float32 linear picture for `edit(texture=...)`. Raises InputError."""
-    import numpy as np
-
-    from materialist.io.photo import decode_photo
-
-    return np.clip(decode_photo(Path(path)).linear, 0, 1)
 
 
 def _switch(value: Any, name: str, other: str = "") -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import gradio as gr
 import numpy as np
 
-from materialist.edits.core.surfaces import parse_colour
+from materialist.option_kinds import parse_colour
 from materialist.studio.context import Context
 from materialist.studio.follow import box
 from materialist.studio.guard import guarded
@@ -99,7 +99,7 @@ def _wire_following(context: Context) -> None:
 def tint_text(colour: str) -> str | None:
     """A picked colour as the option `tint` of glass, linear; None for white."""
     linear = parse_colour(hex_colour(colour))
-    return None if linear.min() >= 1 else ",".join(f"{v:.4g}" for v in linear)
+    return None if min(linear) >= 1 else ",".join(f"{v:.4g}" for v in linear)
 
 
 def tint_colour(tint: Any) -> str:

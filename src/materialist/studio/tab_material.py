@@ -81,7 +81,7 @@ def wire(context: Context) -> None:
         session = context.session(request)
         if file is None:
             return {}
-        from materialist.edits.recipe import read_texture
+        from materialist.edits.material.texture import read_texture
 
         suffix = uploads.checked_picture(Path(file), Path(file).name)
         with uploads.called(Path(file), Path(file).name):

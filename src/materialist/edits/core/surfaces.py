@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from materialist.color import srgb_to_linear
-from materialist.errors import InputError
 from materialist.types import Array, Surface
 
 PHOTO_LIGHT = "photo light"
@@ -27,25 +25,3 @@ def triple(values: Array) -> tuple[float, float, float]:
     """Three numbers as a tuple of plain floats, as files and comparisons want them."""
     a, b, c = (float(v) for v in values)
     return a, b, c
-
-
-def parse_colour(colour: tuple[float, float, float] | str, name: str = "albedo") -> Array:
-    """[3] float32 linear colour from (R, G, B) linear, "R,G,B" linear, or "#rrggbb" sRGB.
-
-    Raises InputError with the given `name`.
-    """
-    if isinstance(colour, str) and colour.startswith("#"):
-        try:
-            if len(colour) != 7:
-                raise ValueError
-            return srgb_to_linear(np.array([int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)], np.float32))
-        except ValueError as error:
-            raise InputError(f"The {name} {colour!r} must look like #ff8800.") from error
-    try:
-        parts = colour.split(",") if isinstance(colour, str) else colour
-        rgb = np.array([float(c) for c in parts], np.float32)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.") from error
-    if rgb.shape != (3,) or not (np.isfinite(rgb).all() and (rgb >= 0).all() and (rgb <= 1).all()):
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
-    return rgb

@@ -86,7 +86,7 @@ def repainted(model: Model, material: str) -> Model:
 
     Glass is smooth with an index of 1.5; the mirror's albedo is 0.95; a colour is dielectric with roughness 0.5.
     """
-    from materialist.edits.core.surfaces import parse_colour
+    from materialist.option_kinds import parse_colour
 
     if material == "as-is":
         return model
@@ -96,7 +96,7 @@ def repainted(model: Model, material: str) -> Model:
         surface = uniform_surface(0.95, 0.03, 1.0)
     else:
         try:
-            surface = uniform_surface(parse_colour(material), 0.5, 0.0)
+            surface = uniform_surface(np.asarray(parse_colour(material)), 0.5, 0.0)
         except InputError as error:
             raise InputError(
                 f"The material is {material!r}; give as-is, glass, mirror, R,G,B in [0, 1], or #rrggbb."

@@ -2,76 +2,49 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region
-from materialist.edits.core.surfaces import parse_colour
 from materialist.errors import InputError
+from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
 
 
-def edit(
-    scene: Scene,
-    mask: Array,
-    *,
-    hue: float = 0.0,
-    saturation: float = 0.0,
-    value: float = 0.0,
-    albedo: tuple[float, float, float] | str | None = None,
-    texture: Array | None = None,
-    texture_scale: float = 1.0,
-    roughness: float | str | None = None,
-    metallic: float | str | None = None,
-) -> Scene:
+def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **values: Any) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
+
+    Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or
+    metallic sets it, a text with a sign ("+0.5", "-0.5") shifts it; +-0.5 are the paper's high and low. Hue, saturation
+    and value act on a new albedo or texture, too.
 
     Args:
         mask: [H, W] bool, or weights in [0, 1], at working size.
-        hue: turn of the albedo's hue, degrees; +120 makes red green.
-        saturation: in [-1, 1]; -1 is grey, 0 as it is, +1 more colourful; grey stays grey.
-        value: in [-1, 1]; -1 is black, 0 as it is, +1 white. The texture keeps its order: nothing clips.
-        albedo: (R, G, B) linear in [0, 1], or "#rrggbb" as sRGB: one colour in place of the texture.
-        texture: [h, w, 3] linear picture, laid on the surface (see `texture.projected`). Hue, saturation and value
-            act on a new albedo or texture, too.
-        texture_scale: size of the picture; 1 covers the region once, 0.5 repeats it twice in each direction.
-        roughness, metallic: a number in [0, 1] sets it, a string with a sign ("+0.5", "-0.5") shifts it; +-0.5 are
-            the paper's high and low.
+        options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
 
     Raises:
         InputError: a mask of another size or empty, or a value out of its range.
     """
+    wanted = MaterialEdit.given(options, **values)
     weight = checked_region(scene, mask)
-    for name, amount in (("saturation", saturation), ("value", value)):
-        _in_range(name, amount, -1, 1)
-    _in_range("hue", hue, -3600, 3600)
     materials = scene.materials
-    colour = _base_colour(scene, weight, albedo, texture, texture_scale)
-    if hue or saturation or value:
-        colour = shifted_hsv(colour, hue, saturation, value)
+    colour, texture = _base_colour(scene, weight, wanted)
+    if wanted.hue or wanted.saturation or wanted.value:
+        colour = shifted_hsv(colour, wanted.hue, wanted.saturation, wanted.value)
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
-        _mix(materials.roughness, _changed("roughness", materials.roughness, roughness), weight),
-        _mix(materials.metallic, _changed("metallic", materials.metallic, metallic), weight),
+        _mix(materials.roughness, _changed(materials.roughness, wanted.roughness), weight),
+        _mix(materials.metallic, _changed(materials.metallic, wanted.metallic), weight),
     )
-    if albedo is not None and not isinstance(albedo, str):
-        red, green, blue = (float(c) for c in albedo)
-        albedo = (red, green, blue)
-    entry = {
-        "hue": hue, "saturation": saturation, "value": value, "albedo": albedo, "roughness": roughness,
-        "metallic": metallic, "texture": None if texture is None else list(np.shape(texture)),
-    }  # fmt: skip
-    entry = {name: amount for name, amount in entry.items() if amount not in (None, 0.0) or name in SETTABLE}
-    entry = {name: amount for name, amount in entry.items() if amount is not None}
+    shifts = {name: getattr(wanted, name) for name in ("hue", "saturation", "value") if getattr(wanted, name)}
+    levels = {"albedo": wanted.albedo, "roughness": wanted.roughness, "metallic": wanted.metallic, "texture": texture}
+    entry = {**shifts, **{name: level for name, level in levels.items() if level is not None}}
     return noted(replace(scene, materials=new), "material", {**entry, "pixels": int((weight > 0.5).sum())})
-
-
-SETTABLE = ("albedo", "roughness", "metallic")
-"""Properties of which 0 is a value of its own and not 'as it is'."""
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
@@ -93,39 +66,28 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     return srgb_to_linear(np.clip(moved, 0, 1)).reshape(shape)
 
 
-def _base_colour(scene: Scene, weight: Array, albedo, texture: Array | None, scale: float) -> Array:
-    """[H, W, 3] albedo before hue, saturation and value act."""
-    if albedo is not None and texture is not None:
+def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Array, list[int] | None]:
+    """([H, W, 3] albedo before hue, saturation and value act, shape of the texture that it has)."""
+    if wanted.albedo is not None and wanted.texture is not None:
         raise InputError("Give an albedo or a texture, not both; hue, saturation and value can go with either.")
-    if texture is not None:
-        from materialist.edits.material.texture import projected
+    if wanted.texture is not None:
+        from materialist.edits.material.texture import projected, read_texture
 
-        return projected(scene, weight > 0.5 if (weight > 0.5).any() else weight > 0, texture, scale)
-    if albedo is not None:
-        return np.broadcast_to(parse_colour(albedo), scene.materials.albedo.shape)
-    return scene.materials.albedo
+        picture = read_texture(wanted.texture) if isinstance(wanted.texture, str | Path) else wanted.texture
+        region = weight > 0.5 if (weight > 0.5).any() else weight > 0
+        return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
+    if wanted.albedo is not None:
+        return np.broadcast_to(np.asarray(wanted.albedo, np.float32), scene.materials.albedo.shape), None
+    return scene.materials.albedo, None
 
 
-def _changed(name: str, old: Array, wanted: float | str | None) -> Array:
-    """[H, W] property set to a number, or shifted by a signed string, and kept in [0, 1]."""
+def _changed(old: Array, wanted: float | str | None) -> Array:
+    """[H, W] property set to a number, or shifted by a signed text, and kept in [0, 1]."""
     if wanted is None:
         return old
-    shift = isinstance(wanted, str) and wanted.strip()[:1] in ("+", "-")
-    try:
-        amount = float(wanted)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} must be a number in [0, 1], or a shift such as +0.5, not {wanted!r}.") from error
-    _in_range(f"{name} shift" if shift else name, amount, -1 if shift else 0, 1)
-    return np.clip(old + amount, 0, 1) if shift else np.full_like(old, amount)
+    return np.clip(old + float(wanted), 0, 1) if isinstance(wanted, str) else np.full_like(old, wanted)
 
 
 def _mix(old: Array, new: Array, weight: Array) -> Array:
     """float32; old exactly where the weight is 0, new exactly where it is 1."""
     return np.where(weight >= 1, new, old + (new - old) * weight).astype(np.float32)
-
-
-def _in_range(name: str, amount: float, low: float, high: float) -> None:
-    if isinstance(amount, bool) or not isinstance(amount, int | float | np.number) or not math.isfinite(amount):
-        raise InputError(f"The {name} must be a number in [{low:g}, {high:g}], not {amount!r}.")
-    if not low <= amount <= high:
-        raise InputError(f"The {name} is {amount:g}; it must lie in [{low:g}, {high:g}].")

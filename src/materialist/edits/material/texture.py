@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from materialist.camera import unproject
@@ -9,20 +11,25 @@ from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 
+def read_texture(path: str | Path) -> Array:
+    """[h, w, 3] float32 linear picture in [0, 1]. Raises InputError."""
+    from materialist.io.photo import decode_photo
+
+    return np.clip(decode_photo(Path(path)).linear, 0, 1)
+
+
 def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -> Array:
     """[H, W, 3] albedo: `picture` [h, w, 3] projected on the region [H, W] bool along its mean normal.
 
     The picture lies in the plane of the region's mean normal, upright as the camera sees it, and covers the region's
     extent there (times `scale`; repeated beyond), so that flat surfaces carry it in right perspective.
-    Raises InputError for a picture without three channels, with values outside [0, 1], or a scale that is not > 0.
+    Raises InputError for a picture without three channels, or with values outside [0, 1].
     """
     picture = np.asarray(picture, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or min(picture.shape[:2]) < 1:
         raise InputError(f"The texture is {picture.shape}; it must be a picture [h, w, 3].")
     if not (np.isfinite(picture).all() and picture.min() >= 0 and picture.max() <= 1):
         raise InputError(f"The texture has values from {picture.min():g} to {picture.max():g}; they must be 0 to 1.")
-    if not (np.isfinite(scale) and 0 < scale <= 100):
-        raise InputError(f"The texture scale is {scale:g}; it must lie in (0, 100].")
     use = region & (scene.depth > 0)
     points = unproject(scene.depth, scene.camera)
     right, up = _tangents(scene.normal[use].mean(0))
