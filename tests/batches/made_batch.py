@@ -17,7 +17,9 @@ from materialist.errors import InputError, SetupError
 from materialist.types import Geometry, Photo, Scene
 
 TESTS = Path(__file__).resolve().parents[1]
-HELPERS = os.pathsep.join(str(TESTS / folder) for folder in ("batch", "cli", "io"))
+HELPERS = os.pathsep.join(
+    filter(None, [*(str(TESTS / folder) for folder in ("batches", "cli", "io")), os.environ.get("PYTHONPATH")])
+)
 """What a worker needs on its path to find these."""
 
 

@@ -97,7 +97,7 @@ def test_many_photos_take_several_pages(tmp_path):
 
 
 def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
-    from materialist.batches.summary import write_summary
+    from materialist.batches.outcome import write_summary
 
     write_summary(Outcome(tmp_path, (Row({"id": "=1+1.png", "name": "@x", "status": "open"}),), 0, 1.0))
     row = next(csv.DictReader((tmp_path / "summary.csv").open()))

@@ -43,7 +43,7 @@ def wait_for(condition, seconds=60):
 
 
 def workers_of(process):
-    return [c for c in psutil.Process(process.pid).children() if "materialist.batches.worker" in c.cmdline()]
+    return [c for c in psutil.Process(process.pid).children() if "materialist.jobs.worker" in c.cmdline()]
 
 
 def undisturbed(source, runs):

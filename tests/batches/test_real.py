@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from materialist.batches.packages import package_hash
+from materialist.batches.results import package_hash
 from materialist.batches.run import batch
-from materialist.batches.work import ONE_THREAD
+from materialist.batches.task import SINGLE_THREAD
 from materialist.io.examples import example_path
 from materialist.io.package import load_scene
 
@@ -38,5 +38,5 @@ def test_the_scene_is_the_one_of_a_single_inversion_whatever_the_worker_did_befo
     two = batch(listing, tmp_path / "two", workers=2, size=64, device="cpu")
     assert one.hash == two.hash and one.exit_code == 0
     command = [sys.executable, "-m", "materialist", "invert", "example:rocket", "-o", str(tmp_path / "rocket.scene")]
-    subprocess.run([*command, "--size", "64", "--device", "cpu"], check=True, env={**os.environ, **ONE_THREAD})
+    subprocess.run([*command, "--size", "64", "--device", "cpu"], check=True, env={**os.environ, **SINGLE_THREAD})
     assert package_hash(tmp_path / "rocket.scene") == package_hash(tmp_path / "one/rocket.scene")

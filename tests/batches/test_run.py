@@ -10,8 +10,9 @@ from made_batch import photos
 from PIL import Image
 
 from materialist.batches.ledger import LEDGER, read_events
-from materialist.batches.packages import package_hash
+from materialist.batches.results import package_hash
 from materialist.batches.run import batch
+from materialist.batches.task import PhotoTask
 from materialist.errors import InputError, SetupError
 from materialist.io.package import load_scene
 
@@ -178,11 +179,8 @@ def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(t
 
 
 def test_predictors_by_name_reach_the_inversion(tmp_path):
-    from materialist.batches.job import Job
-
-    job = Job("a.png", "kitchen", "/a.png", "/r", {"predictor": "maps:priors/{name}", "size": 64})
-    assert job.named_options() == {"predictor": "maps:priors/kitchen", "size": 64}
-    assert Job.from_text(job.to_text()) == job
+    task = PhotoTask("a.png", "kitchen", "/a.png", tmp_path, {"predictor": "maps:priors/{name}", "size": 64})
+    assert task.named_options() == {"predictor": "maps:priors/kitchen", "size": 64}
 
 
 def test_the_scene_says_where_the_photo_lay(tmp_path):

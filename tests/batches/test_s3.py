@@ -3,7 +3,7 @@
 import pytest
 from made_batch import photos
 
-from materialist.batches.listing import list_photos
+from materialist.batches.photos import list_photos
 from materialist.batches.remote import local_copy, version
 from materialist.batches.run import batch
 from materialist.errors import InputError

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.packages import file_hash
+from materialist.batches.results import file_hash
 from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.mesh_folder import files_beside
 from materialist.edits.recipe import Step, read_recipe

@@ -1,12 +1,15 @@
-"""What a batch came to, and how it stands while it runs."""
+"""The outcome of a batch, its state while it runs, and the tables summary.csv and summary.json."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.packages import together
+from materialist.batches.results import replace_file, together
 
 COLUMNS = (
     "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
@@ -76,3 +79,41 @@ class Status:
     """A line to show; most are about a photo that has just ended."""
     urgent: bool = False
     """Whether the line is about something that went wrong."""
+
+
+def write_summary(outcome: Outcome) -> None:
+    """Write both into the folder of the batch, each whole or not at all. Raises OutputError."""
+    replace_file(outcome.runs / "summary.csv", _csv(outcome).encode("utf-8"))
+    replace_file(outcome.runs / "summary.json", (json.dumps(as_dict(outcome), indent=1) + "\n").encode())
+
+
+def as_dict(outcome: Outcome) -> dict[str, Any]:
+    """The content of summary.json."""
+    return {
+        "photos": len(outcome.rows),
+        **{status: outcome.count(status) for status in ("done", "failed", "open")},
+        "kept": outcome.kept,
+        "seconds": round(outcome.seconds, 3),
+        "photo_seconds": round(sum(row["seconds"] or 0 for row in outcome.rows), 3),
+        "hash": outcome.hash,
+        "options": outcome.options,
+        "rows": [{key: row[key] for key in COLUMNS} for row in outcome.rows],
+    }
+
+
+def _csv(outcome: Outcome) -> str:
+    text = io.StringIO()
+    table = csv.writer(text)
+    table.writerow(COLUMNS)
+    for row in outcome.rows:
+        table.writerow([_cell(row[key]) for key in COLUMNS])
+    return text.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """A value as a spreadsheet may read it: no text of ours or of a file's name can begin a formula."""
+    if isinstance(value, list):
+        value = " | ".join(value)
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") else value

@@ -1,4 +1,4 @@
-"""What a batch has to do: which photos are finished, which begun, under which names and options."""
+"""What a batch has to do: which photos are finished, and what is left."""
 
 from __future__ import annotations
 
@@ -6,16 +6,14 @@ import json
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from materialist.batches.edits import edits_key
-from materialist.batches.job import INVERSION, Job
 from materialist.batches.ledger import Ledger
-from materialist.batches.listing import Listed
-from materialist.batches.names import unique_names
-from materialist.batches.packages import file_hash, whole_size
+from materialist.batches.photos import Listed, unique_names
 from materialist.batches.remote import is_url, version
+from materialist.batches.results import file_hash, whole_size
+from materialist.batches.task import PhotoTask
 from materialist.errors import InputError, MaterialistError
 from materialist.io.decoded import MIN_SIDE
 from materialist.pipeline import check_overrides
@@ -54,41 +52,29 @@ def check_options(options: dict[str, Any]) -> None:
         ) from error
 
 
-def plan(
-    photos: Iterable[Listed], ledger: Ledger, runs: Path, options: dict[str, Any], *, edits: Path | None = None,
-    spp: int = 256, function: str = INVERSION,
-) -> tuple[list[Job], list[str]]:  # fmt: skip
-    """Jobs for what is not finished, and ids of what is.
+def plan(photos: Iterable[Listed], ledger: Ledger, template: PhotoTask) -> tuple[list[PhotoTask], list[str]]:
+    """Tasks for what is not finished, and ids of what is; `template` has what all tasks have in common.
 
     A photo is finished when the ledger says so with the same options, the photo (by hash) and the edits are what they
-    were, and the results are whole. Where only the edit is missing or another, the job keeps the scene.
+    were, and the results are whole. Where only the edit is missing or another, the task keeps the scene.
     """
     photos = list(photos)
     names = unique_names([photo.id for photo in photos], ledger.names)
-    recipe = str(edits.resolve()) if edits is not None else None
 
-    def look(photo: Listed) -> tuple[Job, bool]:
-        job = Job(
-            photo.id, names[photo.id], photo.location, str(runs.resolve()), options, recipe, spp,
-            function=function,
-        )  # fmt: skip
+    def look(photo: Listed) -> tuple[PhotoTask, bool]:
+        task = replace(template, id=photo.id, name=names[photo.id], location=photo.location)
         entry = ledger.last.get(photo.id, {})
-        if entry.get("key") != ledger.key or not _inverted(entry, job):
-            return job, False
-        return replace(job, inverted=True), _edited(entry, job)
+        if entry.get("key") != ledger.key or not _inverted(entry, task):
+            return task, False
+        return replace(task, inverted=True), _edited(entry, task)
 
-    jobs, finished = [], []
     with ThreadPoolExecutor(8) as threads:  # reading and hashing: the disk's time, not the interpreter's
-        for job, whole in threads.map(look, photos):
-            if whole:
-                finished.append(job.id)
-            else:
-                jobs.append(job)
-    return jobs, finished
+        found = list(threads.map(look, photos))
+    return [task for task, finished in found if not finished], [task.id for task, finished in found if finished]
 
 
 def fingerprint(location: str) -> str | None:
-    """What tells a photo from another at the same place: the hash of its bytes, or what a remote store says of it."""
+    """The hash of a photo's bytes, or the version that a remote store gives it; None where it cannot be read."""
     from materialist.io.examples import PREFIX, example_path
 
     try:
@@ -99,23 +85,23 @@ def fingerprint(location: str) -> str | None:
         return None
 
 
-def _inverted(entry: dict[str, Any], job: Job) -> bool:
-    """Whether the scene of the ledger's last word on a photo is there, whole, and of the photo as it is now."""
+def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:
+    """Whether the scene of the ledger's last entry is there, whole, and of the photo as it is now."""
     size = entry.get("scene_bytes")
-    if not size or size != whole_size(job.scene):
+    if not size or size != whole_size(task.scene):
         return False
-    known = entry.get("photo_version") if is_url(job.location) else entry.get("photo_hash")
-    return known is not None and known == fingerprint(job.location)
+    known = entry.get("photo_version") if is_url(task.location) else entry.get("photo_hash")
+    return known is not None and known == fingerprint(task.location)
 
 
-def _edited(entry: dict[str, Any], job: Job) -> bool:
+def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether nothing is to be edited, or the edited photo is there and of the same edits."""
     if entry.get("event") != "done":
         return False
-    if job.edits is None:
+    if task.edits is None:
         return True
     try:
-        same = entry.get("edits") == edits_key(job.edits, job.name, job.spp)
-        return same and entry.get("picture_hash") == file_hash(job.picture)
+        same = entry.get("edits") == edits_key(task.edits, task.name, task.spp)
+        return same and entry.get("picture_hash") == file_hash(task.picture)
     except OSError:
         return False

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.listing import list_photos
-from materialist.batches.packages import package_hash, together
-from materialist.batches.work import ONE_THREAD
+from materialist.batches.photos import list_photos
+from materialist.batches.results import package_hash, together
+from materialist.batches.task import SINGLE_THREAD
 from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError
@@ -104,7 +104,7 @@ def _chosen(data: Path | None, photos: int, output: Path) -> list[str]:
 def _command(*arguments: str) -> None:
     """Run `materialist`; raises MaterialistError with what it said when it fails."""
     # A thread for each worker, and for the single inversions too: what is compared is the same work.
-    environment = {**os.environ, **ONE_THREAD}
+    environment = {**os.environ, **SINGLE_THREAD}
     command = [sys.executable, "-m", "materialist", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     if done.returncode:

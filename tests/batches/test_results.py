@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_scene import make_scene
 
-from materialist.batches.packages import NEEDED, package_hash, together, whole_size
+from materialist.batches.results import NEEDED, package_hash, together, whole_size
 from materialist.errors import SceneError
 from materialist.io.package import save_scene
 from materialist.types import FitReport

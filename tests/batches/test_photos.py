@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_batch import photos
 
-from materialist.batches.listing import list_photos
-from materialist.batches.names import LONGEST, unique_names
+from materialist.batches.photos import LONGEST_NAME as LONGEST
+from materialist.batches.photos import list_photos, unique_names
 from materialist.batches.remote import is_url, local_copy, shown, version
 from materialist.errors import InputError
 

@@ -1,13 +1,14 @@
-"""Scene packages as results: are they whole, and are two the same."""
+"""Results of a batch: where they lie, whether they are whole, and whether two are the same."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from materialist.errors import SceneError
+from materialist.errors import OutputError, SceneError
 from materialist.io.target import MARKER
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
@@ -19,6 +20,32 @@ NEEDED = (
     *("overview.png", "report.json", MARKER),
 )
 """What a package must hold to be whole."""
+
+
+def scene_path(runs: Path, name: str) -> Path:
+    """The scene package of a name."""
+    return runs / f"{name}.scene"
+
+
+def picture_path(runs: Path, name: str) -> Path:
+    """The edited photo of a name."""
+    return runs / f"{name}.png"
+
+
+def thumbnail_path(runs: Path, name: str) -> Path:
+    """Small pictures of the photo, its re-rendering and its edit, side by side."""
+    return runs / "thumbs" / f"{name}.jpg"
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all. Raises OutputError."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(exist_ok=True)
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def package_hash(path: str | Path) -> str:

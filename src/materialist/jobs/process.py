@@ -1,0 +1,132 @@
+"""A worker process, seen by whoever started it: tasks go in, messages come out, and its death is one of them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import wait
+from typing import IO, Any
+
+from materialist.jobs.worker import READY
+
+LOST = "lost"
+"""Kind of the last message: the process has ended. Its facts are those of `exit_report`, and `unready`."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """What a worker told."""
+
+    kind: str
+    """A kind of `worker`, or LOST."""
+    facts: Any
+    number: int = 0
+    """The task that it is about, as `Worker.begin` gave it."""
+
+
+class Worker:
+    """A process of its own, in a session of its own: Ctrl-C does not reach it."""
+
+    def __init__(
+        self, *, environment: Mapping[str, str] | None = None, niceness: int = 0, idle: float = 0.0,
+        errors: IO[bytes] | None = None,
+    ) -> None:  # fmt: skip
+        """Start it. Raises OSError where no process can be started.
+
+        environment: variables that differ from this process's. niceness: added to this process's. idle: seconds
+        without a task after which it ends by itself; 0: never. errors: file that takes its stderr; else this one's.
+        """
+        self.connection, theirs = Pipe()
+        words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno()), str(niceness), str(idle)]
+        try:
+            # A new program, not a fork: a renderer that has started does not survive one.
+            self._process = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stderr=errors, env={**os.environ, **(environment or {})},
+                pass_fds=(theirs.fileno(),), start_new_session=True,
+            )  # fmt: skip
+        except OSError:
+            self.connection.close()
+            raise
+        finally:
+            theirs.close()
+        self._errors, self._ready, self._number = errors, False, 0
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether the process has not ended yet."""
+        return self._process.poll() is None
+
+    def begin(self, task: Callable[..., Any], arguments: dict[str, Any]) -> int:
+        """Send a task, which replaces those that wait in the process; returns its number."""
+        self._number += 1
+        with contextlib.suppress(OSError):  # the process has ended: LOST says so
+            self.connection.send((self._number, pickle.dumps((task, arguments))))
+        return self._number
+
+    def receive(self) -> list[Message]:
+        """The messages that are there now. After LOST there is nothing more, and the process is gone."""
+        found = []
+        try:
+            while self.connection.poll():
+                kind, facts, number = self.connection.recv()
+                self._ready = True
+                if kind != READY:
+                    found.append(Message(kind, facts, number))
+        except (EOFError, OSError):
+            code = self.close()
+            facts = {**exit_report(code, self._errors), "unready": not self._ready and code > 0}
+            found.append(Message(LOST, facts, self._number))
+        return found
+
+    def messages(self) -> Iterator[Message]:
+        """Messages as they come, the last one LOST."""
+        while True:
+            wait([self.connection])
+            for message in self.receive():
+                yield message
+                if message.kind == LOST:
+                    return
+
+    def kill(self) -> None:
+        """End it and what it started at once; the next message is LOST."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            if self.running:
+                os.killpg(self.pid, signal.SIGKILL)
+
+    def close(self) -> int:
+        """End it, and wait for that; returns its exit code, below zero for a signal."""
+        if self.connection.closed:
+            return self._process.wait()
+        self.connection.close()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(0.5)  # one that is ending by itself keeps its exit code
+        self.kill()
+        return self._process.wait()
+
+
+def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
+    """Why a process ended, from its exit code and the end of its stderr; the same keys as `worker.failure`."""
+    if code < 0:
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
+        hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""
+        reason = f"The worker process was ended by {name}{hint}."
+    else:
+        reason = f"The worker process ended with exit code {code}."
+    if errors is not None:
+        size = errors.seek(0, os.SEEK_END)
+        errors.seek(max(0, size - 2000))
+        lines = errors.read().decode("utf-8", "replace").strip().splitlines()
+        reason += f" Its last words: {lines[-1][:300]}" if lines else ""
+    return {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}

@@ -1,0 +1,162 @@
+"""The studio's jobs: a queue with a limit, each job in a process of its own, and a stop that always works."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from materialist.jobs.process import LOST, Message, Worker
+from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
+
+QUEUED, RUNNING, STOPPED = "queued", "running", "stopped"
+"""States of a job, beside DONE and FAILED."""
+KEPT_SECONDS = 3600
+"""How long a finished job is remembered, so that a page that was reloaded can ask for its outcome."""
+NICENESS = 5
+"""Of the processes: live previews go before."""
+
+
+@dataclass
+class Job:
+    """One piece of work; changed by the queue alone, read by anyone."""
+
+    kind: str
+    owner: str
+    """Who asked for it: the person, not the page, so that a reloaded page finds it."""
+    folder: Path
+    """Where it writes."""
+    task: Callable[..., Any] = field(repr=False)
+    """Importable function task(report, **arguments)."""
+    arguments: dict[str, Any] = field(default_factory=dict)
+    state: str = QUEUED
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    shown: float = 0.0
+    """The longest that its bar was, in [0, 1]: it never runs back."""
+    message: str = ""
+    """One sentence where it failed."""
+    found: list[dict[str, Any]] = field(default_factory=list)
+    """Intermediate results."""
+    result: Any = None
+    began: float = field(default_factory=time.monotonic)
+    ended: float | None = None
+    worker: Worker | None = field(default=None, repr=False)
+
+    @property
+    def over(self) -> bool:
+        """Whether it is done, failed or stopped."""
+        return self.state in (DONE, FAILED, STOPPED)
+
+    @property
+    def seconds(self) -> float:
+        """How long it has run, or ran."""
+        return (self.ended or time.monotonic()) - self.began
+
+    def end(self, state: str, message: str = "") -> None:
+        """Set the final state, unless it has one."""
+        if not self.over:
+            self.state, self.message, self.ended = state, message, time.monotonic()
+
+
+class JobQueue:
+    """Runs at most `limit` jobs at a time, in the order they came."""
+
+    def __init__(self, limit: int = 1):
+        self._threads = ThreadPoolExecutor(limit, thread_name_prefix="job")
+        self._lock = threading.Lock()
+        self._jobs: list[Job] = []
+
+    def submit(self, job: Job) -> Job:
+        """Put a job in the queue."""
+        with self._lock:
+            now = time.monotonic()
+            self._jobs = [j for j in self._jobs if not j.over or now - (j.ended or now) < KEPT_SECONDS]
+            self._jobs.append(job)
+        self._threads.submit(self.run, job)
+        return job
+
+    def ahead(self, job: Job) -> int:
+        """How many jobs are before this one in the queue; 0 when it runs."""
+        with self._lock:
+            waiting = [j for j in self._jobs if not j.over]
+        return waiting.index(job) if job.state == QUEUED and job in waiting else 0
+
+    def of(self, owner: str, kind: str | None = None) -> list[Job]:
+        """The jobs of a person, the last first."""
+        with self._lock:
+            return [j for j in reversed(self._jobs) if j.owner == owner and kind in (None, j.kind)]
+
+    def stop(self, job: Job) -> None:
+        """End a job, in the queue or in the middle; nothing half-written stays."""
+        with self._lock:
+            job.end(STOPPED)
+            worker = job.worker
+        if worker is not None:
+            worker.kill()
+
+    def close(self) -> None:
+        """Stop everything."""
+        with self._lock:
+            unfinished = [j for j in self._jobs if not j.over]
+        for job in unfinished:
+            self.stop(job)
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def run(self, job: Job) -> Job:
+        """Run a job now, beside the queue; returns when it is over."""
+        with self._lock:
+            if job.over:
+                return job
+            job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
+            try:
+                job.worker = worker = Worker(niceness=NICENESS)
+            except OSError as error:
+                job.end(FAILED, f"The work cannot be started: {error}.")
+                return job
+        worker.begin(job.task, job.arguments)
+        try:
+            for message in worker.messages():
+                if message.kind in (DONE, FAILED, LOST):
+                    worker.kill()
+                    break
+                _note(job, message)
+        finally:
+            worker.close()
+            _sweep(job.folder, worker.pid)
+        with self._lock:
+            if message.kind == DONE:
+                job.result = message.facts
+            job.end(DONE if message.kind == DONE else FAILED, "" if message.kind == DONE else _sentence(message.facts))
+        return job
+
+
+def _note(job: Job, message: Message) -> None:
+    if message.kind == PROGRESS:
+        job.stage, job.done, job.total = (message.facts[name] for name in ("stage", "done", "total"))
+    elif message.kind == FOUND:
+        job.found = [*job.found, message.facts]
+
+
+def _sentence(facts: dict[str, Any]) -> str:
+    """Why a job failed; what was not expected goes to the terminal as well."""
+    if not facts["bug"]:
+        return str(facts["reason"])
+    sys.stderr.write(facts["trace"])
+    return f"Something went wrong inside ({facts['error']}: {facts['reason']}); the terminal has the details."
+
+
+def _sweep(folder: Path, pid: int) -> None:
+    """Remove what a stopped worker was writing (`io.beside.partial` names it)."""
+    for leftover in folder.glob(f".*partial-{pid}-*"):
+        if leftover.is_dir():
+            shutil.rmtree(leftover, ignore_errors=True)
+        else:
+            leftover.unlink(missing_ok=True)

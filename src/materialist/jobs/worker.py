@@ -1,0 +1,126 @@
+"""The worker process: `python -m materialist.jobs.worker FD NICENESS IDLE` does the tasks that come over a socket.
+
+It receives `(task, arguments, number)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest.
+It ends when the other end of the socket is closed, also in the middle of a task: a coordinator that was killed leaves
+no process behind. `multiprocessing` and pools on top of it (pebble) would run the caller's main module again in each
+worker and import torch before the environment of a worker is set, so only its connections are used.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import queue
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+from materialist.errors import MaterialistError
+
+READY, PROGRESS, FOUND, DONE, FAILED = "ready", "progress", "found", "done", "failed"
+"""Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Report.found`; of
+DONE: what the task returned; of FAILED: see `failure`."""
+INTERVAL = 0.1
+"""Seconds between two messages about the progress of one stage."""
+
+
+class Report:
+    """Callback of a task: `report(stage, done, total)` tells progress, `report.found(...)` an intermediate result."""
+
+    def __init__(self, send: Callable[[str, Any], None], waiting: Callable[[], bool] = lambda: False):
+        self._send, self._waiting, self._last = send, waiting, 0.0
+        self.stage = "read"
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        now = time.monotonic()
+        if stage != self.stage or now - self._last > INTERVAL or done >= total:
+            self.stage, self._last = stage, now
+            self._send(PROGRESS, {"stage": stage, "done": int(done), "total": int(total)})
+
+    def found(self, **facts: Any) -> None:
+        """Send an intermediate result."""
+        self._send(FOUND, facts)
+
+    @property
+    def outdated(self) -> bool:
+        """Whether a newer task waits."""
+        return self._waiting()
+
+
+def main(descriptor: int, niceness: int, idle: float) -> None:
+    """Do tasks until the socket is closed, or none came for `idle` seconds (0: wait for ever)."""
+    os.dup2(2, 1)  # what libraries print is not the output of the command that started this process
+    os.nice(niceness)
+    connection: Connection = Connection(descriptor)
+    tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    send = _sender(connection)
+    send((READY, {}, 0))
+    threading.Thread(target=_receive, args=(connection, tasks), daemon=True).start()
+    while True:
+        try:
+            content = tasks.get(timeout=idle or None)
+        except queue.Empty:
+            os._exit(0)
+        while not tasks.empty():
+            content = tasks.get()
+        _do(content, send, lambda: not tasks.empty())
+
+
+def _receive(connection: Connection, tasks: queue.SimpleQueue[bytes]) -> None:
+    try:
+        while True:
+            tasks.put(connection.recv_bytes())
+    except (EOFError, OSError):
+        os._exit(3)  # nobody waits for the result
+
+
+def _sender(connection: Connection) -> Callable[[Any], None]:
+    def send(message: Any) -> None:
+        try:
+            connection.send(message)
+        except OSError:
+            os._exit(3)
+
+    return send
+
+
+def _do(content: bytes, send: Callable[[Any], None], waiting: Callable[[], bool]) -> None:
+    number = 0
+    report = Report(lambda kind, facts: send((kind, facts, number)), waiting)
+    try:
+        number, load = pickle.loads(content)
+        task, arguments = pickle.loads(load)
+        kind, facts = run(task, report, arguments)
+    except Exception as error:  # the task cannot be imported here
+        kind, facts = FAILED, failure(error, report.stage)
+    send((kind, facts, number))
+
+
+def run(task: Callable[..., Any], report: Report, arguments: dict[str, Any]) -> tuple[str, Any]:
+    """(DONE, what the task returned) or (FAILED, why)."""
+    try:
+        return DONE, task(report, **arguments)
+    except Exception as error:
+        return FAILED, failure(error, report.stage)
+
+
+def failure(error: BaseException, stage: str) -> dict[str, Any]:
+    """An exception as texts: `error` (its type), `reason`, `stage`, `bug` (whether unexpected), `trace` of bugs.
+
+    An exception may bring more in its attribute `facts`.
+    """
+    bug = not isinstance(error, MaterialistError | MemoryError | OSError)
+    reason = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, MemoryError):
+        reason = "There is not enough memory for this; take a smaller size, or fewer workers."
+    trace = "".join(traceback.format_exception(error))[-4000:] if bug else None
+    found = {"error": type(error).__name__, "reason": reason, "stage": stage, "bug": bug, "trace": trace}
+    return {**getattr(error, "facts", {}), **found}
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]))

@@ -1,0 +1,29 @@
+"""Tasks for worker processes of tests."""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+from materialist.errors import InputError
+
+
+def answer(report, how="fine", out=None, wait=0.0):
+    """What `how` says, after a stage of progress; `out` gets a half-written file."""
+    report("light", 1, 4)
+    if out is not None:
+        Path(out, f".partial-{os.getpid()}-host.png").touch()
+    sys.stdout.write("not for the one who started it\n")
+    if how == "fail":
+        raise InputError("It is too dark.")
+    if how == "bug":
+        raise RuntimeError("three is not four")
+    if how == "die":
+        sys.stderr.write("first\nLLVM ERROR: Cannot select: fminimum\n")
+        sys.stderr.flush()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if how == "found":
+        report.found(name="albedo", file="a.jpg")
+    time.sleep(60 if how == "wait" else wait)
+    return {"how": how, "pid": os.getpid(), "threads": os.environ.get("OMP_NUM_THREADS"), "outdated": report.outdated}

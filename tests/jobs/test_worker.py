@@ -1,0 +1,144 @@
+"""Worker processes and pools: results, failures, death, and the end of the coordinator."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+import psutil
+import pytest
+from made_tasks import answer
+
+from materialist.errors import SetupError
+from materialist.jobs.pool import LocalPool
+from materialist.jobs.process import LOST, Worker, exit_report
+from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
+
+COORDINATOR = """
+import sys, time
+from made_tasks import answer
+from materialist.jobs.process import Worker
+worker = Worker()
+worker.begin(answer, {"how": "wait"})
+next(worker.messages())
+print(worker.pid, flush=True)
+time.sleep(60)
+"""
+
+
+def told(worker, how, **more):
+    """The last message about a task, and the kinds of those before it."""
+    worker.begin(answer, {"how": how, **more})
+    kinds = []
+    for message in worker.messages():
+        if message.kind in (DONE, FAILED, LOST):
+            return message, kinds
+        kinds.append(message.kind)
+    raise AssertionError
+
+
+def until(done, seconds=15.0):
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "took too long"
+        time.sleep(0.02)
+
+
+def test_one_process_does_task_after_task_until_it_dies():
+    with tempfile.TemporaryFile() as errors:
+        worker = Worker(environment={"OMP_NUM_THREADS": "7"}, errors=errors)
+        done, kinds = told(worker, "found")
+        assert kinds == [PROGRESS, FOUND] and done.facts["threads"] == "7" and done.facts["pid"] == worker.pid
+        failed, _ = told(worker, "fail")
+        assert (
+            failed.kind == FAILED and failed.facts["reason"] == "It is too dark." and failed.facts["stage"] == "light"
+        )
+        assert failed.facts["error"] == "InputError" and not failed.facts["bug"] and failed.number == 2
+        bug = told(worker, "bug")[0].facts
+        assert bug["bug"] and "RuntimeError: three is not four" in bug["trace"]
+        lost, _ = told(worker, "die")
+        assert lost.kind == LOST and "ended by SIGKILL" in lost.facts["reason"] and not lost.facts["unready"]
+        assert "Its last words: LLVM ERROR: Cannot select" in lost.facts["reason"]
+        assert not worker.running
+
+
+def test_exit_reports_name_the_signal():
+    assert "ended by SIGABRT." in exit_report(-6)["reason"] and "exit code 3." in exit_report(3)["reason"]
+
+
+def test_of_waiting_tasks_the_newest_is_done_and_the_running_one_knows():
+    worker = Worker()
+    first = worker.begin(answer, {"wait": 0.5})
+    next(worker.messages())
+    for how in ("skipped", "newest"):
+        last = worker.begin(answer, {"how": how})
+    done = []
+    for message in worker.messages():
+        done += [message] if message.kind == DONE else []
+        if message.number == last and message.kind == DONE:
+            break
+    assert [message.number for message in done] == [first, last] and done[0].facts["outdated"]
+    assert done[1].facts["how"] == "newest" and not done[1].facts["outdated"]
+    worker.close()
+    assert not worker.running
+
+
+def test_kill_ends_a_task_at_once():
+    worker = Worker()
+    worker.begin(answer, {"how": "wait"})
+    messages = worker.messages()
+    next(messages)
+    start = time.monotonic()
+    worker.kill()
+    assert next(messages).kind == LOST and time.monotonic() - start < 5
+
+
+def test_an_idle_process_ends_by_itself():
+    worker = Worker(idle=0.2)
+    assert told(worker, "fine")[0].kind == DONE
+    until(lambda: not worker.running)
+    worker.close()
+
+
+def test_a_dead_coordinator_leaves_no_process():
+    process = subprocess.Popen([sys.executable, "-c", COORDINATOR], stdout=subprocess.PIPE, text=True)
+    worker = psutil.Process(int(process.stdout.readline()))
+    process.kill()
+    process.communicate()
+    assert not psutil.wait_procs([worker], timeout=15)[1]
+
+
+def test_a_pool_replaces_dead_workers_and_keeps_the_others():
+    pool = LocalPool([{}, {}])
+    for key, how in (("a", "wait"), ("b", "die")):
+        pool.begin(key, answer, {"how": how})
+    assert pool.free() == 0
+    kinds = {}
+    while pool.free() == 0:
+        for key, message in pool.wait(5):
+            kinds[key] = message.kind
+    assert kinds == {"a": PROGRESS, "b": LOST}
+    pool.begin("c", answer, {})
+    while kinds.get("c") != DONE:
+        for key, message in pool.wait(5):
+            kinds[key] = message.kind
+    pool.close()
+    assert pool.free() == 2 and pool.wait(0) == []
+
+
+def test_workers_that_cannot_start_are_told_as_such(monkeypatch):
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    pool = LocalPool([{}])
+    pool.begin("a", answer, {})
+    with pytest.raises(SetupError, match="does not start"):
+        pool.wait(10)
+    pool.close()
+
+
+def test_a_task_that_cannot_be_imported_there_fails(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.environ["PYTHONPATH"].partition(os.pathsep)[2])
+    worker = Worker()
+    failed, _ = told(worker, "fine")
+    assert failed.kind == FAILED and "made_tasks" in failed.facts["reason"]
+    worker.close()
