@@ -87,7 +87,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     start = time.monotonic()
     own = {one.name for one in fields(BatchOptions)}
     how = BatchOptions(**{name: value for name, value in options.items() if name in own})
-    asked = {"predictor": "auto", "size": 512, "fov": "auto", "seed": 0, "device": "auto"}
+    asked: dict[str, Any] = {"predictor": "auto", "size": 512, "fov": "auto", "seed": 0, "device": "auto"}
     asked |= {name: value for name, value in options.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
