@@ -371,7 +371,7 @@ def test_what_is_revealed_has_glass_under_the_rim_of_what_stands_before_it():
     everywhere = np.ones(MASK.shape, bool)
     portrait = NativeLayer(inside, inside, np.zeros_like(base))
     layers = Layers(base, glass, everywhere, MASK, glass, native=portrait, covered=covered)
-    studio = SimpleNamespace(scene=scene, photo_lights=lambda edited: ~everywhere)
+    studio = SimpleNamespace(scene=scene, emitter_pixels=lambda edited: ~everywhere)
     photo, found = revealed(studio, removed, layers, spp=1)
     for picture in (found.base, found.edited, photo.linear):
         np.testing.assert_allclose(picture[16, 20:22], np.full((2, 3), [0.1, 0.6, 0.2]), atol=1e-5)

@@ -11,7 +11,7 @@ from typing import Any
 
 from materialist.batches.results import file_hash
 from materialist.edits.glass.thickness import METHODS
-from materialist.edits.insert.mesh_folder import files_beside
+from materialist.edits.insert.meshes import files_beside
 from materialist.edits.recipe import Step, read_recipe
 
 FILES = ("mask", "texture", "envmap", "mesh", "background", "thickness")

@@ -1,8 +1,12 @@
-"""Mesh files as bodies in a frame of their own: OBJ, PLY, STL, glTF and GLB, with their textures."""
+"""Mesh files as bodies in a frame of their own: OBJ, PLY, STL, glTF and GLB, read by trimesh."""
 
 from __future__ import annotations
 
+import io
+import json
 import logging
+import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,16 +16,40 @@ import numpy as np
 
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import uniform_surface
-from materialist.edits.core.topology import edge_faults
-from materialist.edits.insert import mesh_gltf, mesh_obj
-from materialist.edits.insert.mesh_folder import FORMATS, MAX_FACES, MeshFolder, claimed_faces
-from materialist.edits.insert.mesh_material import GREY, surface_of, texels
-from materialist.edits.insert.mesh_shape import creased_normals, inside_out
+from materialist.edits.core.topology import edge_faults, volume
+from materialist.edits.insert.mesh_folder import MeshFolder
+from materialist.edits.insert.mesh_material import (
+    GREY,
+    Textures,
+    coloured,
+    gltf_left_out,
+    gltf_surface,
+    mtl_surface,
+)
 from materialist.errors import InputError
+from materialist.option_kinds import parse_colour
 from materialist.types import Array, Body, Surface
 
-DISTANT = 16.0
-"""A mesh whose middle is further from its origin than so many times its size is moved there (georeferenced scans)."""
+FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
+READ = ("KHR_materials_", "EXT_texture_webp", "KHR_lights_punctual", "KHR_texture_transform")
+"""Beginnings of the glTF extensions that a file may require."""
+
+
+@dataclass(frozen=True)
+class MeshLimits:
+    """Limits of the files that are read."""
+
+    faces: int = 2_000_000
+    """Triangles; above it rendering runs out of memory on ordinary machines (tuned by eye)."""
+    megabytes: float = 512.0
+    """Size of the file (tuned by eye)."""
+    texture: int = 4096
+    """Pixels along the longer side of a texture; larger ones are shrunk (tuned by eye)."""
+    crease: float = 40.0
+    """Degrees: where a file has no normals, faces that meet at a sharper angle keep an edge (tuned by eye)."""
+
+
+LIMITS = MeshLimits()
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +57,7 @@ class Model:
     """A thing to be put into a scene: its parts in one frame, +Y up, front to +Z, in the units of its file."""
 
     parts: tuple[Body, ...]
-    """One for each material."""
+    """One for each mesh of the file, with one material."""
     name: str
     warnings: tuple[str, ...] = ()
     closed: bool = True
@@ -41,44 +69,53 @@ class Model:
         return np.concatenate([part.vertices for part in self.parts])
 
 
-def read_model(path: str | Path, *, up: str = "auto") -> Model:
-    """Read a mesh file.
+def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMITS) -> Model:
+    """Read a mesh file; the middle of its base becomes the origin.
 
-    Nothing outside of the file's own folder is opened, whatever it refers to. Normals that are missing are computed
-    (edges of more than 40 degrees stay), texture coordinates that are missing are 0, materials that are missing a
-    grey. Base colours are decoded from sRGB; a transparent texture is taken as opaque.
+    Nothing outside of the file's own folder is opened, whatever it refers to. Normals that are missing are computed,
+    texture coordinates that are missing are 0, materials that are missing a grey. Base colours are decoded from sRGB;
+    a transparent texture is taken as opaque. A closed mesh that is inside out is turned.
 
     Args:
         up: axis of the file that points up, `y` or `z`; `auto`: z for STL, y for the others.
 
     Raises:
-        InputError: no such file, another format, damaged, without faces, of more than 2 million triangles, with
-            vertices that are not finite, or with references that lead outside of its folder.
+        InputError: no such file, another format, damaged, without faces, beyond the limits, with vertices that are
+            not finite, or with references that lead outside of its folder.
     """
     path = Path(path)
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
-    data = _bytes(path)
-    folder = MeshFolder(path.parent)
-    read = _Reader(path, folder)
-    if path.suffix.lower() in (".gltf", ".glb"):
-        data, read.materials = mesh_gltf.prepared(path, data)
-        read.linear = True
-    elif path.suffix.lower() == ".obj":
-        data = mesh_obj.prepared(data, folder)
-    pieces = list(read.pieces(_parsed(path, data, folder)))
+    data, folder = _bytes(path, limits), MeshFolder(path.parent)
+    reader = _Reader(path, _gltf_materials(path, data), limits)
+    parts = list(reader.parts(_parsed(path, data, folder)))
     if folder.refused:
         raise InputError(
             f"{path} refers to {folder.refused[0]}, outside of its folder, which is never followed; "
             "copy that file beside the mesh and name it there."
         )
-    count = sum(len(piece.faces) for piece in pieces)
+    count = sum(len(part.faces) for part in parts)
     if count == 0:
-        raise InputError(f"{path} has no triangles; give a mesh with faces.")
-    _check_size(path, count)
-    if (up == "z") or (up == "auto" and path.suffix.lower() == ".stl"):
-        pieces = [_z_up(piece) for piece in pieces]
-    return _checked(Model(tuple(pieces), path.stem), path, folder, read.left_out())
+        raise InputError(f"{path} has no triangles with an area; give a mesh with faces.")
+    if count > limits.faces:
+        raise InputError(
+            f"{path} has {count / 1e6:.1f} million triangles, more than {limits.faces / 1e6:g} million; reduce it "
+            "first (Blender: Modifier > Decimate; MeshLab: Quadric Edge Collapse Decimation)."
+        )
+    if up == "z" or (up == "auto" and path.suffix.lower() == ".stl"):
+        turned = lambda v: np.stack([v[:, 0], v[:, 2], -v[:, 1]], -1)  # noqa: E731
+        parts = [replace(part, vertices=turned(part.vertices), normals=turned(part.normals)) for part in parts]
+    return _checked(parts, path, [*reader.notes, *_file_notes(path, folder, reader)])
+
+
+def files_beside(path: Path) -> list[Path]:
+    """Files that a mesh file refers to and that were opened for it; none for a file that cannot be read."""
+    folder = MeshFolder(path.parent)
+    try:
+        _parsed(path, _bytes(path, LIMITS), folder)
+    except InputError:
+        return []
+    return list(dict.fromkeys(folder.opened))
 
 
 def repainted(model: Model, material: str) -> Model:
@@ -86,8 +123,6 @@ def repainted(model: Model, material: str) -> Model:
 
     Glass is smooth with an index of 1.5; the mirror's albedo is 0.95; a colour is dielectric with roughness 0.5.
     """
-    from materialist.option_kinds import parse_colour
-
     if material == "as-is":
         return model
     if material == "glass":
@@ -107,36 +142,31 @@ def repainted(model: Model, material: str) -> Model:
     return replace(model, parts=tuple(replace(part, surface=surface) for part in model.parts), warnings=notes)
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(path: Path, limits: MeshLimits) -> bytes:
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"The mesh {path} ends in '{path.suffix}'; give one of {', '.join(FORMATS)}.")
     try:
+        size = path.stat().st_size / 1e6
+        if size > limits.megabytes:
+            raise InputError(f"The mesh {path} has {size:.0f} MB, more than {limits.megabytes:g}; reduce it first.")
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"The mesh {path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
     if not data:
         raise InputError(f"The mesh {path} is empty; give a file with faces.")
-    _check_size(path, claimed_faces(path, data))
+    if path.suffix.lower() == ".obj" and re.search(rb"(?m)^[ \t]*f[ \t][^\r\n]*-\d", data):
+        # trimesh counts them from the end of the file, and not from their line.
+        raise InputError(f"The mesh {path} counts its vertices backwards; export it again, from Blender for example.")
     return data
-
-
-def _check_size(path: Path, count: int) -> None:
-    if count > MAX_FACES:
-        raise InputError(
-            f"{path} has {count / 1e6:.1f} million triangles, more than {MAX_FACES // 10**6} million; reduce it first "
-            "(Blender: Modifier > Decimate; MeshLab: Quadric Edge Collapse Decimation)."
-        )
 
 
 def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
     """trimesh's scene of the file."""
-    import io
-
     import trimesh
 
     quiet = logging.getLogger("trimesh")
     level = quiet.level
-    quiet.setLevel(logging.CRITICAL)  # what it has to say ends in our own sentence
+    quiet.setLevel(logging.CRITICAL)  # its messages end in the sentences of this module
     try:
         return trimesh.load_scene(
             io.BytesIO(data), file_type=path.suffix[1:].lower(), resolver=cast(Any, folder), process=False,
@@ -144,7 +174,7 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
         )  # fmt: skip
     except Exception as error:
         if folder.refused:
-            return trimesh.Scene()  # the caller tells
+            return trimesh.Scene()  # the caller reports the reference
         if folder.missing:
             raise InputError(f"{path} needs {folder.missing[0]}, which is not beside it; add that file.") from error
         reason = " ".join(str(error).split())[:120] or type(error).__name__
@@ -153,161 +183,148 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
         quiet.setLevel(level)
 
 
-class _Reader:
-    """The meshes of a file as bodies."""
+def _gltf_materials(path: Path, data: bytes) -> dict[str | None, dict[str, Any]]:
+    """Name -> material as a .gltf or .glb has it, for the entries that trimesh leaves out.
 
-    def __init__(self, path: Path, folder: MeshFolder):
-        self.path, self.folder = path, folder
-        self.materials: list[dict[str, Any]] = []
-        """Those of a glTF file, which trimesh knows by their number (see `mesh_gltf.prepared`)."""
-        self.linear = False
-        """Whether colours of vertices are linear, as glTF's are."""
-        self.unpainted = 0
-        """Parts whose colours of vertices are not shown."""
-
-    def left_out(self) -> list[str]:
-        """What of the file is not shown, in words."""
-        return (
-            mesh_gltf.left_out(self.materials)
-            + sorted(self.folder.left_out)
-            + ["the colours of its vertices"] * bool(self.unpainted)
+    Bytes that are no glTF have none; trimesh refuses them. Raises InputError for a required extension that is not read.
+    """
+    if path.suffix.lower() not in (".gltf", ".glb"):
+        return {}
+    try:
+        if data[:4] == b"glTF":
+            (length,) = struct.unpack_from("<I", data, 12)
+            data = data[20 : 20 + length]
+        header = json.loads(data)
+        unread = [name for name in header.get("extensionsRequired", []) if not name.startswith(READ)]
+        materials = {material.get("name"): material for material in reversed(header.get("materials", []))}
+    except (ValueError, TypeError, AttributeError, struct.error):
+        return {}
+    if unread:
+        raise InputError(
+            f"{path} needs the glTF extension {unread[0]}, which is not read; export it without (in Blender, without "
+            "compression), or as OBJ or PLY."
         )
+    return materials
 
-    def pieces(self, scene: Any) -> Iterator[Body]:
-        """The meshes of trimesh's scene, each where its node puts it."""
+
+class _Reader:
+    """The meshes of a trimesh scene as bodies."""
+
+    def __init__(self, path: Path, materials: dict[str | None, dict[str, Any]], limits: MeshLimits):
+        self.path, self.materials, self.limits = path, materials, limits
+        self.textures = Textures(limits.texture)
+        self.notes: list[str] = []
+
+    def parts(self, scene: Any) -> Iterator[Body]:
+        """Its meshes as bodies where their nodes put them, about the middle of the base of all."""
         found = []
-        for number, node in enumerate(scene.graph.nodes_geometry):
+        for node in scene.graph.nodes_geometry:
             transform, name = scene.graph[node]
             mesh = scene.geometry[name]
             if getattr(mesh, "faces", None) is None or len(mesh.faces) == 0:
                 continue
             if int(np.min(mesh.faces)) < 0 or int(np.max(mesh.faces)) >= len(mesh.vertices):
-                raise InputError(f"The mesh part {name} has faces of vertices that do not exist; export it again.")
+                raise InputError(f"{self.path} has faces of vertices that do not exist; export it again.")
             transform = np.asarray(transform, np.float64)
             vertices = np.asarray(mesh.vertices, np.float64) @ transform[:3, :3].T + transform[:3, 3]
             if not np.isfinite(vertices).all():
                 raise InputError(
                     f"{self.path} has vertices that are NaN or infinite; repair it, in Blender for example."
                 )
-            found.append((mesh, transform, vertices, f"{name or number}"))
-        origin = _origin([vertices[np.unique(mesh.faces)] for mesh, _, vertices, _ in found])
+            found.append((mesh, transform, vertices, str(name)))
+        if not found:
+            return
+        used = np.concatenate([vertices[np.unique(mesh.faces)] for mesh, _, vertices, _ in found])
+        origin = (used.min(0) + used.max(0)) / 2  # in float64: scans lie far from their origin
         for mesh, transform, vertices, name in found:
-            yield self.piece(mesh, transform, vertices - origin, name)
+            body = self._body(mesh, transform, vertices - origin, name)
+            if len(body.faces):
+                yield body
 
-    def piece(self, mesh: Any, transform: Array, vertices: Array, name: str) -> Body:
+    def _body(self, mesh: Any, transform: Array, vertices: Array, name: str) -> Body:
         """One mesh with its vertices [V, 3] where they are."""
-        faces = np.asarray(mesh.faces, np.int32)
-        given = getattr(mesh._cache, "cache", {}).get("vertex_normals")  # trimesh would compute others, no creases
-        turn = np.linalg.inv(transform[:3, :3]).T if np.linalg.det(transform[:3, :3]) else np.eye(3)
-        kept = _area(vertices, faces) > 0
-        if np.linalg.det(transform[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        normals = None
+        faces = np.asarray(mesh.faces, np.int64)
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        kept = np.linalg.norm(np.cross(b - a, c - a), axis=-1) > 0
+        faces = faces[kept, ::-1] if np.linalg.det(transform[:3, :3]) < 0 else faces[kept]
+        given = getattr(mesh._cache, "cache", {}).get("vertex_normals")  # trimesh would compute others, without creases
+        surface, uv, face_uv = self._paint(mesh, kept)
+        uv = np.zeros((len(vertices), 2)) if uv is None else uv
         if given is not None and len(given) == len(vertices):
-            normals = _unit(np.asarray(given, np.float64) @ turn.T)
-        uv, surface, colours = self.paint(mesh, len(vertices), kept)
-        faces = faces[kept]
-        if colours is not None or normals is None:  # every corner is a vertex of its own
-            flat = faces.ravel()
-            normals = creased_normals(vertices, faces).reshape(-1, 3) if normals is None else normals[flat]
-            uv = uv[flat] if colours is None else np.repeat(colours, 3, 0)
-            vertices, faces = vertices[flat], np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-        # A vertex of no face is nowhere, and must not count where the size is measured.
+            normals = _unit(np.asarray(given, np.float64) @ np.linalg.pinv(transform[:3, :3]))
+        else:
+            corner = creased_normals(vertices, faces, self.limits.crease).reshape(-1, 3)
+            vertices, uv = vertices[faces.ravel()], uv[faces.ravel()]
+            normals, faces = corner, np.arange(faces.size).reshape(-1, 3)
+        if face_uv is not None:
+            vertices, normals = vertices[faces.ravel()], normals[faces.ravel()]
+            uv, faces = np.repeat(face_uv, 3, 0), np.arange(faces.size).reshape(-1, 3)
+        # A vertex of no face must not count where the size is measured.
         used, number = np.unique(faces, return_inverse=True)
-        take = lambda a: np.ascontiguousarray(a[used], np.float32)  # noqa: E731
-        faces = number.reshape(-1, 3).astype(np.int32)
-        return Body(take(vertices), faces, take(normals), take(uv), surface, name)
+        take = lambda v: np.ascontiguousarray(v[used], np.float32)  # noqa: E731
+        return Body(
+            take(vertices), number.reshape(-1, 3).astype(np.int32), take(normals), take(uv), surface, name
+        )  # fmt: skip
 
-    def paint(self, mesh: Any, count: int, kept: Array) -> tuple[Array, Surface, Array | None]:
-        """(uv [V, 2] with v DOWN, surface, uv [F, 2] of a texel for each face of those `kept`, where they have one)."""
+    def _paint(self, mesh: Any, kept: Array) -> tuple[Surface, Array | None, Array | None]:
+        """(surface, uv [V, 2] with v DOWN, uv [F, 2] for each kept face where its colours are those of vertices)."""
         visual = mesh.visual
-        places: Array | None
         if visual.kind in ("vertex", "face"):
             colours = np.asarray(visual.face_colors)[kept, :3].astype(np.float32) / 255
-            texture, places = texels(colours if self.linear else srgb_to_linear(colours))
-            return np.zeros((count, 2)), replace(uniform_surface(GREY, GREY, 0.0), albedo=texture), places
+            linear = self.path.suffix.lower() in (".gltf", ".glb")  # glTF's colours of vertices are linear
+            surface, face_uv = coloured(colours if linear else srgb_to_linear(colours))
+            return surface, None, face_uv
         material = getattr(visual, "material", None)
-        said = self.said(material)
-        surface = surface_of(material, self.folder, (said.get("pbrMetallicRoughness") or {}).get("baseColorFactor"))
-        uv = getattr(visual, "uv", None)
-        uv = np.zeros((count, 2)) if uv is None or np.shape(uv) != (count, 2) else np.asarray(uv, np.float64)
-        uv = np.nan_to_num(uv)
-        uv = np.stack([uv[:, 0], 1 - uv[:, 1]], -1)
-        places = None
-        shades = self.shades(visual, mesh, kept)
-        if shades is not None and surface.albedo.size == 3 and surface.roughness.size == surface.metallic.size == 1:
-            texture, places = texels(shades)
-            surface = replace(surface, albedo=np.clip(texture * surface.albedo, 0, 1).astype(np.float32))
-        elif shades is not None:
-            self.unpainted += 1
-        return mesh_gltf.tiled(uv, said), mesh_gltf.extended(surface, said), places
-
-    def said(self, material: Any) -> dict[str, Any]:
-        """What the glTF file says of a material of trimesh's."""
-        name = str(getattr(material, "name", None))
-        return self.materials[int(name)] if name.isdigit() and int(name) < len(self.materials) else {}
-
-    @staticmethod
-    def shades(visual: Any, mesh: Any, kept: Array) -> Array | None:
-        """[F, 3] linear colours of faces that multiply those of a material (glTF's COLOR_0); None for white or none."""
-        colours = getattr(visual, "vertex_attributes", {}).get("color")
-        if colours is None or len(colours) != len(mesh.vertices):
-            return None
-        colours = np.asarray(colours)[:, :3].astype(np.float64) / (255 if colours.dtype == np.uint8 else 1)
-        return None if (colours > 0.998).all() else np.clip(colours[mesh.faces[kept]].mean(1), 0, 1)
+        if material is None:
+            return uniform_surface(GREY, GREY, 0.0), None, None
+        if hasattr(material, "metallicFactor"):
+            said = self.materials.get(getattr(material, "name", None), {})
+            surface, left_out = gltf_surface(material, said, self.textures), gltf_left_out(said)
+        else:
+            surface, left_out = mtl_surface(material, self.textures)
+        if "color" in (getattr(visual, "vertex_attributes", None) or {}):
+            left_out = [*left_out, "the colours of its vertices"]
+        self.notes += [f"{self.path.name}: {what} is left out." for what in left_out]
+        uv = np.asarray(visual.uv, np.float64) if np.shape(visual.uv) == (len(mesh.vertices), 2) else None
+        return surface, None if uv is None else np.nan_to_num(np.stack([uv[:, 0], 1 - uv[:, 1]], -1)), None
 
 
-def _origin(clouds: list[Array]) -> Array:
-    """[3] what is taken off all vertices: their middle, where single precision would not tell them apart there."""
-    if not clouds:
-        return np.zeros(3)
-    points = np.concatenate(clouds)
-    if not len(points) or not np.isfinite(points).all():
-        return np.zeros(3)
-    low, high = points.min(0), points.max(0)
-    middle = (low + high) / 2
-    return middle if np.abs(middle).max() > DISTANT * (high - low).max() else np.zeros(3)
+def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
+    """[F, 3, 3] unit normals of the corners of faces [F, 3]; faces that meet at a sharper angle keep an edge."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False, validate=False)
+    mesh.merge_vertices()
+    smooth = trimesh.graph.smooth_shade(mesh, angle=np.radians(degrees), facet_minarea=None)
+    order = smooth.metadata.get("original_components")
+    order = np.arange(len(faces)) if order is None else np.concatenate(order)
+    normals = np.empty((len(faces), 3, 3))
+    normals[order] = smooth.vertex_normals[smooth.faces]
+    return _unit(normals)
 
 
-def _checked(model: Model, path: Path, folder: MeshFolder, left_out: list[str]) -> Model:
-    """The model with its faces to the outside, and warnings of what is wrong with it."""
-    corners = np.cumsum([0, *(len(part.vertices) for part in model.parts)])
-    vertices = model.vertices
-    faces = np.concatenate([part.faces + first for part, first in zip(model.parts, corners)])
-    if not np.ptp(vertices[faces], axis=(0, 1)).max() > 0:
-        raise InputError(f"{path} has no triangles with an area; give a mesh with faces.")
+def _file_notes(path: Path, folder: MeshFolder, reader: _Reader) -> list[str]:
+    notes = [f"{path.name}: {name} is missing; a constant takes its place." for name in folder.missing]
+    return notes + [f"{path.name}: a texture cannot be read; a constant takes its place."] * reader.textures.damaged
+
+
+def _checked(parts: list[Body], path: Path, notes: list[str]) -> Model:
+    """The model with its base at the origin, its faces to the outside, and warnings of what is wrong with it."""
+    corners = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    faces = np.concatenate([part.faces + first for part, first in zip(parts, corners)])
     open_edges, crowded = edge_faults(vertices, faces)
-    notes = [f"{path.name}: {name} is missing; a constant takes its place." for name in dict.fromkeys(folder.missing)]
-    notes += [f"{path.name}: a texture cannot be read; a constant takes its place."] * bool(folder.damaged)
-    notes += [f"{path.name}: {', '.join(left_out)} left out."] * bool(left_out)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
-    turned = np.split(inside_out(vertices, faces), np.cumsum([len(part.faces) for part in model.parts])[:-1])
-    parts = tuple(_turned(part, which) for part, which in zip(model.parts, turned))
-    return replace(model, parts=parts, warnings=tuple(notes), closed=open_edges == 0)
-
-
-def _turned(body: Body, which: Array) -> Body:
-    """The body with those of its faces [F] the other way round; they share no corner with others."""
-    if not which.any():
-        return body
-    faces, normals = body.faces.copy(), body.normals.copy()
-    faces[which] = faces[which][:, ::-1]
-    corners = np.unique(faces[which])
-    normals[corners] = -normals[corners]
-    return replace(body, faces=np.ascontiguousarray(faces), normals=normals)
-
-
-def _z_up(body: Body) -> Body:
-    turn = lambda v: np.ascontiguousarray(np.stack([v[:, 0], v[:, 2], -v[:, 1]], -1))  # noqa: E731
-    return replace(body, vertices=turn(body.vertices), normals=turn(body.normals))
-
-
-def _area(vertices: Array, faces: Array) -> Array:
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+    base = np.float32([0, vertices[:, 1].min(), 0])
+    parts = [replace(part, vertices=part.vertices - base) for part in parts]
+    if not open_edges and not crowded and volume(vertices, faces) < 0:
+        parts = [
+            replace(part, faces=np.ascontiguousarray(part.faces[:, ::-1]), normals=-part.normals) for part in parts
+        ]
+    return Model(tuple(parts), path.stem, tuple(dict.fromkeys(notes)), open_edges == 0)
 
 
 def _unit(vectors: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), [0.0, 1.0, 0.0])
+    return np.where(length > 1e-30, vectors / np.maximum(length, 1e-30), [0.0, 1.0, 0.0])
