@@ -149,5 +149,5 @@ def _numbers(value: Any, otherwise: tuple[float, ...]) -> Array:
     try:
         found = np.asarray([] if value is None else value, np.float32).ravel()
     except (TypeError, ValueError):
-        found = np.zeros(0)
+        found = np.zeros(0, np.float32)
     return np.asarray(found if len(found) == len(otherwise) else otherwise, np.float32)

@@ -316,7 +316,7 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> Model:
     open_edges, crowded = edge_faults(vertices, faces)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
-    base = np.float32([0, vertices[:, 1].min(), 0])
+    base = np.array([0, vertices[:, 1].min(), 0], np.float32)
     parts = [replace(part, vertices=part.vertices - base) for part in parts]
     if not open_edges and not crowded and volume(vertices, faces) < 0:
         parts = [
