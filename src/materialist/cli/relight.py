@@ -114,7 +114,7 @@ def relight(
         "spp": spp, "seed": seed, "denoise": denoise, "device": device.value, "full_render": full_render,
     }  # fmt: skip
     if frames is not None:
-        moving = {**options, "turn": rotate or 0.0, "suns": tuple(suns), "lamps": lamps}
+        moving = {**options, "rotate": rotate or 0.0, "suns": tuple(suns), "lamps": lamps}
         _video(loaded, output, frames, moving, shared, fps, as_json, force)
         return
     edited = change(loaded, rotate=rotate or 0.0, sun=suns[0] if suns else None, lamps=lamps, **options)

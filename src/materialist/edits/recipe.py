@@ -10,19 +10,19 @@ from materialist.edits.drop.drop_rest import settle
 from materialist.edits.glass.glass import OPEN, glass
 from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.insert import insert
-from materialist.edits.light.relight import lamp, read_envmap, relight
+from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.remove.background import without
 from materialist.edits.remove.hole import told_shadow
 from materialist.edits.select.select import select
 from materialist.errors import InputError, OutputError
 from materialist.option_kinds import OperationOptions, declarations, parse_colour
-from materialist.options import MaterialEdit
+from materialist.options import MaterialEdit, Relight
 from materialist.types import Array, Scene
 
 REGION = ("mask", "click", "box", "with")
 MATERIAL = tuple(declarations(MaterialEdit))
-LIGHT = ("envmap", "gain", "rotate", "sun", "sun_power", "ambient", "dim", "lamps", *REGION)
+LIGHT = (*(name for name in declarations(Relight) if name != "lights"), *REGION)
 INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
 DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
 REMOVE = ("background", "inpaint", "shadow", "grow", "seed")
@@ -32,7 +32,7 @@ KINDS = {
     "remove": (*REGION, *REMOVE),
 }  # fmt: skip
 """Kind of step -> what it may say."""
-OPTIONS: dict[str, type[OperationOptions]] = {"edit": MaterialEdit}
+OPTIONS: dict[str, type[OperationOptions]] = {"edit": MaterialEdit, "relight": Relight}
 
 
 ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
@@ -195,27 +195,13 @@ def _options(step: Step) -> Any:
 
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
-    given = step.options
-    if not given:
+    if not step.options:
         raise InputError("A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim.")
-    for name, needed in (("gain", "envmap"), ("sun_power", "sun")):
-        if name in given and needed not in given:
-            raise InputError(f"relight: {name} says nothing without {needed}; give that, too, or leave {name} out.")
-    options: dict[str, Any] = {k: _number(given[k], k) for k in ("rotate", "sun_power", "ambient", "dim") if k in given}
-    region = [name for name in REGION if name in given]
-    if region and "dim" not in given:
+    region = [name for name in REGION if name in step.options]
+    if region and "dim" not in step.options:
         raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
-    if region:
-        options["lights"] = region_of(scene, step)
-    if "envmap" in given:
-        options["envmap"] = read_envmap(_file(step, "envmap"))
-        gain = given.get("gain", "auto")
-        options["gain"] = gain if gain == "auto" else _number(gain, "gain")
-    if "sun" in given:
-        options["sun"] = _numbers(given["sun"], 2, "sun")
-    if "lamps" in given:
-        options["lamps"] = [lamp(scene, *_numbers(one, 5, "lamp")) for one in _list_of(given["lamps"])]
-    return relight(edited, **options, fitted=scene)
+    wanted = _options(step)
+    return relight(edited, wanted, lights=region_of(scene, step) if region else None, fitted=scene)
 
 
 def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:

@@ -193,7 +193,7 @@ def _turntable(progress: Progress, loaded: Scene, edited: Scene, output: Path, *
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
-    scenes = list(moving_light(edited, frames, turn=360.0))
+    scenes = list(moving_light(edited, frames, rotate=360.0))
     write_frames(output, pictures(loaded, scenes, spp=spp, progress=progress), fps=12, force=True)
 
 

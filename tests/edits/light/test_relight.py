@@ -160,7 +160,7 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
     path = [s.lamps[0] for s in moving_light(SCENE, 3, lamps=tuple(ends))]
     np.testing.assert_allclose([path[0].position, path[2].position], [e.position for e in ends])
     np.testing.assert_allclose(path[1].power, np.mean([e.power for e in ends], 0))
-    more = [s.envmap for s in moving_light(SCENE, 4, turn=450)]
+    more = [s.envmap for s in moving_light(SCENE, 4, rotate=450)]
     np.testing.assert_allclose(more[3], rotated(SCENE.envmap, 450), atol=1e-6)  # by as much as was asked
     np.testing.assert_allclose(more[1], rotated(SCENE.envmap, 150), atol=1e-6)
     suns = list(moving_light(SCENE, 2, suns=((0, 20), (90, 40))))

@@ -96,11 +96,9 @@ def dimmed(
         fitted: the scene before its edits, whose rendering is the photo: the lights are found in it.
 
     Raises:
-        InputError: the scene is edited, and `fitted` is not given; dim is not in [0, 10], no clipped region of the
-            photo is large enough, or the mask has another size or no surface in it.
+        InputError: the scene is edited, and `fitted` is not given; no clipped region of the photo is large enough, or
+            the mask has another size or no surface in it.
     """
-    if not (np.isfinite(dim) and 0 <= dim <= 10):
-        raise InputError(f"The dimming is {dim:g}; it must lie in [0, 10], 1 for as it is, 0 for off.")
     if any(body.name.startswith(PHOTO_LIGHT) for body in scene.bodies):
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")
     if fitted is None and is_edited(scene):

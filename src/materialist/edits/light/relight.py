@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
 from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
+from materialist.options import Relight
 from materialist.types import Array, Lamp, Scene
 
 SUN_RADIUS = 1.5
@@ -23,67 +25,57 @@ LAMP_RADIUS = 0.015
 """Radius of a lamp as a share of the scene's median depth."""
 
 
-def relight(
-    scene: Scene,
-    *,
-    dim: float | None = None,
-    lights: Array | None = None,
-    envmap: Array | None = None,
-    gain: float | str = 1.0,
-    rotate: float = 0.0,
-    sun: tuple[float, float] | None = None,
-    sun_power: float = 1.0,
-    ambient: float = 1.0,
-    lamps: tuple[Lamp, ...] | list[Lamp] = (),
-    fitted: Scene | None = None,
-) -> Scene:
-    """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of arguments.
+def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Any) -> Scene:
+    """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of `Relight`.
+
+    Dimmed lights become surfaces that glow and stay where they are, whatever happens to the light from around. A sun
+    replaces the brightest spot of the map (see `with_sun`), and `ambient` does not act on it.
 
     Args:
-        dim: factor on lights that the photo shows, in [0, 10]; see `glows.dimmed`. They become surfaces that glow and
-            stay where they are, whatever happens to the light from around.
-        lights: [H, W] bool: the lights that `dim` means, at working size; None takes those that are found.
-        envmap: [h, 2h, 3] linear radiance >= 0 in place of the fitted light, in the project's convention.
-        gain: factor on `envmap`; "auto" gives it the fitted map's mean light, for captures of unknown exposure.
-        rotate: turn of the light about the vertical, degrees; > 0 moves what is in front of the camera to its right.
-        sun: (azimuth, elevation) in degrees, see `with_sun`; it replaces the brightest spot of the map.
-        sun_power: irradiance of the sun on a surface that faces it, relative to that of the light before.
-        ambient: factor on the environment map (not on its new sun), 0 for lamps alone.
-        lamps: glowing spheres to add; make them with `lamp`.
+        options, values: see `options.Relight`; `values` are fields of it, as in `relight(scene, rotate=90)`.
         fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
 
     Raises:
         InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
     """
-    for name, amount, high in (("ambient", ambient, 1e4), ("sun power", sun_power, 1e4)):
-        if not (np.isfinite(amount) and 0 <= amount <= high):
-            raise InputError(f"The {name} is {amount}; it must lie in [0, {high:g}].")
-    if dim is not None:
+    wanted = resolved(scene, Relight.given(options, **values))
+    if wanted.dim is not None:
         from materialist.edits.light.emitters import dimmed
 
-        scene = dimmed(scene, dim, lights=lights, fitted=fitted)
-    elif lights is not None:
+        scene = dimmed(scene, wanted.dim, lights=wanted.lights, fitted=fitted)
+    elif wanted.lights is not None:
         raise InputError("The mask of lights says nothing without a dimming; give dim, too.")
-    light = scene.envmap
-    if envmap is not None:
-        light = checked_envmap(envmap) * _gain(gain, envmap, scene.envmap)
-    if rotate:
-        light = rotated(light, rotate)
+    light, lamps = scene.envmap, wanted.lamps
+    if wanted.envmap is not None:
+        light = wanted.envmap * _gain(wanted.gain, wanted.envmap, scene.envmap)
+    if wanted.rotate:
+        light = rotated(light, wanted.rotate)
     disc = np.zeros_like(light)
-    if sun is not None:
-        light, disc = with_sun(light, *sun, power=sun_power)
-    light = (light * np.float32(ambient) + disc).astype(np.float32)
+    if wanted.sun is not None:
+        light, disc = with_sun(light, *wanted.sun, power=wanted.sun_power)
+    light = (light * np.float32(wanted.ambient) + disc).astype(np.float32)
     if not light.any() and not (lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)):
         raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
     what = {
-        "envmap": None if envmap is None else list(np.shape(envmap)), "gain": gain if envmap is not None else None,
-        "rotate": rotate or None, "sun": sun, "ambient": ambient if ambient != 1 else None, "lamps": len(lamps) or None,
-        "dim": dim,
+        "envmap": None if wanted.envmap is None else list(np.shape(wanted.envmap)),
+        "gain": wanted.gain if wanted.envmap is not None else None, "rotate": wanted.rotate or None, "sun": wanted.sun,
+        "ambient": wanted.ambient if wanted.ambient != 1 else None, "lamps": len(lamps) or None, "dim": wanted.dim,
     }  # fmt: skip
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
     return noted(
         warned(new, *_warnings(scene)), "light", {name: value for name, value in what.items() if value is not None}
     )
+
+
+def resolved(scene: Scene, options: Relight) -> Any:
+    """The options with the environment map [h, 2h, 3] itself, its gain, and `types.Lamp` objects. Raises InputError."""
+    envmap, gain = options.envmap, options.gain
+    if isinstance(envmap, str | Path):
+        envmap, gain = read_envmap(envmap), "auto" if gain is None else gain
+    elif envmap is not None:
+        envmap, gain = checked_envmap(envmap), 1.0 if gain is None else gain
+    lamps = tuple(one if isinstance(one, Lamp) else lamp(scene, *one) for one in options.lamps)
+    return replace(options, envmap=envmap, gain=gain, lamps=lamps)
 
 
 def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: float) -> Lamp:
@@ -203,12 +195,11 @@ def _angle_to(rows: int, azimuth: float, elevation: float) -> Array:
 
 
 def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
-    if gain == "auto":
-        mean = lambda e: float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())  # noqa: E731
-        return np.float32(mean(np.asarray(fitted)) / mean(np.asarray(envmap)))
-    if isinstance(gain, str) or not (np.isfinite(gain) and 0 < gain <= 1e6):
-        raise InputError(f"The gain is {gain!r}; it must be a number above 0, or auto.")
-    return np.float32(gain)
+    """The factor on `envmap`; `auto` gives it the mean light of the fitted map."""
+    if gain != "auto":
+        return np.float32(gain)
+    mean = lambda e: float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())  # noqa: E731
+    return np.float32(mean(np.asarray(fitted)) / mean(np.asarray(envmap)))
 
 
 def _warnings(scene: Scene) -> list[str]:
