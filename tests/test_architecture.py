@@ -100,7 +100,8 @@ NETWORKS = (
     "predict.refraction.",
     "predict.clicks.",
     "predict.unet",
-    "predict.lite",
+    "predict.efficientnet",
+    "predict.network",
 )
 """Networks need torch at their top; whoever calls them imports them late."""
 LIGHT_START = ("", "types", "errors", "color", "camera", "option_kinds", "options", "plain", "cli")

@@ -14,7 +14,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.metrics.lpips import lpips
-from materialist.predict.bundled.network import Architecture, BundledNetwork
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.normals import normals_from_depth
 from materialist.procedural.dataset import CONTENT, options_for, read_description
 from materialist.procedural.sample import make_sample
@@ -136,7 +136,7 @@ def test_times_of_a_known_wait():
 
 
 def test_the_forward_pass_alone():
-    tiny = Architecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+    tiny = BundledArchitecture((8, 8, 16, 32), (1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
     seen = []
     network = BundledNetwork(tiny).eval()
     network.register_forward_pre_hook(lambda _, inputs: seen.append([tuple(t.shape) for t in inputs]))

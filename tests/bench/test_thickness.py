@@ -8,15 +8,15 @@ import trimesh
 
 from materialist import bench
 from materialist.errors import InputError
-from materialist.predict.refraction import weights
-from materialist.predict.refraction.network import Architecture, RefractionNet
+from materialist.predict.refraction.network import RefractionNet
+from materialist.predict.unet import UNetArchitecture
 
 
 @pytest.fixture
 def plain(tmp_path):
     """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
     torch.manual_seed(0)
-    weights.save(tmp_path / "plain.safetensors", RefractionNet(Architecture((8,) * 5, (1,) * 5)), {"step": 0})
+    RefractionNet(UNetArchitecture((8,) * 5, (1,) * 5)).save(tmp_path / "plain.safetensors", {"step": 0})
     return str(tmp_path / "plain.safetensors")
 
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
-from materialist.predict.bundled import weights
+from materialist.predict.bundled.network import BundledNetwork
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +31,10 @@ def test_one_step_and_its_weights(data, tmp_path):
     assert again["step"] == 2
     written = _call("export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--json")
     assert written["step"] == 2 and written["megabytes"] < 40, "what the package can hold"
-    assert weights.load(tmp_path / "w.safetensors")[1]["data"] == {"samples": 5, "seed": [5, 5]}
+    assert BundledNetwork.load(tmp_path / "w.safetensors")[1]["data"] == {"samples": 5, "seed": [5, 5]}
     mixed = ("-o", tmp_path / "mean.safetensors", "--average-with", tmp_path / "w.safetensors", "--json")
     _call("export", tmp_path / "run", *mixed)
-    assert "averaged with" in weights.load(tmp_path / "mean.safetensors")[1]
+    assert "averaged with" in BundledNetwork.load(tmp_path / "mean.safetensors")[1]
 
 
 @pytest.mark.parametrize(

@@ -4,18 +4,16 @@ import pytest
 import torch
 
 from materialist.errors import WeightsError
-from materialist.predict import own_weights
-from materialist.predict.bundled import weights
-from materialist.predict.bundled.network import Architecture, BundledNetwork
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.clicks.network import ClickNet
-from materialist.predict.unet import Architecture as Widths
+from materialist.predict.unet import UNetArchitecture
 from materialist.train.start import fill
 
 TINY = {"widths": (8, 8, 16, 32), "blocks": (1, 1, 1, 1), "attention": 1, "decoder_blocks": (1, 1, 1), "fine": 8}
 
 
 def bundled(**more):
-    return BundledNetwork(Architecture(**TINY, **more)).eval()
+    return BundledNetwork(BundledArchitecture(**TINY, **more)).eval()
 
 
 def answers(network):
@@ -27,7 +25,7 @@ def answers(network):
 def test_a_network_without_encoder_goes_on_as_it_was(tmp_path):
     torch.manual_seed(0)
     before = bundled()
-    weights.save(tmp_path / "w.safetensors", before, {})
+    before.save(tmp_path / "w.safetensors", {})
     after = bundled(encoder="lite2")
     fill(after, tmp_path / "w.safetensors")
     for name, value in answers(before).items():
@@ -39,7 +37,7 @@ def test_what_the_encoder_tells_is_taken_on(tmp_path):
     before = bundled(encoder="lite2")
     for parameter in before.told.parameters():
         torch.nn.init.normal_(parameter, 0, 0.1)
-    weights.save(tmp_path / "w.safetensors", before, {})
+    before.save(tmp_path / "w.safetensors", {})
     after = bundled(encoder="lite2")
     fill(after, tmp_path / "w.safetensors")
     assert (answers(after)["depth"] - answers(before)["depth"]).abs().max() < 0.01
@@ -49,16 +47,15 @@ def test_what_the_encoder_tells_is_taken_on(tmp_path):
 
 def test_the_encoder_is_not_stored_with_a_network(tmp_path):
     torch.manual_seed(0)
-    network = ClickNet(Widths((8, 8, 8, 8, 8), (1, 1, 1, 1, 1), "lite2"))
-    own_weights.save(tmp_path / "w.safetensors", network, "kind", {"step": 1})
+    network = ClickNet(UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1), "lite2"))
+    network.save(tmp_path / "w.safetensors", {"step": 1})
     assert (tmp_path / "w.safetensors").stat().st_size < 300_000
-    build = lambda values: ClickNet(Widths.from_dict(values))  # noqa: E731
-    found, facts = own_weights.load(tmp_path / "w.safetensors", "kind", build, "again")
+    found, facts = ClickNet.load(tmp_path / "w.safetensors")
     assert facts == {"step": 1}
     torch.testing.assert_close(found.encoder.stem.weight, network.encoder.stem.weight)
 
 
 def test_other_weights_are_refused(tmp_path):
-    weights.save(tmp_path / "w.safetensors", bundled(), {})
+    bundled().save(tmp_path / "w.safetensors", {})
     with pytest.raises(WeightsError, match="is not a checkpoint of BundledNetwork"):
-        fill(BundledNetwork(Architecture(**(TINY | {"fine": 16}))), tmp_path / "w.safetensors")
+        fill(BundledNetwork(BundledArchitecture(**(TINY | {"fine": 16}))), tmp_path / "w.safetensors")

@@ -14,8 +14,7 @@ import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
 from materialist.io.samples import SampleFolder
-from materialist.predict.bundled import weights
-from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint, stream
@@ -127,16 +126,16 @@ def test_the_mean_with_other_weights_is_exported(run, tmp_path):
     folder, _ = run
     alone, other, mean = (tmp_path / f"{name}.safetensors" for name in ("alone", "other", "mean"))
     export_run(folder, alone)
-    network, facts = weights.load(alone)
+    network, facts = BundledNetwork.load(alone)
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.5
-    weights.save(other, network, facts)
+    network.save(other, facts)
     export_run(folder, mean, average_with=other)
-    found, told = weights.load(mean)
+    found, told = BundledNetwork.load(mean)
     assert told["averaged with"] == sha256(other)[:16] and "scores" not in told
     mixed = found.state_dict()
-    for name, tensor in weights.load(alone)[0].named_parameters():
+    for name, tensor in BundledNetwork.load(alone)[0].named_parameters():
         torch.testing.assert_close(mixed[name], tensor + 0.25, atol=4e-3, rtol=4e-3)
 
 
@@ -144,7 +143,7 @@ def test_no_mean_with_another_network(run, tmp_path):
     file, other = tmp_path / "w.safetensors", tmp_path / "other.safetensors"
     with pytest.raises(WeightsError, match=r"no weights at .*nowhere"):
         export_run(run[0], file, average_with=tmp_path / "nowhere.safetensors")
-    weights.save(other, BundledNetwork(Architecture.from_dict({**made_runs.NETWORK, "fine": 16})), {})
+    BundledNetwork(BundledArchitecture.from_dict({**made_runs.NETWORK, "fine": 16})).save(other, {})
     with pytest.raises(WeightsError, match="differ in fine; give weights of the same"):
         export_run(run[0], file, average_with=other)
     state = checkpoint.load(run[0])

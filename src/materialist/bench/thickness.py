@@ -45,14 +45,14 @@ class ThicknessBench(Benchmark):
         if data is not None and not (data / "meshes").is_dir():
             raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
         from materialist.predict.refraction import WEIGHTS
-        from materialist.predict.refraction.weights import load
+        from materialist.predict.refraction.network import RefractionNet
         from materialist.procedural.thickness.dataset import Plan
         from materialist.procedural.thickness.dataset import views as lessons_of
         from materialist.procedural.thickness.errors import of_meshes
         from materialist.render.variant import setup
 
         setup("cpu")
-        network, _ = load(Path(self.weights) if self.weights else WEIGHTS)
+        network, _ = RefractionNet.load(Path(self.weights) if self.weights else WEIGHTS)
         rows: list[dict[str, Any]] = []
         report = Report("Thickness and back of objects", NOTE, self.settings(data), COLUMNS, rows, ("solid", "back"))
         for k in range(self.shapes):

@@ -54,8 +54,7 @@ def download_model(
 ) -> None:
     """Fetch a model and check it against the hub's checksums; an interrupted download is taken up again."""
     from materialist.cli.progress import StageProgress
-    from materialist.predict.download import adopt, download
-    from materialist.predict.models import hub_model
+    from materialist.predict.models import adopt, download, hub_model
 
     if source is not None:
         folder, taken = adopt(hub_model(name), source)

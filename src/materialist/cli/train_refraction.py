@@ -60,7 +60,7 @@ def refraction(
     train, aside = folder / "train", folder / "heldout"
     plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
     if not data_only:
-        from materialist.predict.refraction.weights import load
+        from materialist.predict.refraction.network import RefractionNet
         from materialist.train import checkpoint
         from materialist.train.budget import Budget
         from materialist.train.refraction.trainer import Recipe, Trainer
@@ -72,7 +72,7 @@ def refraction(
             note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
             init = None
         elif init is not None:
-            load(init)
+            RefractionNet.load(init)
     with StageProgress(quiet=as_json) as progress:
         seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
         if data_only:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import SetupError, WeightsError
-from materialist.predict.models import CHECKSUMS, INSTEAD, KNOWN, hub_model, is_hub_id, require
-from materialist.predict.weights import SHOWN, verify_folder
+from materialist.predict.models import KNOWN, hub_model, is_hub_id, require
+from materialist.predict.weights import CHECKSUMS, INSTEAD, SHOWN, verify_folder
 
 INSTALL = "pip install 'materialist[hub]'"
 

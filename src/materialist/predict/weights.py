@@ -1,21 +1,24 @@
-"""Files of weights: checked by checksum, read without running code, and compared with what a network needs."""
+"""Files of weights: checksums, reading without running code, writing, and loading into a network that fits exactly."""
 
 from __future__ import annotations
 
 import hashlib
 import pickle
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from materialist.errors import WeightsError
-from materialist.predict.models import CHECKSUMS, INSTEAD
 
 if TYPE_CHECKING:
     from torch import Tensor, nn
 
+INSTEAD = "use another predictor (--predictor auto), or read another tool's maps with --predictor maps:DIR"
+"""Advice for a person who lacks the network in question."""
+CHECKSUMS = "SHA256SUMS"
+"""List beside every download: one line a file, as `sha256sum` writes and checks them."""
 SHOWN = 4
-"""Tensors that a message names before it only counts."""
+"""Names of tensors or files in a message before it only counts them."""
 WRAPPERS = ("state_dict", "model_state_dict", "model", "network")
 """Keys under which training scripts put the tensors."""
 
@@ -39,14 +42,19 @@ def read_checksums(folder: Path) -> dict[str, str]:
     return {name.lstrip("*"): digest.lower() for digest, name in pairs}
 
 
-def verify_file(path: Path, name: str | None = None, folder: Path | None = None) -> str:
-    """The file's sha256, which must be the one in the list beside it when that names it.
+def write_checksums(folder: Path, names: Iterable[str]) -> None:
+    """Write the list for these files of the folder; a download without it is not complete."""
+    lines = [f"{sha256(folder / name)}  {name}\n" for name in sorted(names)]
+    (folder / CHECKSUMS).write_text("".join(lines), "utf-8")
 
-    `name` is the file's name in the list of `folder`; without them, its own name in its own folder.
+
+def verify_file(path: Path, expected: str | None = None) -> str:
+    """The file's sha256, which must be `expected`, or the digest in the list beside the file where that names it.
+
     Raises WeightsError, with both digests, when they differ.
     """
     digest = sha256(path)
-    expected = read_checksums(folder or path.parent).get(name or path.name)
+    expected = expected or read_checksums(path.parent).get(path.name)
     if expected and expected != digest:
         raise WeightsError(
             f"{path} is damaged: its sha256 is {digest}, expected {expected}; fetch it again "
@@ -63,8 +71,8 @@ def verify_folder(folder: Path) -> str:
     missing = [name for name in listed if not (folder / name).is_file()]
     if missing:
         raise WeightsError(f"{folder} lacks {_some(missing)}; fetch the model again (materialist models download).")
-    for name in listed:
-        verify_file(folder / name, name, folder)
+    for name, digest in listed.items():
+        verify_file(folder / name, digest)
     return hashlib.sha256("\n".join(f"{listed[n]} {n}" for n in sorted(listed)).encode()).hexdigest()
 
 
@@ -152,6 +160,28 @@ def load_weights(network: nn.Module, state: Mapping[str, Tensor], path: Path) ->
     if broken:
         raise WeightsError(f"{path} has NaN or infinite values in {_some(broken)}; fetch or train it again.")
     network.load_state_dict({name: tensor.float() for name, tensor in state.items()}, strict=True)
+
+
+def write_weights(path: Path, tensors: Mapping[str, Tensor], texts: dict[str, str]) -> None:
+    """Write tensors as float16, with `texts` in the header, whole or not at all."""
+    import torch
+    from safetensors.torch import save_file
+
+    half = {name: tensor.detach().cpu().to(torch.float16).contiguous() for name, tensor in tensors.items()}
+    partial = path.with_name(path.name + ".part")
+    save_file(half, str(partial), texts)
+    partial.replace(path)
+
+
+def metadata(path: Path) -> dict[str, str]:
+    """The texts in the header of a .safetensors file; empty for other files."""
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(str(path), framework="pt") as file:
+            return file.metadata() or {}
+    except (SafetensorError, OSError, ValueError):
+        return {}
 
 
 def _some(names: list[str]) -> str:

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.predict.bundled.network import Architecture, BundledNetwork
-from materialist.predict.bundled.weights import load, save
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.matnet.predictor import FORMAT
-from materialist.predict.own_weights import write
-from materialist.predict.weights import sha256
+from materialist.predict.weights import sha256, write_weights
 from materialist.train import checkpoint
 from materialist.train.trainer import KIND, SCORES
 
@@ -50,11 +48,11 @@ def export_run(run: Path, output: Path, *, average_with: Path | None = None, for
 
     try:
         if state["recipe"]["task"] == "paper":
-            write(output, tensors, {"format": FORMAT, "facts": json.dumps(facts)})
+            write_weights(output, tensors, {"format": FORMAT, "facts": json.dumps(facts)})
         else:
-            network = BundledNetwork(Architecture.from_dict(state["recipe"]["network"]))
+            network = BundledNetwork(BundledArchitecture.from_dict(state["recipe"]["network"]))
             network.load_state_dict(tensors)
-            save(output, network, facts)
+            network.save(output, facts)
     except (OSError, SafetensorError) as error:  # the writer has its own for a folder that is not there
         raise OutputError(f"The weights cannot be written to {output}: {error}.") from error
     return {
@@ -69,8 +67,8 @@ def _mean(tensors: dict[str, Any], path: Path, network: dict[str, Any]) -> dict[
     """Tensors half way to those in an exported file of the same network."""
     if not path.is_file():
         raise WeightsError(f"There are no weights at {path}; give a file of materialist train export.")
-    other, _ = load(path)
-    own = Architecture.from_dict(network)
+    other, _ = BundledNetwork.load(path)
+    own = BundledArchitecture.from_dict(network)
     if other.architecture != own:
         differing = [n for n, value in own.as_dict().items() if other.architecture.as_dict()[n] != value]
         raise WeightsError(f"{path} and the run differ in {', '.join(differing)}; give weights of the same network.")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from torch import nn
 
-from materialist.predict.own_weights import shared
+from materialist.predict.network import shared_tensors
 from materialist.predict.weights import load_weights, read_state
 
 WITH_ENCODER = ("told.",)
@@ -21,4 +21,4 @@ def fill(network: nn.Module, init: Path) -> None:
     Raises WeightsError for a file that is damaged or of another architecture.
     """
     fresh = {name: tensor for name, tensor in network.state_dict().items() if name.startswith(WITH_ENCODER)}
-    load_weights(network, fresh | dict(read_state(init)) | shared(network), init)
+    load_weights(network, fresh | dict(read_state(init)) | shared_tensors(network), init)

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from materialist.io.samples import Sample
 from materialist.predict.bundled.inference import infer
-from materialist.predict.bundled.network import Architecture, BundledNetwork, srgb
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
 from materialist.procedural.photographic import as_photo
 from materialist.train import losses, start
 from materialist.train.augment import augment
@@ -69,7 +69,7 @@ class BundledTask:
 
     def network(self, recipe: Recipe) -> nn.Module:
         """A network of the recipe's architecture, to begin from."""
-        network = BundledNetwork(Architecture.from_dict(recipe.network))
+        network = BundledNetwork(BundledArchitecture.from_dict(recipe.network))
         if self.init is not None:
             start.fill(network, self.init)
         return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -10,12 +10,12 @@ from safetensors.torch import load_file, save_file
 from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
 from materialist.errors import WeightsError
-from materialist.predict.bundled import inference, weights
-from materialist.predict.bundled.network import Architecture, BundledNetwork, encode
+from materialist.predict.bundled import inference
+from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, encode
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.types import Camera, Photo
 
-TINY = Architecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+TINY = BundledArchitecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def network():
 @pytest.fixture
 def file(network, tmp_path):
     path = tmp_path / "own.safetensors"
-    weights.save(path, network, {"step": 7})
+    network.save(path, {"step": 7})
     return path
 
 
@@ -142,7 +142,7 @@ def test_specks_are_taken_for_their_surroundings():
 
 
 def test_weights_round_trip(network, file):
-    loaded, facts = weights.load(file)
+    loaded, facts = BundledNetwork.load(file)
     assert facts == {"step": 7} and loaded.architecture == TINY
     for name, tensor in network.state_dict().items():
         torch.testing.assert_close(loaded.state_dict()[name], tensor, atol=1e-3, rtol=1e-3)
@@ -162,7 +162,7 @@ def test_bad_weights_are_refused(file, tmp_path):
         BundledPredictor(broken)
     tensors = load_file(file)
     tensors["head.bias"] = torch.full_like(tensors["head.bias"], float("nan"))
-    meta = {"format": weights.FORMAT, "architecture": json.dumps(TINY.as_dict()), "facts": "{}"}
+    meta = {"format": BundledNetwork.FORMAT, "architecture": json.dumps(TINY.as_dict()), "facts": "{}"}
     save_file(tensors, broken, meta)
     with pytest.raises(WeightsError, match="NaN"):
         BundledPredictor(broken)

@@ -6,14 +6,13 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
-from materialist.predict.clicks import weights
 from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.clicks.segment import LEAST, SIDE, Photo, _around, object_at
-from materialist.predict.unet import Architecture
+from materialist.predict.unet import UNetArchitecture
 from materialist.types import Camera
 
-SMALL = Architecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
+SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 DISTANCE, SPOT, COSINE = -1, -2, -3
 COLOUR = slice(8, 11)
 
@@ -44,7 +43,7 @@ def untrained(tmp_path_factory):
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, 0, 0.1)
     path = tmp_path_factory.mktemp("weights") / "w.safetensors"
-    weights.save(path, network, {"step": 7})
+    network.save(path, {"step": 7})
     return path
 
 
@@ -123,7 +122,7 @@ def test_bad_input(untrained, tmp_path):
 
 
 def test_weights_keep_what_they_are(untrained):
-    network, facts = weights.load(untrained)
+    network, facts = ClickNet.load(untrained)
     assert network.architecture == SMALL and facts["step"] == 7 and not network.training
     maps = torch.zeros(2, CHANNELS, 64, 32)
     assert network(maps).shape == (2, 64, 32)

@@ -6,13 +6,14 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
-from materialist.predict.refraction import WEIGHTS, thickness, weights
+from materialist.predict.refraction import WEIGHTS, thickness
 from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
-from materialist.predict.refraction.network import LEAST, Architecture, RefractionNet
+from materialist.predict.refraction.network import LEAST, RefractionNet
+from materialist.predict.unet import UNetArchitecture
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 
-SMALL = Architecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
+SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 
 
 def ball(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
@@ -35,7 +36,7 @@ def ball(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
 def plain(tmp_path):
     """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
     torch.manual_seed(0)
-    weights.save(tmp_path / "plain.safetensors", RefractionNet(SMALL), {"step": 0})
+    RefractionNet(SMALL).save(tmp_path / "plain.safetensors", {"step": 0})
     return tmp_path / "plain.safetensors"
 
 

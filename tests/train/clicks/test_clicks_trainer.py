@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from materialist.cli import app
 from materialist.errors import InputError, OutputError
-from materialist.predict.clicks import weights
 from materialist.predict.clicks.features import CHANNELS
+from materialist.predict.clicks.network import ClickNet
 from materialist.train import checkpoint
 from materialist.train.budget import Budget
 from materialist.train.clicks import views
@@ -86,7 +86,7 @@ def test_it_learns_resumes_and_leaves_weights(folder, tmp_path):
     resumed = Trainer(run, folder, budget=Budget(steps=2), recipe=RECIPE, resume=True)
     assert resumed.clock.step == 3
     resumed.run()
-    network, facts = weights.load(run / "weights.safetensors")
+    network, facts = ClickNet.load(run / "weights.safetensors")
     assert facts["step"] == 5 and facts["recipe"]["last_side"] == 64
     with torch.inference_mode():
         assert network(torch.zeros(1, CHANNELS, 32, 32)).shape == (1, 32, 32)

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError, OutputError
-from materialist.predict.refraction import weights
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness import dataset as lessons
 from materialist.procedural.thickness import errors as scores
 from materialist.train import checkpoint
@@ -56,7 +56,7 @@ def test_it_learns_resumes_and_leaves_weights(views, tmp_path):
     assert resumed.clock.step == 3
     figures = resumed.run()
     assert figures.keys() >= {"solid", "symmetry", "hollow", "back", "back_symmetry"}
-    network, facts = weights.load(run / "weights.safetensors")
+    network, facts = RefractionNet.load(run / "weights.safetensors")
     assert facts["step"] == 6 and facts["recipe"]["batch"] == 4
     again = scores.score(network, lessons.load(views))
     assert again["solid"] == pytest.approx(figures["solid"], rel=1e-2)

@@ -9,7 +9,7 @@ import numpy as np
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.background import Inpaint
 from materialist.errors import InputError, SetupError, WeightsError
-from materialist.predict.models import INSTEAD
+from materialist.predict.weights import INSTEAD
 from materialist.types import Array
 
 DEFAULT = "stable-diffusion-v1-5/stable-diffusion-inpainting"

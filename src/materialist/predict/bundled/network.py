@@ -8,14 +8,14 @@ whole picture. Everything is relative to the camera rays, so that any field of v
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.predict.lite import level, shipped
+from materialist.predict.efficientnet import shipped, unit_power
+from materialist.predict.network import Architecture, ResidualBlock, StoredNetwork, group_norm
 
 STRIDE = 32
 """Sides of the input are multiples of this."""
@@ -28,7 +28,7 @@ LOG_FLOOR = 2.0**-7
 
 
 @dataclass(frozen=True)
-class Architecture:
+class BundledArchitecture(Architecture):
     """Widths and depths; stored with the weights."""
 
     widths: tuple[int, int, int, int] = (64, 128, 192, 256)
@@ -42,38 +42,30 @@ class Architecture:
     fine: int = 32
     """Channels at 1/2."""
     encoder: str = ""
-    """Variant of EfficientNet-Lite (`predict.lite`) whose features are read beside the photo; "" for none."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain lists and numbers, for JSON."""
-        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Architecture:
-        """The inverse of `as_dict`; raises TypeError for unknown names."""
-        plain: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-        return cls(**plain)
+    """Variant of EfficientNet-Lite (`predict.efficientnet`) whose features are read beside the photo; "" for none."""
 
 
-class BundledNetwork(nn.Module):
+class BundledNetwork(StoredNetwork):
     """Photo and camera rays in, all maps out."""
 
-    def __init__(self, architecture: Architecture | None = None):
-        super().__init__()
-        self.architecture = a = architecture or Architecture()
-        w = a.widths
-        self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), _norm(w[0]), nn.SiLU())
-        self.levels = nn.ModuleList(nn.Sequential(*(_Block(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
+    FORMAT, COMMAND = "materialist-bundled-1", "materialist train export"
+    ARCHITECTURE = BundledArchitecture
+
+    def __init__(self, architecture: BundledArchitecture | None = None):
+        super().__init__(architecture or BundledArchitecture())
+        a, w = self.architecture, self.architecture.widths
+        self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), group_norm(w[0]), nn.SiLU())
+        self.levels = nn.ModuleList(nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
         self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
         self.place = nn.Conv2d(4, w[3], 1)
         self.attention = nn.ModuleList(_Attention(w[3]) for _ in range(a.attention))
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
         self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
         self.decoders = nn.ModuleList(
-            nn.Sequential(*(_Block(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
+            nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
         )
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
-        self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), _norm(a.fine), nn.SiLU())
+        self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), group_norm(a.fine), nn.SiLU())
         self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
         if a.encoder:
             self.encoder = shipped(a.encoder)
@@ -115,7 +107,7 @@ class BundledNetwork(nn.Module):
         if not self.architecture.encoder:
             return [0.0] * 4
         with torch.no_grad():
-            features = [level(found) for found in self.encoder(srgb(image))]
+            features = [unit_power(found) for found in self.encoder(srgb(image))]
         return [part(found) for part, found in zip(self.told, features, strict=True)]
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
@@ -176,31 +168,12 @@ def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:
     return nn.Conv2d(inputs, outputs, 3, padding=1, bias=bias)
 
 
-def _norm(channels: int) -> nn.GroupNorm:
-    # Statistics over each picture alone: small batches train, and a batch of one predicts, alike.
-    return nn.GroupNorm(8, channels)
-
-
 @torch.no_grad()
 def _same_subpixels(conv: nn.Conv2d) -> None:
     """Start the four pixels that pixel_shuffle makes of one as equals: no checkerboard (Aitken et al. 2017)."""
     conv.weight.copy_(conv.weight[::4].repeat_interleave(4, 0))
     if conv.bias is not None:
         conv.bias.zero_()
-
-
-class _Block(nn.Module):
-    """Residual block: two normalised 3x3 convolutions, starting as the identity."""
-
-    def __init__(self, channels: int):
-        super().__init__()
-        self.norm1, self.conv1 = _norm(channels), _conv(channels, channels)
-        self.norm2, self.conv2 = _norm(channels), _conv(channels, channels)
-        nn.init.zeros_(self.conv2.weight)
-
-    def forward(self, x: Tensor) -> Tensor:
-        y = self.conv1(F.silu(self.norm1(x)))
-        return x + self.conv2(F.silu(self.norm2(y)))
 
 
 class _Attention(nn.Module):

@@ -8,8 +8,9 @@ import numpy as np
 import torch
 
 from materialist.errors import WeightsError
-from materialist.predict.bundled import WEIGHTS, weights
+from materialist.predict.bundled import WEIGHTS
 from materialist.predict.bundled.inference import infer, rays_of
+from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.device import on_gpu
 from materialist.predict.protocol import SKY_NOTE
 from materialist.predict.weights import sha256
@@ -36,8 +37,8 @@ class BundledPredictor:
                 "export some (materialist train matnet, materialist train export)."
             )
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
-        network, self.facts = weights.load(path)
-        self.network = network.to(self.device)
+        network, self.facts = BundledNetwork.load(path)
+        self.network = network.to(self.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         own = "" if path == WEIGHTS else f" {path.name}"
         self.source = f"bundled{own} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
 

@@ -11,17 +11,19 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.predict.clicks.features import CHANNELS, SPOT
-from materialist.predict.lite import level, shipped
-from materialist.predict.unet import Architecture, UNet
+from materialist.predict.efficientnet import shipped, unit_power
+from materialist.predict.unet import UNet, UNetArchitecture
 
-WIDTHS = Architecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
+DEFAULT = UNetArchitecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
 
 
 class ClickNet(UNet):
     """Features in, one logit a pixel out."""
 
-    def __init__(self, architecture: Architecture | None = None):
-        a = architecture or WIDTHS
+    FORMAT, COMMAND = "materialist-clicks-1", "materialist train clicks"
+
+    def __init__(self, architecture: UNetArchitecture | None = None):
+        a = architecture or DEFAULT
         super().__init__(CHANNELS, 1, a)
         if a.encoder:
             self.encoder = shipped(a.encoder)
@@ -36,7 +38,7 @@ class ClickNet(UNet):
             return self.raw(maps)[:, 0]
         with torch.no_grad():
             features = self.encoder((maps[:, :3] + 0.5).clamp(0, 1))
-            seen = [related(level(found), maps[:, SPOT : SPOT + 1]) for found in features]
+            seen = [related(unit_power(found), maps[:, SPOT : SPOT + 1]) for found in features]
         return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[:, 0]
 
 

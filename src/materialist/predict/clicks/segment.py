@@ -123,6 +123,6 @@ def _loaded(path: Path) -> Any:
             f"There are no weights of ClickNet at {path}; train some (materialist train clicks), or select with "
             "--with grabcut."
         )
-    from materialist.predict.clicks.weights import load
+    from materialist.predict.clicks.network import ClickNet
 
-    return load(path)[0]
+    return ClickNet.load(path)[0]

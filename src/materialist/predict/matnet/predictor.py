@@ -11,9 +11,8 @@ from materialist.errors import WeightsError
 from materialist.predict.device import on_gpu
 from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth, trained_depth
 from materialist.predict.matnet.network import SIZES, MatNet
-from materialist.predict.models import INSTEAD, hub_model, is_hub_id, require, weights_file
-from materialist.predict.own_weights import metadata
-from materialist.predict.weights import load_weights, read_content, state_of, verify_file
+from materialist.predict.models import hub_model, is_hub_id, require, weights_file
+from materialist.predict.weights import INSTEAD, load_weights, metadata, read_content, state_of, verify_file
 from materialist.types import Materials, Photo, Prediction
 
 FORMAT = "materialist-matnet-1"

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X
 from materialist.predict.unet import STRIDE as STRIDE
-from materialist.predict.unet import Architecture, UNet
+from materialist.predict.unet import UNet, UNetArchitecture
 
 LEAST = 0.05
 """Added to the mirrored thickness, in units of the object's size, so that a factor can change where that is 0."""
@@ -22,8 +22,10 @@ LEAST = 0.05
 class RefractionNet(UNet):
     """Features of an object in, solid and hollow thickness and normals of the back out."""
 
-    def __init__(self, architecture: Architecture | None = None):
-        super().__init__(CHANNELS, ANSWERS, architecture or Architecture())
+    FORMAT, COMMAND = "materialist-refraction-1", "materialist train refraction"
+
+    def __init__(self, architecture: UNetArchitecture | None = None):
+        super().__init__(CHANNELS, ANSWERS, architecture or UNetArchitecture())
 
     def forward(self, maps: Tensor) -> Tensor:
         """Thickness and back of a batch of objects.

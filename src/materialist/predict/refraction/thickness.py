@@ -103,6 +103,6 @@ def _loaded(path: Path) -> tuple[RefractionNet, dict[str, Any]]:
             f"There are no weights of RefractionNet at {path}; train some (materialist train refraction -o RUN), or "
             "take the thickness by symmetry."
         )
-    from materialist.predict.refraction.weights import load
+    from materialist.predict.refraction.network import RefractionNet
 
-    return load(path)
+    return RefractionNet.load(path)

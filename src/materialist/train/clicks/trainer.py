@@ -13,7 +13,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from materialist.errors import InputError
-from materialist.predict.clicks import weights
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.unet import STRIDE
 from materialist.train import small
@@ -94,7 +93,7 @@ class Trainer(small.Run):
 
     def write(self, path: Path, facts: dict[str, Any]) -> None:
         """The averaged weights as the package reads them."""
-        weights.save(path, self.averaged, facts)
+        self.averaged.save(path, facts)
 
     def batches(self) -> Iterator[dict[str, Tensor]]:
         """Lessons of random views, without end."""

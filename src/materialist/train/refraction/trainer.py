@@ -13,7 +13,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from materialist.errors import InputError
-from materialist.predict.refraction import weights
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import STRIDE, RefractionNet
 from materialist.procedural.thickness import dataset as lessons
@@ -66,7 +65,7 @@ class Trainer(small.Run):
         self.kept_aside = None if heldout is None else lessons.load(heldout)
 
         def network() -> RefractionNet:
-            return RefractionNet() if init is None else weights.load(init)[0].train().requires_grad_(True)
+            return RefractionNet() if init is None else RefractionNet.load(init)[0].train().requires_grad_(True)
 
         super().__init__(
             folder, network, recipe or Recipe(), budget=budget, seed=seed, every=every, resume=resume, note=note,
@@ -79,7 +78,7 @@ class Trainer(small.Run):
 
     def write(self, path: Path, facts: dict[str, Any]) -> None:
         """The averaged weights as the package reads them."""
-        weights.save(path, self.averaged, facts)
+        self.averaged.save(path, facts)
 
     def terms(self, found: Tensor, batch: dict[str, Tensor]) -> dict[str, Tensor]:
         """See `losses`."""

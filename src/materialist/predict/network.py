@@ -1,0 +1,99 @@
+"""Networks that this project trains: an architecture stored with the weights, one file format, one residual block."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from materialist.errors import WeightsError
+from materialist.predict.weights import load_weights, metadata, read_state, write_weights
+
+SHARED = "encoder."
+"""Prefix of the tensors of the shared image encoder (`predict.efficientnet`), which a network's file does not hold."""
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Widths and depths of a network."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Lists, numbers and texts, for JSON."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Self:
+        """The inverse of `as_dict`; raises TypeError for unknown names."""
+        found: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
+        return cls(**found)
+
+
+class StoredNetwork(nn.Module):
+    """A network with an architecture, kept in one .safetensors file (float16) that names its kind."""
+
+    FORMAT: ClassVar[str]
+    """`format` in the file's header; another number is another network."""
+    COMMAND: ClassVar[str]
+    """The command that makes such a file."""
+    ARCHITECTURE: ClassVar[type[Architecture]]
+
+    def __init__(self, architecture: Any):
+        super().__init__()
+        self.architecture = architecture
+
+    def save(self, path: Path, facts: dict[str, Any]) -> None:
+        """Write the network with `facts` (steps, data, scores), whole or not at all; without the shared encoder."""
+        own = {k: v for k, v in self.state_dict().items() if not k.startswith(SHARED)}
+        architecture = json.dumps(self.architecture.as_dict())
+        write_weights(path, own, {"format": self.FORMAT, "architecture": architecture, "facts": json.dumps(facts)})
+
+    @classmethod
+    def load(cls, path: Path) -> tuple[Self, dict[str, Any]]:
+        """The network in evaluation mode, float32, and the facts it was written with.
+
+        Raises WeightsError where the file is missing, damaged, of another kind, or does not fit its architecture.
+        """
+        tensors, header = read_state(path), metadata(path)
+        if header.get("format") != cls.FORMAT:
+            raise WeightsError(
+                f"{path} has format {header.get('format')!r}, not {cls.FORMAT!r}; make it with: {cls.COMMAND}."
+            )
+        try:
+            network = cls(cls.ARCHITECTURE.from_dict(json.loads(header["architecture"])))
+            facts = json.loads(header.get("facts", "{}"))
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
+            raise WeightsError(
+                f"{path} describes no usable network ({error}); make it again with: {cls.COMMAND}."
+            ) from error
+        load_weights(network, tensors | shared_tensors(network), path)
+        return network.eval().requires_grad_(False), facts
+
+
+def shared_tensors(network: nn.Module) -> dict[str, Tensor]:
+    """Tensors of the network that its file does not hold."""
+    return {k: v for k, v in network.state_dict().items() if k.startswith(SHARED)}
+
+
+def group_norm(channels: int) -> nn.GroupNorm:
+    """Statistics over each picture alone, so that small batches train and a batch of one predicts alike."""
+    return nn.GroupNorm(8, channels)
+
+
+class ResidualBlock(nn.Module):
+    """Two normalised 3x3 convolutions added to the input; it starts as the identity (He et al. 2016)."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.norm1, self.norm2 = group_norm(channels), group_norm(channels)
+        self.conv1, self.conv2 = (nn.Conv2d(channels, channels, 3, padding=1, bias=False) for _ in range(2))
+        nn.init.zeros_(self.conv2.weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """[B, C, H, W] -> [B, C, H, W]."""
+        y = self.conv1(F.silu(self.norm1(x)))
+        return torch.add(x, self.conv2(F.silu(self.norm2(y))))

@@ -1,0 +1,60 @@
+"""The encoder that the networks share."""
+
+import pytest
+import torch
+
+from materialist.predict.efficientnet import shipped, unit_power
+
+STRIDES = (4, 8, 16, 32)
+FIGURES = (
+    (24, -1.2621, 8.2813, 9.2987, 8.4701, -5.9386),
+    (48, -0.5538, 7.8424, 9.9643, -6.1738, 6.2877),
+    (120, -0.2624, 4.4237, 8.6887, -10.2042, -2.9417),
+    (352, 0.0155, 1.9152, 0.4106, 0.0495, -0.7167),
+)
+"""Channels, mean, spread and three values that efficientnet_lite_pytorch 0.1.0 has for `picture`, in float32."""
+
+
+def picture():
+    """Two ramps and a ripple, 260 x 260: the size for which that package pads."""
+    rows, columns = torch.meshgrid(torch.linspace(0, 1, 260), torch.linspace(0, 1, 260), indexing="ij")
+    return torch.stack([rows, columns, (6 * rows * columns).sin() * 0.5 + 0.5])[None]
+
+
+def test_the_package_has_the_classifier_it_names():
+    """Against the reference implementation with the same checkpoint; the package stores float16."""
+    encoder = shipped("lite2")
+    with torch.no_grad():
+        found = encoder(picture())
+    for one, (channels, mean, spread, *values) in zip(found, FIGURES, strict=True):
+        assert one.shape[1] == channels
+        assert one.mean().item() == pytest.approx(mean, abs=0.01)
+        assert one.std().item() == pytest.approx(spread, rel=4e-3)
+        places = [one[0, 0, 0, 0], one[0, -1, -1, -1], one[0, 7, 1, 1]]
+        assert [v.item() for v in places] == pytest.approx(values, abs=0.03 * spread)
+
+
+def test_features_lie_where_the_networks_add_them():
+    encoder = shipped("lite2")
+    with torch.no_grad():
+        found = encoder(torch.rand(1, 3, 64, 96))
+    for one, stride in zip(found, STRIDES, strict=True):
+        assert one.shape[-2:] == (64 // stride, 96 // stride)
+    assert not encoder.training and not any(p.requires_grad for p in encoder.parameters())
+
+
+def test_a_copy_is_ones_own():
+    one = shipped("lite2")
+    with torch.no_grad():
+        one.stem.weight.zero_()
+    assert shipped("lite2").stem.weight.abs().max() > 0
+
+
+def test_features_have_unit_power():
+    x = torch.randn(2, 5, 4, 4) * torch.tensor([0.01, 30.0]).view(2, 1, 1, 1)
+    torch.testing.assert_close(unit_power(x).square().mean((1, 2, 3)), torch.ones(2), atol=0.02, rtol=0)
+
+
+def test_another_encoder_is_refused():
+    with pytest.raises(ValueError, match=r"no encoder 'huge'.*lite2"):
+        shipped("huge")
