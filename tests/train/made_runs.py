@@ -1,30 +1,50 @@
-"""Tiny training runs, in this process or in several."""
+"""Tiny training runs of each network, in this process or in several."""
 
 import os
 from pathlib import Path
 
+import numpy as np
 import torch
 
-from materialist.io.samples import SampleFolder
-from materialist.train.budget import Budget
-from materialist.train.launch import Processes, join
-from materialist.train.recipes import recipe
-from materialist.train.tasks import BundledTask
-from materialist.train.trainer import Habits, Trainer
+from materialist.io.datasets import open_source
+from materialist.predict.bundled.network import BundledArchitecture
+from materialist.predict.unet import UNetArchitecture
+from materialist.train.bundled import RECIPE, BundledTask
+from materialist.train.clicks import RECIPE as CLICKS
+from materialist.train.clicks import ClickTask
+from materialist.train.processes import join
+from materialist.train.refraction import RECIPE as REFRACTION
+from materialist.train.refraction import RefractionTask
+from materialist.train.schedule import Budget
+from materialist.train.trainer import RunOptions, Trainer
 
-NETWORK = {"widths": [8, 8, 16, 32], "blocks": [1, 1, 1, 1], "attention": 1, "decoder_blocks": [1, 1, 1], "fine": 8}
+NETWORK = BundledArchitecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+SMALL = {"side": 32, "batch": 2, "warm_up": 2, "bfloat16": False}
+WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 
 
-def trainer(
-    data: Path, run: Path, *, steps: int, resume=False, samples=0, processes=None, notes=None, workers=0, **changes
-):
-    """A run of a network that is a thousand times smaller than the real one."""
-    options = {"network": NETWORK, "size": 32, "batch": 2, "warm_up": 2, "bfloat16": False, **changes}
-    habits = Habits(checkpoint_seconds=1e9, score_samples=samples, workers=workers, seed=3)
+def bundled(data: Path, *, samples=0, architecture=NETWORK, **changes) -> BundledTask:
+    """The bundled network's task, a thousand times smaller than the real one."""
+    recipe = RECIPE.changed(**(SMALL | changes))
+    return BundledTask(open_source(data), recipe, score_samples=samples, architecture=architecture)
+
+
+def clicks(views: Path, **changes) -> ClickTask:
+    """ClickNet's task with a tiny network."""
+    return ClickTask(views, CLICKS.changed(**(SMALL | changes)), architecture=WIDTHS)
+
+
+def refraction(views: Path, held_out: Path | None = None, **options) -> RefractionTask:
+    """RefractionNet's task on small views."""
+    return RefractionTask(views, held_out, REFRACTION.changed(**SMALL), **options)
+
+
+def trainer(task, run: Path, *, steps: int, resume=False, processes=None, notes=None, **options) -> Trainer:
+    """A run that writes no checkpoint before its end."""
     note = (lambda _: None) if notes is None else notes.append
     return Trainer(
-        recipe("bundled", **options), BundledTask(), SampleFolder(data), run, budget=Budget(steps=steps),
-        habits=habits, processes=processes or Processes(), resume=resume, note=note,
+        task, run, budget=Budget(steps=steps), options=RunOptions(**{"checkpoint_seconds": 1e9, "seed": 3, **options}),
+        processes=processes, resume=resume, note=note,
     )  # fmt: skip
 
 
@@ -34,7 +54,29 @@ def one_of_two(rank: int, port: int, data: Path, run: Path) -> None:
     os.environ |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
     torch.set_num_threads(1)
     processes = join("cpu")
-    run_of_mine = trainer(data, run, steps=3, processes=processes)
-    run_of_mine.run()
-    torch.save(run_of_mine.network.state_dict(), run / f"weights{rank}.pt")
+    mine = trainer(bundled(data), run, steps=3, processes=processes)
+    mine.fit()
+    torch.save(mine.network.state_dict(), run / f"weights{rank}.pt")
     processes.leave()
+
+
+def click_view(seed: int) -> dict:
+    """The arrays of a view: a floor with two discs, told by their colours alone."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:64, :80]
+    thing = np.full((64, 80), -1, np.int16)
+    for number, column in ((1, 24), (2, 58)):
+        thing[(x - column) ** 2 + (y - 30) ** 2 < rng.integers(10, 15) ** 2] = number
+    colours = rng.uniform(0.1, 0.9, (4, 3))
+    rgb = (255 * colours[thing + 1]).astype(np.uint8)
+    normal = np.zeros((64, 80, 3), np.int8)
+    normal[..., 2] = 127
+    return {"rgb": rgb, "normal": normal, "depth": np.full((64, 80), 2, np.float16), "thing": thing}
+
+
+def write_click_views(folder: Path, count: int = 3) -> Path:
+    """A folder of such views."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for k in range(count):
+        np.savez(folder / f"{k:07d}.npz", **click_view(k))
+    return folder

@@ -1,28 +1,21 @@
 """Runs: they learn, stop on time, go on where they stopped, and several processes make one network."""
 
-import json
 import os
 import signal
 import socket
 
 import made_runs
 import made_samples
-import numpy as np
 import psutil
 import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.io.samples import SampleFolder
-from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
-from materialist.predict.bundled.predictor import BundledPredictor
-from materialist.predict.weights import sha256
-from materialist.train import checkpoint, stream
-from materialist.train.budget import Budget, Clock
-from materialist.train.export import export_run
-from materialist.train.recipes import recipe
-from materialist.train.tasks import BundledTask, relative_log_depth
-from materialist.train.trainer import CURVE, SCORES, Habits
+from materialist.procedural.thickness.dataset import Plan, produce
+from materialist.train import checkpoint
+from materialist.train.bundled import RECIPE
+from materialist.train.schedule import Budget, Schedule
+from materialist.train.trainer import RunOptions
 
 
 @pytest.fixture(scope="module")
@@ -31,169 +24,129 @@ def data(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def tasks(data, tmp_path_factory):
+    """Kind of run -> what makes its task."""
+    place = tmp_path_factory.mktemp("views")
+    made_runs.write_click_views(place / "clicks")
+    produce(place / "shapes", Plan(shapes=1, views=3))
+    return {
+        "matnet": lambda: made_runs.bundled(data),
+        "clicks": lambda: made_runs.clicks(place / "clicks"),
+        "refraction": lambda: made_runs.refraction(place / "shapes"),
+    }
+
+
+@pytest.fixture(scope="module")
 def run(data, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "run"
     notes: list[str] = []
-    trainer = made_runs.trainer(data, folder, steps=60, samples=2, notes=notes, rate=5e-3)
-    trainer.run()
+    made_runs.trainer(
+        made_runs.bundled(data, samples=2, rate=5e-3), folder, steps=50, notes=notes, report_steps=10
+    ).fit()
     return folder, notes
+
+
+def during(trainer, number, act):
+    """Call `act` in the step with that number, counted from 1."""
+    step, count = trainer._step, [0]
+
+    def counted(batch):
+        found = step(batch)
+        count[0] += 1
+        if count[0] == number:
+            act()
+        return found
+
+    trainer._step = counted
+
+
+def weights_of(trainer):
+    return torch.cat([p.detach().flatten() for n in (trainer.network, trainer.averaged) for p in n.parameters()])
 
 
 def test_a_run_learns_and_tells(run):
     folder, notes = run
-    curve = checkpoint.read_lines(folder / CURVE)
-    assert [line["step"] for line in curve] == [20, 40, 60]
+    curve = checkpoint.read_lines(folder / checkpoint.CURVE)
+    assert [line["step"] for line in curve] == [10, 20, 30, 40, 50]
     assert curve[-1]["loss"] < 0.8 * curve[0]["loss"]
     assert curve[-1]["rate"] < curve[0]["rate"] and curve[-1]["per_second"] > 0
     assert "no LPIPS" in notes[0]
-    scores = checkpoint.read_lines(folder / SCORES)
-    assert {"albedo_psnr", "normal_angle", "depth_si_log_rmse"} <= scores[-1].keys()
+    scores = checkpoint.read_lines(folder / checkpoint.SCORES)[-1]
+    assert {"albedo_psnr", "normal_angle", "depth_si_log_rmse"} <= scores.keys() and scores[
+        "of"
+    ] == "samples trained on"
     assert (folder / "sheet.png").stat().st_size > 1000
 
 
-def test_a_run_goes_on(run, data):
-    folder, _ = run
-    before = checkpoint.load(folder)
+@pytest.mark.parametrize("kind", ["matnet", "clicks", "refraction"])
+def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
+    whole = made_runs.trainer(tasks[kind](), tmp_path / "whole", steps=6)
+    whole.fit()
+    cut = made_runs.trainer(tasks[kind](), tmp_path / "cut", steps=6)
+    during(cut, 3, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    assert cut.fit() == {} and cut.schedule.step == 3
+    rest = made_runs.trainer(tasks[kind](), tmp_path / "cut", steps=6, resume=True)
+    rest.fit()
+    assert rest.schedule.step == 6
+    torch.testing.assert_close(weights_of(rest), weights_of(whole), atol=0, rtol=0)
+
+
+def test_another_budget_is_on_top(tasks, tmp_path):
+    made_runs.trainer(tasks["clicks"](), tmp_path / "run", steps=2).fit()
     notes: list[str] = []
-    trainer = made_runs.trainer(data, folder, steps=3, resume=True, notes=notes)
-    assert any("Resumed at step 60" in note for note in notes)
-    for name, tensor in trainer.network.state_dict().items():
-        torch.testing.assert_close(tensor, before["network"][name])
-    moments = trainer.optimizer.state_dict()["state"][0]["exp_avg_sq"]
-    torch.testing.assert_close(moments, before["optimizer"]["state"][0]["exp_avg_sq"])
-    trainer.run()
-    after = checkpoint.load(folder)
-    assert after["step"] == 63 and after["epoch"] > before["epoch"] and after["seconds"] > before["seconds"]
+    again = made_runs.trainer(tasks["clicks"](), tmp_path / "run", steps=2, resume=True, notes=notes)
+    assert any("Resumed at step 2" in note for note in notes)
+    again.fit()
+    assert checkpoint.load(tmp_path / "run", "clicks")["schedule"]["step"] == 4
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_run_that_is_told_to_end_leaves_a_checkpoint(data, tmp_path, number):
+def test_a_signal_leaves_a_checkpoint(data, tmp_path, number):
     before = signal.getsignal(number)
-    trainer = made_runs.trainer(data, tmp_path / "run", steps=10_000)
-    step, seen = trainer._step, []
-
-    def third_step_is_the_last(batch):
-        seen.append(step(batch))
-        if len(seen) == 3:
-            os.kill(os.getpid(), number)
-        return seen[-1]
-
-    trainer._step = third_step_is_the_last
-    assert trainer.run() == {}
-    assert checkpoint.load(tmp_path / "run")["step"] == 3
+    trainer = made_runs.trainer(made_runs.bundled(data), tmp_path / "run", steps=10_000)
+    during(trainer, 2, lambda: os.kill(os.getpid(), number))
+    assert trainer.fit() == {}
+    assert checkpoint.load(tmp_path / "run", "matnet")["schedule"]["step"] == 2
     assert trainer.interrupted is (number == signal.SIGINT) and signal.getsignal(number) == before
 
 
 def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_path):
-    trainer = made_runs.trainer(data, tmp_path / "run", steps=10_000, workers=1)
-    step = trainer._step
-
-    def terminated(batch):
-        for process in (*psutil.Process().children(), psutil.Process()):
-            process.terminate()
-        return step(batch)
-
-    trainer._step = terminated
-    assert trainer.run() == {}
-    assert checkpoint.load(tmp_path / "run")["step"] == 1
+    trainer = made_runs.trainer(made_runs.bundled(data), tmp_path / "run", steps=10_000, workers=1)
+    during(trainer, 1, lambda: [p.terminate() for p in (*psutil.Process().children(), psutil.Process())])
+    assert trainer.fit() == {}
+    assert checkpoint.load(tmp_path / "run", "matnet")["schedule"]["step"] == 1
 
 
-def test_a_run_is_not_overwritten_nor_mixed_up(run, data):
+def test_a_run_is_not_overwritten_nor_mixed_up(run, data, tasks, tmp_path):
     folder, _ = run
     with pytest.raises(OutputError, match="add --resume"):
-        made_runs.trainer(data, folder, steps=1)
+        made_runs.trainer(tasks["matnet"](), folder, steps=1)
+    other = made_runs.bundled(data, architecture=made_runs.BundledArchitecture(fine=16))
     with pytest.raises(InputError, match="another network"):
-        made_runs.trainer(data, folder, steps=1, resume=True, network={**made_runs.NETWORK, "fine": 16})
-
-
-def test_the_averaged_weights_are_exported_and_predict(run, tmp_path):
-    folder, _ = run
-    file = tmp_path / "w.safetensors"
-    facts = export_run(folder, file)
-    assert facts["megabytes"] < 1
-    predictor = BundledPredictor(file)
-    assert predictor.facts["step"] == facts["step"] and predictor.facts["data"]["seed"] == 5
-    state = checkpoint.load(folder)
-    for name, tensor in predictor.network.state_dict().items():
-        torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
-    moved = max(float((state["averaged"][n] - state["network"][n]).abs().max()) for n in state["network"])
-    assert moved > 0, "an average is not the last step"
-    with pytest.raises(OutputError, match="exists"):
-        export_run(folder, file)
-
-
-def test_the_mean_with_other_weights_is_exported(run, tmp_path):
-    folder, _ = run
-    alone, other, mean = (tmp_path / f"{name}.safetensors" for name in ("alone", "other", "mean"))
-    export_run(folder, alone)
-    network, facts = BundledNetwork.load(alone)
-    with torch.no_grad():
-        for parameter in network.parameters():
-            parameter += 0.5
-    network.save(other, facts)
-    export_run(folder, mean, average_with=other)
-    found, told = BundledNetwork.load(mean)
-    assert told["averaged with"] == sha256(other)[:16] and "scores" not in told
-    mixed = found.state_dict()
-    for name, tensor in BundledNetwork.load(alone)[0].named_parameters():
-        torch.testing.assert_close(mixed[name], tensor + 0.25, atol=4e-3, rtol=4e-3)
-
-
-def test_no_mean_with_another_network(run, tmp_path):
-    file, other = tmp_path / "w.safetensors", tmp_path / "other.safetensors"
-    with pytest.raises(WeightsError, match=r"no weights at .*nowhere"):
-        export_run(run[0], file, average_with=tmp_path / "nowhere.safetensors")
-    BundledNetwork(BundledArchitecture.from_dict({**made_runs.NETWORK, "fine": 16})).save(other, {})
-    with pytest.raises(WeightsError, match="differ in fine; give weights of the same"):
-        export_run(run[0], file, average_with=other)
-    state = checkpoint.load(run[0])
-    (tmp_path / "paper").mkdir()
-    checkpoint.save(tmp_path / "paper", state | {"recipe": state["recipe"] | {"task": "paper"}})
-    with pytest.raises(InputError, match="leave it out for the paper's"):
-        export_run(tmp_path / "paper", file, average_with=other)
-    assert not file.exists()
-
-
-def test_an_export_to_no_folder_is_refused(run, tmp_path):
+        made_runs.trainer(other, folder, steps=1, resume=True)
+    for kind in ("clicks", "refraction"):
+        with pytest.raises(InputError, match=f"holds a run of `train matnet`, not of `train {kind}`"):
+            made_runs.trainer(tasks[kind](), folder, steps=1, resume=True)
     (tmp_path / "file").write_text("")
-    for place in ("file", "nowhere"):
-        with pytest.raises(OutputError, match="cannot be written"):
-            export_run(run[0], tmp_path / place / "w.safetensors")
-
-
-def test_figures_of_samples_trained_on_are_said_to_be(run, tmp_path):
-    """Four samples are too few to keep any aside, forty are enough."""
-    folder, notes = run
-    assert any("of samples trained on" in note for note in notes)
-    assert checkpoint.read_lines(folder / SCORES)[-1]["of"] == "samples trained on"
-    enough, told = made_samples.write_set(tmp_path / "set", stream.KEPT_ASIDE), []
-    trainer = made_runs.trainer(enough, tmp_path / "run", steps=1, samples=2, notes=told)
-    assert trainer.scored_on == ""
-    trainer.run()
-    assert trainer.scored_on == "samples kept aside" and not any("trained on" in note for note in told)
-    assert checkpoint.read_lines(tmp_path / "run" / SCORES)[-1]["of"] == "samples kept aside"
-
-
-@pytest.mark.parametrize("habit", ["workers", "score_samples"])
-def test_habits_that_cannot_be(habit):
-    with pytest.raises(InputError, match=f"--{habit.replace('_', '-')} is -1; give 0 or more"):
-        Habits(**{habit: -1})
+    for place in ("file", "file/run"):
+        with pytest.raises(OutputError, match="cannot be made"):
+            made_runs.trainer(tasks["clicks"](), tmp_path / place, steps=1)
 
 
 def test_checkpoints_are_whole_or_refused(tmp_path):
-    checkpoint.save(tmp_path, {"step": 1})
+    checkpoint.save(tmp_path, {"kind": "matnet", "step": 1})
     with pytest.raises(AttributeError):
-        checkpoint.save(tmp_path, {"step": 2, "bad": lambda: None})
-    assert checkpoint.load(tmp_path)["step"] == 1
+        checkpoint.save(tmp_path, {"kind": "matnet", "step": 2, "bad": lambda: None})
+    assert checkpoint.load(tmp_path, "matnet")["step"] == 1
     path = tmp_path / checkpoint.NAME
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(WeightsError, match="is damaged"):
-        checkpoint.load(tmp_path)
-    with pytest.raises(WeightsError, match="give the folder of a run"):
-        checkpoint.load(tmp_path / "nowhere")
+        checkpoint.load(tmp_path, "matnet")
+    with pytest.raises(WeightsError, match="materialist train clicks"):
+        checkpoint.load(tmp_path / "nowhere", "clicks")
 
 
-def test_a_cut_off_line_of_a_curve_is_left_out(tmp_path):
+def test_a_cut_off_line_of_a_log_is_left_out(tmp_path):
     file = tmp_path / "curve.jsonl"
     checkpoint.append_line(file, {"step": 1})
     file.write_text(file.read_text() + '{"step": 2, "lo')
@@ -209,136 +162,55 @@ def test_two_processes_train_one_network(data, tmp_path):
     first, second = (torch.load(run / f"weights{k}.pt", weights_only=True) for k in range(2))
     for name in first:
         torch.testing.assert_close(first[name], second[name], atol=0, rtol=0)
-    assert checkpoint.load(run)["step"] == 3
-    start = made_runs.trainer(data, tmp_path / "other", steps=1).network.state_dict()
+    assert checkpoint.load(run, "matnet")["schedule"]["step"] == 3
+    start = made_runs.trainer(made_runs.bundled(data), tmp_path / "other", steps=1).network.state_dict()
     assert any(not torch.equal(start[name], first[name]) for name in first)
 
 
-def test_the_processes_share_the_samples(data):
-    source, task = SampleFolder(data), BundledTask()
-    args = {"number": 1, "size": 32, "seed": 0, "workers": 0}
-    alone = list(stream.epoch(source, task, batch=4, **args))
-    shares = [list(stream.epoch(source, task, batch=2, rank=r, world=2, **args)) for r in range(2)]
-    assert len(alone) == len(shares[0]) == len(shares[1]) == 1
-    together = torch.cat([shares[0][0]["image"], shares[1][0]["image"]])
-    key = lambda x: sorted(float(p.sum()) for p in x)  # noqa: E731
-    np.testing.assert_allclose(key(together), key(alone[0]["image"]), rtol=1e-6)
-
-
-def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
-    source = SampleFolder(made_samples.write_set(tmp_path, 4))
-    bad = tmp_path / "samples" / "0000002.npz"
-    bad.write_bytes(b"no sample")
-    args = {"number": 1, "size": 32, "seed": 0, "workers": 0, "batch": 4}
-    assert len(list(stream.epoch(source, BundledTask(), **args))) == 1
-    assert "0000002.npz" in caplog.text
-    for path in (tmp_path / "samples").iterdir():
-        path.write_bytes(b"no sample")
-    with pytest.raises(InputError, match="cannot be read"):
-        list(stream.epoch(source, BundledTask(), **args))
-
-
-def test_kept_aside_samples_are_never_trained_on():
-    trained = stream.trained_on(range(100))
-    assert len(trained) == 98 and not {39, 79} & set(trained)
-    assert stream.trained_on(range(5)) == [0, 1, 2, 3, 4]
-
-
-def test_a_sample_that_goes_moves_no_other_one(tmp_path):
-    """Which samples are kept aside is told by their own numbers, not by their places."""
-    (tmp_path / "samples").mkdir()
-    for k in range(90):
-        (tmp_path / "samples" / f"{k:07d}.npz").touch()
-    source = SampleFolder(tmp_path)
-    before = {source.number(k) for k in stream.trained_on(source)}
-    (tmp_path / "samples" / "0000005.npz").unlink()
-    source.refresh()
-    assert {source.number(k) for k in stream.trained_on(source)} == before - {5}
-    assert not {39, 79} & before
-
-
-def test_samples_kept_aside_that_cannot_be_read_are_left_out(tmp_path, caplog):
-    source = SampleFolder(made_samples.write_set(tmp_path, 3))
-    (tmp_path / "samples" / "0000001.npz").write_bytes(b"no sample")
-    assert len(stream.kept_aside(source, 3)) == 2 and "0000001.npz" in caplog.text
-    trainer = made_runs.trainer(tmp_path, tmp_path / "run", steps=1)
-    for path in (tmp_path / "samples").iterdir():
-        path.write_bytes(b"no sample")
-    assert stream.kept_aside(source, 3) == [] and trainer.score() == {}
-
-
-def test_the_error_of_a_loading_worker_is_one_sentence_and_ends_them(tmp_path):
-    """Not the worker's traceback; and nothing is left that could keep the command from ending."""
-    import multiprocessing
-
-    source = SampleFolder(made_samples.write_set(tmp_path, 4))
-    for path in (tmp_path / "samples").iterdir():
-        path.write_bytes(b"no sample")
-    with pytest.raises(InputError, match="cannot be read") as caught:
-        list(stream.epoch(source, BundledTask(), number=1, size=32, seed=0, workers=1, batch=2))
-    assert "Traceback" not in str(caught.value)
-    del caught
-    assert not multiprocessing.active_children()
+def test_pictures_grow_with_the_run(data, tmp_path):
+    assert [RECIPE.side_at(p) for p in (0, 0.59, 0.6, 0.79, 0.8, 1)] == [128, 128, 192, 192, 256, 256]
+    assert RECIPE.changed(side=96).side_at(0) == 96
+    task = made_runs.bundled(data, side=64, growth=((0.5, 32),))
+    trainer = made_runs.trainer(task, tmp_path / "run", steps=6)
+    losses, sides = task.losses, []
+    task.losses = lambda network, batch: (sides.append(batch["image"].shape[-1]), losses(network, batch))[1]
+    trainer.fit()
+    assert sides == [32] * 3 + [64] * 3, "in the middle of a pass of two steps"
 
 
 def test_the_rate_rises_falls_and_is_restarted():
-    clock = Clock(Budget(steps=100))
-    assert clock.rate(10, 0.1) == pytest.approx(0.1)
-    clock.step = 50
-    assert clock.rate(10, 0.1) == pytest.approx(0.55)
-    clock.step = 100
-    assert clock.rate(10, 0.1) == pytest.approx(0.1) and clock.done
-    longer = Clock(Budget(steps=900), step=100)
+    schedule = Schedule(Budget(steps=100))
+    assert schedule.rate(10, 0.1) == pytest.approx(0.1)
+    schedule.step = 50
+    assert schedule.rate(10, 0.1) == pytest.approx(0.55)
+    unfinished = schedule.as_dict()
+    schedule.step = 100
+    assert schedule.rate(10, 0.1) == pytest.approx(0.1) and schedule.done
+    same = Schedule(Budget(steps=100), unfinished)
+    assert same.rate(10, 0.1) == pytest.approx(0.55), "the same budget goes on"
+    longer = Schedule(Budget(steps=900), schedule.as_dict())
     assert longer.progress == pytest.approx(0.1) and not longer.done
     longer.step = 150
     assert longer.rate(10, 0.1) > 0.9, "a longer whole goes on near its peak"
-    shorter = Clock(Budget(steps=10), step=100)
+    shorter = Schedule(Budget(steps=10), schedule.as_dict())
     shorter.step = 105
     assert shorter.rate(0, 0.1) < 0.2, "a short budget at the end anneals"
+    done = {**Schedule(Budget(minutes=1)).as_dict(), "seconds": 60.0, "done": True}
+    assert Schedule(Budget(minutes=1), done).progress == pytest.approx(0.5, abs=0.01)
 
 
-def test_minutes_are_counted_over_all_starts():
-    clock = Clock(Budget(minutes=1), seconds=60)
-    assert clock.progress == pytest.approx(0.5, abs=0.01)
-
-
-@pytest.mark.parametrize("bad", [{}, {"steps": 3, "minutes": 1.0}, {"steps": 0}, {"minutes": -1.0}])
-def test_budgets_that_say_nothing(bad):
-    with pytest.raises(InputError):
-        Budget(**bad)
-
-
-@pytest.mark.parametrize("bad", [{"size": 100}, {"batch": 0}, {"rate": 3.0}])
-def test_recipes_that_cannot_work(bad):
-    with pytest.raises(InputError, match=str(next(iter(bad.values())))[:1]):
-        recipe("bundled", **bad)
-    with pytest.raises(InputError, match="no training recipe"):
-        recipe("nonsense")
-
-
-def test_recipes_survive_json():
-    for name in ("bundled", "paper"):
-        assert json.loads(json.dumps(recipe(name).as_dict()))["name"] == name
-
-
-def test_targets_of_the_bundled_network():
-    values = torch.tensor([0.0, 0.002, 0.18, 1.0])
-    np.testing.assert_allclose(srgb(values), [0, 0.02584, 0.46135, 1], atol=1e-4)
-    depth = torch.tensor([1.0, 2.0, 4.0, 0.0]).view(1, 1, 2, 2)
-    found = relative_log_depth(depth, (depth > 0).float()).flatten()
-    np.testing.assert_allclose(found, [-np.log(2), 0, np.log(2), 0], atol=1e-6)
-
-
-def test_crops_grow_with_the_run(data, tmp_path):
-    assert [recipe("bundled").size_at(p) for p in (0, 0.59, 0.6, 0.79, 0.8, 1)] == [128, 128, 192, 192, 256, 256]
-    assert recipe("bundled", size=96).size_at(0) == 96
-    trainer = made_runs.trainer(data, tmp_path / "run", steps=6, size=64, growth=((0.5, 32),))
-    step, sides = trainer._step, []
-
-    def noted(batch):
-        sides.append(batch["image"].shape[-1])
-        return step(batch)
-
-    trainer._step = noted
-    trainer.run()
-    assert sides == [32] * 3 + [64] * 3, "in the middle of a pass of two steps"
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Budget(), "--steps or --minutes"),
+        (lambda: Budget(steps=3, minutes=1.0), "--steps or --minutes"),
+        (lambda: Budget(minutes=-1.0), "more than 0"),
+        (lambda: RunOptions(workers=-1), "--workers is -1"),
+        (lambda: RECIPE.changed(side=100), "multiple of 32"),
+        (lambda: RECIPE.changed(batch=0), "batch is 0"),
+        (lambda: RECIPE.changed(rate=3.0), "rate is 3"),
+    ],
+)
+def test_settings_that_cannot_be(make, said):
+    with pytest.raises(InputError, match=said):
+        make()

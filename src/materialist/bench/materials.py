@@ -128,7 +128,7 @@ class MaterialsBench(Benchmark):
         if count:
             from materialist.procedural.dataset import CONTENT
 
-            settings["procedural content"] = CONTENT["heldout"]
+            settings["procedural content"] = CONTENT
             with tempfile.TemporaryDirectory() as place:
                 add(
                     held_out(Path(place) / "set", count, self.size, self.seed, self.meshes, self.envmaps, self.device),

@@ -21,8 +21,6 @@ from materialist.cli.options import (
     Steps,
     output_option,
 )
-from materialist.cli.outcome import report_success
-from materialist.errors import Interrupted
 
 
 def register(app: typer.Typer) -> None:
@@ -46,27 +44,20 @@ def clicks(
     as_json: Json = False,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
-    from materialist.cli.progress import StageProgress
-    from materialist.train import checkpoint
-    from materialist.train.budget import Budget
-    from materialist.train.clicks.trainer import Recipe, Trainer
-    from materialist.train.clicks.views import produce
+    from materialist.cli.train_run import train_run
+    from materialist.train.click_views import produce
+    from materialist.train.clicks import RECIPE, ClickTask
+    from materialist.train.schedule import Budget
+    from materialist.train.trainer import RunOptions
 
-    budget = Budget(steps=steps, minutes=40 if steps is None and minutes is None else minutes)
-    recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
-    note = (lambda _: None) if as_json else lambda text: typer.echo(text, err=True)
-    if init is not None and resume and checkpoint.there(output):
-        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
-        init = None
-    checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
-    with StageProgress(quiet=as_json) as progress:
+    recipe = RECIPE.changed(batch=batch, rate=rate, bfloat16=bfloat16)
+
+    def task(begin, progress):
         produce(data, output / "views", progress)
-        trainer = Trainer(
-            output, output / "views", budget=budget, recipe=recipe, seed=seed, every=every, resume=resume, init=init,
-            note=note, device=device.value,
-        )  # fmt: skip
-        figures = trainer.run(progress)
-    if trainer.interrupted:
-        raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
-    lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
-    report_success("train clicks", as_json, lines, run=str(output), step=trainer.clock.step, **figures)
+        return ClickTask(output / "views", recipe, init=begin)
+
+    train_run(
+        "clicks", task, output, budget=Budget(steps, 40 if steps is None and minutes is None else minutes),
+        options=RunOptions(checkpoint_seconds=every, seed=seed), init=init, device=device.value, resume=resume,
+        as_json=as_json,
+    )  # fmt: skip

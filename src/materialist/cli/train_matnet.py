@@ -21,7 +21,6 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.errors import Interrupted
 
 
 class Config(StrEnum):
@@ -33,11 +32,11 @@ class Config(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command("matnet")(matnet)
+    app.command("matnet")(train_maps)
     app.command("export")(export)
 
 
-def matnet(
+def train_maps(
     data: Annotated[
         list[Path],
         typer.Option(
@@ -66,44 +65,21 @@ def matnet(
     as_json: Json = False,
 ) -> None:
     """Train a network; several GPUs: torchrun --nproc-per-node N -m materialist train matnet ..."""
-    from materialist.train.budget import Budget
-    from materialist.train.recipes import recipe
-
-    budget = Budget(steps=steps, minutes=minutes)
-    chosen = recipe(config.value, batch=batch, size=size, rate=rate)
-    from materialist.cli.progress import StageProgress
+    from materialist.cli.train_run import train_run
     from materialist.io.datasets import open_sources
-    from materialist.train import checkpoint
-    from materialist.train.launch import join
-    from materialist.train.tasks import task
-    from materialist.train.trainer import Habits, Trainer
+    from materialist.train import bundled, matnet
+    from materialist.train.schedule import Budget
+    from materialist.train.trainer import RunOptions
 
-    processes = join(device.value)
-    quiet = as_json or not processes.first
-    note = (lambda _: None) if quiet else lambda text: typer.echo(text, err=True)
-    if init is not None and resume and checkpoint.there(output):
-        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
-        init = None
-    habits = Habits(checkpoint_seconds=every, score_samples=score_samples, workers=workers, seed=seed)
-    try:
-        with StageProgress(quiet=quiet) as progress:
-            trainer = Trainer(
-                chosen, task(chosen, {"init": init} if init else None), open_sources(data), output,
-                budget=budget, habits=habits, processes=processes, resume=resume,
-                note=note,
-            )  # fmt: skip
-            figures = trainer.run(progress)
-    finally:
-        processes.leave()
-    if processes.first:
-        if trainer.interrupted:
-            raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
-        sheet = output / "sheet.png"
-        lines = [f"{output}: step {trainer.clock.step}.", *([f"Look at {sheet}"] if sheet.is_file() else [])]
-        if trainer.scored_on:
-            lines.insert(1, f"The figures are of {trainer.scored_on}.")
-        facts = {"run": str(output), "step": trainer.clock.step, "scored_on": trainer.scored_on or None}
-        report_success("train matnet", as_json, lines, **facts, **figures)
+    make, recipe = {
+        Config.bundled: (bundled.BundledTask, bundled.RECIPE), Config.paper: (matnet.PaperTask, matnet.RECIPE)
+    }[config]  # fmt: skip
+    chosen = recipe.changed(batch=batch, side=size, rate=rate)
+    train_run(
+        "matnet", lambda begin, _: make(open_sources(data), chosen, init=begin, score_samples=score_samples), output,
+        budget=Budget(steps, minutes), options=RunOptions(checkpoint_seconds=every, workers=workers, seed=seed),
+        init=init, device=device.value, resume=resume, as_json=as_json,
+    )  # fmt: skip
 
 
 def export(

@@ -22,7 +22,6 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.errors import Interrupted
 
 
 def register(app: typer.Typer) -> None:
@@ -52,39 +51,36 @@ def refraction(
     as_json: Json = False,
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
-    from materialist.cli.progress import StageProgress
     from materialist.procedural.thickness.dataset import Plan, produce
 
-    note = (lambda _: None) if as_json else lambda text: typer.echo(text, err=True)
     folder = data or output / "views"
     train, aside = folder / "train", folder / "heldout"
-    plans = Plan(shapes, views, "train", seed), Plan(heldout, min(views, 8), "heldout", seed)
-    if not data_only:
-        from materialist.predict.refraction.network import RefractionNet
-        from materialist.train import checkpoint
-        from materialist.train.budget import Budget
-        from materialist.train.refraction.trainer import Recipe, Trainer
+    plans = {aside: Plan(heldout, min(views, 8), "heldout", seed), train: Plan(shapes, views, "train", seed)}
+    if data_only:
+        from materialist.cli.progress import StageProgress
 
-        budget = Budget(steps=steps, minutes=30 if steps is None and minutes is None else minutes)
-        recipe = Recipe(batch=batch, rate=rate, bfloat16=bfloat16)
-        checkpoint.begun(output, Trainer.kind, resume=resume)  # views take long: refuse before they are made
-        if init is not None and resume and checkpoint.there(output):
-            note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
-            init = None
-        elif init is not None:
-            RefractionNet.load(init)
-    with StageProgress(quiet=as_json) as progress:
-        seconds = sum(produce(place, plan, progress) for place, plan in zip((aside, train), plans[::-1], strict=True))
-        if data_only:
-            lines = [f"{shapes} x {views} views in {train} ({seconds:.0f} s)"]
-            report_success("train refraction", as_json, lines, data=str(folder), seconds=seconds)
-            return
-        trainer = Trainer(
-            output, train, aside, budget=budget, recipe=recipe, seed=seed, every=every, resume=resume,
-            note=note, device=device.value, init=init,
-        )  # fmt: skip
-        figures = trainer.run(progress)
-    if trainer.interrupted:
-        raise Interrupted(f"Interrupted at step {trainer.clock.step}; go on with --resume.")
-    lines = [f"{output / 'weights.safetensors'}: step {trainer.clock.step}."]
-    report_success("train refraction", as_json, lines, run=str(output), step=trainer.clock.step, **figures)
+        with StageProgress(quiet=as_json) as progress:
+            seconds = sum(produce(place, plan, progress) for place, plan in plans.items())
+        lines = [f"{shapes} x {views} views in {train} ({seconds:.0f} s)"]
+        report_success("train refraction", as_json, lines, data=str(folder), seconds=seconds)
+        return
+    from materialist.cli.train_run import train_run
+    from materialist.predict.refraction.network import RefractionNet
+    from materialist.train.refraction import RECIPE, RefractionTask
+    from materialist.train.schedule import Budget
+    from materialist.train.trainer import RunOptions
+
+    recipe = RECIPE.changed(batch=batch, rate=rate, bfloat16=bfloat16)
+
+    def task(begin, progress):
+        if begin is not None:
+            RefractionNet.load(begin)  # views take long: refuse other weights before they are made
+        for place, plan in plans.items():
+            produce(place, plan, progress)
+        return RefractionTask(train, aside, recipe, init=begin)
+
+    train_run(
+        "refraction", task, output, budget=Budget(steps, 30 if steps is None and minutes is None else minutes),
+        options=RunOptions(checkpoint_seconds=every, seed=seed), init=init, device=device.value, resume=resume,
+        as_json=as_json,
+    )  # fmt: skip

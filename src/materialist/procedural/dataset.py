@@ -1,27 +1,33 @@
-"""A data set on disk: whole samples only, made by one process or several, to be gone on with after a stop."""
+"""The procedural data set on disk: whole samples only, made by one process or several, resumable."""
 
 from __future__ import annotations
 
-import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from materialist.errors import InputError, OutputError
-from materialist.procedural import heldout
+from materialist.errors import InputError
+from materialist.io.described import claim, described
+from materialist.io.samples import write_arrays
 from materialist.procedural.objects import things
-from materialist.procedural.sample import KINDS, Options, make_sample
+from materialist.procedural.sample import KINDS, SPLITS, Options, make_sample
 
 FORMAT = 1
-CONTENT = {"train": 3, "heldout": 2}
-"""Counts the changes of what sample i of a set of each split holds."""
-_IDENTITY = ("size", "seed", "split", "options", "content")
-"""What of a set's description decides what its samples hold."""
+CONTENT = 4
+"""Counts the changes of what sample i of a set holds."""
+DESCRIPTION = "dataset.json"
+_IDENTITY = ("format", "size", "seed", "split", "options", "content")
+"""What decides what the samples of a set hold."""
+HELD_OUT = frozenset(
+    ("binoculars", "capsule", "fandisk", "lightbulb", "spot_cow", "train",
+     "aristea_wreck_puresky", "brown_photostudio_06", "dikhololo_night", "kiara_dawn", "museum", "st_fagans_interior",
+     "venice_sunset")
+)  # fmt: skip
+"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -47,9 +53,21 @@ def options_for(
         raise InputError(f"The seed is {seed}; give 0 or more.")
     if only and only not in KINDS:
         raise InputError(f"There is no kind '{only}' of scene; give one of {', '.join(KINDS)}, or none for all.")
-    mesh_files = heldout.files(meshes, ".ply", heldout.MESHES, split)
-    maps = heldout.files(envmaps, ".exr", heldout.ENVMAPS, split)
-    return Options(size, seed, spp, split, mesh_files, maps, device, only)
+    if split not in SPLITS:
+        raise InputError(f"The split is {split!r}; choose one of {', '.join(SPLITS)}.")
+    return Options(size, seed, spp, split, _files(meshes, ".ply", split), _files(envmaps, ".exr", split), device, only)
+
+
+def _files(folder: Path | None, ending: str, split: str) -> tuple[Path, ...]:
+    """The files below a folder that a split may use, sorted by name; none for no folder."""
+    if folder is None:
+        return ()
+    if not Path(folder).is_dir():
+        raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
+    wanted = [p for p in Path(folder).rglob(f"*{ending}") if (p.stem in HELD_OUT) == (split == "heldout")]
+    if not wanted:
+        raise InputError(f"{folder} holds no {ending} file for the split {split!r}; give another or leave it out.")
+    return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
 
 
 def produce(
@@ -70,7 +88,12 @@ def produce(
         raise InputError(f"count is {count} and workers is {workers}; give at least 1 of each.")
     for path in options.meshes:  # a damaged one must not end a long run
         things.mesh(path)
-    _open(folder, options, resume)
+    if not resume and folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
+    claim(folder, DESCRIPTION, _description(options), _IDENTITY)
+    (folder / "samples").mkdir(exist_ok=True)
+    for stale in (folder / "samples").glob("*.tmp"):
+        stale.unlink(missing_ok=True)
     missing = [k for k in range(count) if not sample_path(folder, k).exists()]
     start, done = time.monotonic(), 0
     for done, _ in enumerate(_rendered(folder, options, missing, workers), 1):
@@ -84,7 +107,7 @@ def sample_path(folder: Path, index: int) -> Path:
     return folder / "samples" / f"{index:07d}.npz"
 
 
-def _rendered(folder: Path, options: Options, missing: list[int], workers: int):
+def _rendered(folder: Path, options: Options, missing: list[int], workers: int) -> Iterator[int]:
     if workers == 1 or len(missing) < 2:
         yield from (_write(folder, options, k) for k in missing)
         return
@@ -102,76 +125,34 @@ def _one_thread() -> None:
 
 
 def _write(folder: Path, options: Options, index: int) -> int:
-    arrays = make_sample(index, options)
-    path = sample_path(folder, index)
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez(file, allow_pickle=False, **arrays)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    write_arrays(sample_path(folder, index), make_sample(index, options))
     return index
 
 
-def _open(folder: Path, options: Options, resume: bool) -> None:
-    """Create the folder and its description, or check that it is the same set."""
-    described = _description(options)
-    file = folder / "dataset.json"
-    if folder.is_dir() and any(folder.iterdir()):
-        if not resume:
-            raise InputError(
-                f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
-            )
-        if file.exists():
-            _same(read_description(folder), described, folder)
-    try:
-        (folder / "samples").mkdir(parents=True, exist_ok=True)
-        for stale in (folder / "samples").glob("*.tmp"):
-            stale.unlink(missing_ok=True)
-        temporary = folder / f"dataset.{os.getpid()}.tmp"
-        temporary.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
-        os.replace(temporary, file)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
-
-
-def _description(options: Options) -> dict:
+def _description(options: Options) -> dict[str, Any]:
     from materialist import __version__
 
     return {
-        "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split,
-        "content": CONTENT[options.split],
+        "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT,
         "options": {"spp": options.spp, "meshes": [p.stem for p in options.meshes],
                     "envmaps": [p.stem for p in options.envmaps]} | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
     }  # fmt: skip
 
 
-def read_description(folder: str | Path) -> dict:
+def read_description(folder: str | Path) -> dict[str, Any]:
     """The content of DIR/dataset.json. Raises InputError where there is none that this version can read."""
-    file = Path(folder) / "dataset.json"
-    try:
-        found = json.loads(file.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file} describes no data set ({error}); make one: materialist train data.") from error
-    if not isinstance(found, dict) or found.get("format") != FORMAT:
-        raise InputError(f"{file} has another format than {FORMAT}; make the set again with this version.")
+    file = Path(folder) / DESCRIPTION
+    found = described(file)
+    if found is None or found.get("format") != FORMAT:
+        raise InputError(f"{file} describes no data set of format {FORMAT}; make one: materialist train data.")
     return found
 
 
-def identity(folder: str | Path) -> dict:
-    """What tells the samples of one set from those of another, whatever their number and place; see `_description`.
+def identity(folder: str | Path) -> dict[str, Any]:
+    """What tells the samples of one set from those of another, whatever their number and place.
 
     Raises InputError as `read_description` does.
     """
-    found = {"content": 1, **read_description(folder)}
+    found = read_description(folder)
     return {name: found.get(name) for name in _IDENTITY}
-
-
-def _same(old: dict, new: dict, folder: Path) -> None:
-    old = {"content": 1, **old}
-    for name in _IDENTITY:
-        if old.get(name) != new[name]:
-            remedy = "resume with that or name another" if name != "content" else "name another, samples have changed"
-            raise InputError(f"{folder} was begun with {name} {old.get(name)}, not {new[name]}; {remedy}.")

@@ -174,14 +174,13 @@ def test_loading_draws_no_random_numbers(tmp_path, state):
 def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     """SiLog makes the output depth; the published weights' output falls with distance, and is turned round."""
     from materialist.predict.matnet.inference import LEAST_DEPTH, planar_depth
+    from materialist.predict.matnet.predictor import FORMAT
+    from materialist.predict.weights import write_weights
     from materialist.train import checkpoint
-    from materialist.train.export import export_run
-    from materialist.train.recipes import recipe
 
     photo = made_photo(42, 56)
-    found = {"network": state, "step": 4, "seconds": 9.0, "data": {}, "recipe": recipe("paper").as_dict()}
-    checkpoint.save(tmp_path, found)
-    export_run(tmp_path, tmp_path / "own.safetensors")
+    checkpoint.save(tmp_path, {"kind": "matnet", "network": state, "task": {"name": "paper"}})
+    write_weights(tmp_path / "own.safetensors", state, {"format": FORMAT})
     published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu")
     output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0

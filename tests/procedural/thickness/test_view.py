@@ -8,15 +8,14 @@ import pytest
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.procedural.objects import solids
-from materialist.procedural.objects.glassware import Shape, shape
-from materialist.procedural.thickness import dataset as lessons
-from materialist.procedural.thickness import view
+from materialist.procedural.objects.glassware import Shape, make_shape
+from materialist.procedural.thickness import dataset, view
 from materialist.procedural.thickness.ray_paths import Tracer
 
 
 @pytest.mark.parametrize("index", range(20))
 def test_every_kind_of_shape_is_usable(index):
-    made = shape(index)
+    made = make_shape(index)
     vertices = made.solid.vertices
     assert np.isfinite(vertices).all() and np.ptp(vertices, axis=0).max() == pytest.approx(1)
     np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
@@ -31,9 +30,9 @@ def test_every_kind_of_shape_is_usable(index):
 
 
 def test_shapes_depend_on_their_numbers_alone():
-    assert np.array_equal(shape(3).solid.vertices, shape(3).solid.vertices)
-    others = shape(23), shape(3, "heldout"), shape(3, seed=1)  # the same kind as 3
-    assert all(not np.array_equal(shape(3).solid.vertices, o.solid.vertices) for o in others)
+    assert np.array_equal(make_shape(3).solid.vertices, make_shape(3).solid.vertices)
+    others = make_shape(23), make_shape(3, "heldout"), make_shape(3, seed=1)  # the same kind as 3
+    assert all(not np.array_equal(make_shape(3).solid.vertices, o.solid.vertices) for o in others)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +41,7 @@ def ball():
 
 
 def test_a_balls_view_is_consistent(ball):
-    lesson = view.lesson(ball, Tracer(ball.solid), np.random.default_rng(1), exact=True)
+    lesson = view.draw_example(ball, Tracer(ball.solid), np.random.default_rng(1), exact=True)
     maps, target = lesson.maps.astype(float), lesson.target.astype(float)
     assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (ANSWERS, SIDE, SIDE)
     inside = maps[MASK] > 0.5
@@ -64,7 +63,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
     """The network must not learn one exact frame: a window a few percent larger doubled its error."""
     sides = []
     for seed in range(16):
-        maps = view.lesson(ball, Tracer(ball.solid), np.random.default_rng(seed)).maps
+        maps = view.draw_example(ball, Tracer(ball.solid), np.random.default_rng(seed)).maps
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
     framed = SIDE / (1 + 2 * MARGIN)
@@ -92,18 +91,18 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
 
 
 def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
-    plan = lessons.Plan(shapes=2, views=2)
-    lessons.produce(tmp_path / "set", plan)
-    first = lessons.load(tmp_path / "set")
+    plan = dataset.Plan(shapes=2, views=2)
+    dataset.produce(tmp_path / "set", plan)
+    first = dataset.load(tmp_path / "set")
     assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
     before = (tmp_path / "set" / "00001.npz").stat().st_mtime_ns
-    lessons.produce(tmp_path / "set", replace(plan, shapes=3))
+    dataset.produce(tmp_path / "set", replace(plan, shapes=3))
     assert (tmp_path / "set" / "00001.npz").stat().st_mtime_ns == before
-    assert len(lessons.load(tmp_path / "set")["maps"]) == 6
-    assert np.array_equal(lessons.views(1, plan)["maps"], first["maps"][2:])
-    with pytest.raises(InputError, match="other things"):
-        lessons.produce(tmp_path / "set", replace(plan, seed=5))
+    assert len(dataset.load(tmp_path / "set")["maps"]) == 6
+    assert np.array_equal(dataset.make_views(1, plan)["maps"], first["maps"][2:])
+    with pytest.raises(InputError, match="was begun with"):
+        dataset.produce(tmp_path / "set", replace(plan, seed=5))
     with pytest.raises(InputError, match="no views to learn from"):
-        lessons.load(tmp_path)
+        dataset.load(tmp_path)
     with pytest.raises(InputError, match="split is 'odd'"):
-        lessons.Plan(split="odd")
+        dataset.Plan(split="odd")

@@ -72,9 +72,9 @@ class MatNetPredictor:
 
 def _trained_here(content: object, path: Path) -> bool:
     """Whether the weights are a checkpoint of `train matnet --config paper`, or what `train export` wrote of one."""
-    recipe = content.get("recipe") if isinstance(content, dict) else None
-    if isinstance(recipe, dict):
-        return recipe.get("task") == "paper"
+    task = content.get("task") if isinstance(content, dict) else None
+    if isinstance(task, dict):
+        return task.get("name") == "paper"
     return path.suffix == ".safetensors" and metadata(path).get("format") == FORMAT
 
 

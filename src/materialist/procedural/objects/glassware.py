@@ -32,7 +32,7 @@ class Shape:
     """Whether it stands as it is; other shapes are seen from everywhere."""
 
 
-def shape(index: int, split: str = "train", seed: int = 0) -> Shape:
+def make_shape(index: int, split: str = "train", seed: int = 0) -> Shape:
     """Shape number `index` of a split; the same numbers give the same shape, and no two splits share one."""
     rng = np.random.default_rng([seed, SPLITS[split], index])
     kinds = list(_KINDS)

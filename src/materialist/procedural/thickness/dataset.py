@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
+from materialist.io.described import claim
 from materialist.io.samples import read_arrays, write_arrays
-from materialist.procedural.objects.glassware import SPLITS, shape
+from materialist.procedural.objects.glassware import SPLITS, make_shape
 from materialist.procedural.thickness.ray_paths import Tracer
-from materialist.procedural.thickness.view import lesson
+from materialist.procedural.thickness.view import draw_example
 from materialist.types import Array
 
 Progress = Callable[[str, int, int], None]
-DESCRIPTION = "lessons.json"
+DESCRIPTION = "views.json"
 FORMAT = 3
 
 
@@ -48,22 +47,22 @@ def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> f
 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
     """
-    _open(folder, plan)
+    claim(folder, DESCRIPTION, {"format": FORMAT, **asdict(plan)}, ("format", "views", "split", "seed"))
     start = time.monotonic()
     for index in range(plan.shapes):
         path = folder / f"{index:05d}.npz"
         if not path.exists():
-            write_arrays(path, views(index, plan))
+            write_arrays(path, make_views(index, plan))
         progress("shapes", index + 1, plan.shapes)
     return time.monotonic() - start
 
 
-def views(index: int, plan: Plan) -> dict[str, Array]:
+def make_views(index: int, plan: Plan) -> dict[str, Array]:
     """Views of shape `index`: maps [V, CHANNELS, S, S] and target [V, 5, S, S] float16, hollow [V] bool."""
-    chosen = shape(index, plan.split, plan.seed)
+    chosen = make_shape(index, plan.split, plan.seed)
     tracer = Tracer(chosen.solid)
     rng = np.random.default_rng([plan.seed, SPLITS[plan.split], index, 1])
-    found = [lesson(chosen, tracer, rng) for _ in range(plan.views)]
+    found = [draw_example(chosen, tracer, rng) for _ in range(plan.views)]
     return {
         "maps": np.stack([f.maps for f in found]),
         "target": np.stack([f.target for f in found]),
@@ -71,39 +70,10 @@ def views(index: int, plan: Plan) -> dict[str, Array]:
     }
 
 
-def count(folder: Path) -> int:
-    """How many shapes of a set are there."""
-    return sum(1 for _ in folder.glob("[0-9]*.npz"))
-
-
 def load(folder: Path) -> dict[str, Array]:
-    """All views of a set, as `views` has them. Raises InputError when FOLDER holds no set, or a damaged file."""
+    """All views of a set, as `make_views` has them. Raises InputError when FOLDER holds no set, or a damaged file."""
     files = sorted(folder.glob("[0-9]*.npz"))
     if not files or not (folder / DESCRIPTION).is_file():
         raise InputError(f"{folder} holds no views to learn from; make some: materialist train refraction --data-only.")
     parts = [read_arrays(file, "maps", "target", "hollow") for file in files]
     return {name: np.concatenate([p[name] for p in parts]) for name in ("maps", "target", "hollow")}
-
-
-def _open(folder: Path, plan: Plan) -> None:
-    file, described = folder / DESCRIPTION, {"format": FORMAT, **asdict(plan)}
-    try:
-        if folder.is_dir() and any(folder.iterdir()):
-            old = _described(file)
-            if old is None or any(old.get(k) != described[k] for k in ("format", "views", "split", "seed")):
-                raise InputError(f"{folder} holds other things than this set of views; name another folder.")
-        folder.mkdir(parents=True, exist_ok=True)
-        partial = file.with_suffix(".part")
-        partial.write_text(json.dumps(described, indent=1) + "\n", "utf-8")
-        partial.replace(file)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
-
-
-def _described(file: Path) -> dict[str, Any] | None:
-    """What a folder says of its set; None where it says nothing, or that is damaged."""
-    try:
-        found = json.loads(file.read_text("utf-8"))
-    except (FileNotFoundError, ValueError):
-        return None
-    return found if isinstance(found, dict) else None

@@ -11,7 +11,7 @@ from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
 from materialist.procedural.thickness.ray_paths import Tracer
-from materialist.procedural.thickness.view import lesson
+from materialist.procedural.thickness.view import draw_example
 from materialist.types import Array
 
 THIN = 0.05
@@ -37,15 +37,15 @@ def degrees(found: Array, truth: Array, inside: Array) -> Array:
     return (angle * inside).sum((1, 2)) / np.maximum(inside.sum((1, 2)), 1)
 
 
-def score(network, lessons: dict[str, Array]) -> dict[str, float]:
+def mean_errors(network, views: dict[str, Array]) -> dict[str, float]:
     """Means of `errors` over views, and medians as NAME_median."""
-    each = errors(network, lessons)
+    each = errors(network, views)
     figures = {name: float(np.nanmean(values)) for name, values in each.items()}
     return figures | {f"{k}_median": float(np.nanmedian(each[k])) for k in ("solid", "symmetry", "hollow") if k in each}
 
 
-def errors(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, Array]:
-    """Figures [N] of every view (see `lessons.views`).
+def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array]:
+    """Figures [N] of every view (see `dataset.make_views`).
 
     `solid`, `hollow`: relative errors, the latter NaN for shapes that are not, and left out where none is; `symmetry`:
     of the mirrored thickness as the solid one; `solid_pixel`, `symmetry_pixel`: `pixel_error`; `back`,
@@ -55,7 +55,7 @@ def errors(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, Arr
 
     from materialist.predict.refraction.network import both_ways
 
-    maps, target = lessons["maps"].astype(np.float32), lessons["target"].astype(np.float32)
+    maps, target = views["maps"].astype(np.float32), views["target"].astype(np.float32)
     with torch.inference_mode():
         parts = [both_ways(network, torch.from_numpy(maps[k : k + batch])).numpy() for k in range(0, len(maps), batch)]
     found = np.concatenate(parts)
@@ -71,7 +71,7 @@ def errors(network, lessons: dict[str, Array], batch: int = 64) -> dict[str, Arr
         "back": degrees(found[:, BACK_X:], target[:, BACK_X:], inside),
         "back_symmetry": degrees(front, target[:, BACK_X:], inside),
     }
-    hollow = lessons["hollow"].astype(bool)
+    hollow = views["hollow"].astype(bool)
     if hollow.any():
         figures["hollow"] = np.where(hollow, relative_error(found[:, 1], target[:, 1], inside), np.nan)
     return figures
@@ -86,10 +86,10 @@ def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str
     for file in files:
         shape = Shape(centred(mesh(file)), False, file.stem, True)
         tracer, rng = Tracer(shape.solid), np.random.default_rng([seed, len(found)])
-        lessons = [lesson(shape, tracer, rng, exact=True) for _ in range(views)]
+        examples = [draw_example(shape, tracer, rng, exact=True) for _ in range(views)]
         found[file.stem] = {
-            "maps": np.stack([x.maps for x in lessons]),
-            "target": np.stack([x.target for x in lessons]),
+            "maps": np.stack([x.maps for x in examples]),
+            "target": np.stack([x.target for x in examples]),
             "hollow": np.zeros(views, bool),
         }
     return found

@@ -24,7 +24,7 @@ OFF = (0.03, 0.015)
 
 
 @dataclass(frozen=True)
-class Lesson:
+class ThicknessExample:
     """One view."""
 
     maps: Array
@@ -47,7 +47,7 @@ class Pose:
     """[3] the shape's middle in the camera frame."""
 
 
-def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: bool = False) -> Lesson:
+def draw_example(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: bool = False) -> ThicknessExample:
     """A random view of the shape, cut from a picture of any size as `Window` does at prediction.
 
     `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise.
@@ -64,7 +64,7 @@ def lesson(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: boo
     target = np.stack([picture(paths.solid), picture(paths.material)]) * np.linalg.norm(view.rays, axis=-1) / view.size
     back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
-    return Lesson(features(view).astype(np.float16), target, shape.hollow)
+    return ThicknessExample(features(view).astype(np.float16), target, shape.hollow)
 
 
 def _cut(rng: np.random.Generator, tracer: Tracer, pose: Pose, vertices: Array) -> View:

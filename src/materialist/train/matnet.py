@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -11,18 +13,24 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.errors import WeightsError
-from materialist.io.samples import Sample
+from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
 from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.inference import infer
-from materialist.predict.matnet.network import MatNet
-from materialist.predict.weights import read_state
+from materialist.predict.matnet.network import MatNet, Size
+from materialist.predict.matnet.predictor import FORMAT
+from materialist.predict.weights import read_state, write_weights
 from materialist.train import augment, losses
-from materialist.train.recipes import Recipe
-from materialist.train.tasks import Batch
+from materialist.train.maps import MapsTask
+from materialist.train.task import Batch, Recipe
 from materialist.types import Materials, Prediction
 
+RECIPE = Recipe(
+    side=512, batch=8, rate=1e-5, weight_decay=0.01, betas=(0.9, 0.999), warm_up=0, last_rate=1.0, ema=0.0, clip=1e9
+)
+"""Paper, Implementation Details: AdamW, learning rate 1e-5, 512 x 512 crops. Where the paper says nothing (batch,
+decay of weights and of the rate), torch's default or a constant."""
 DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
 """Parts of the depth decoder that learn (paper: "the last four layers of the RefineNet"); its rest is frozen."""
 
@@ -30,46 +38,55 @@ UNUSED = ".refinenet4.resConfUnit1."
 """The first unit of the coarsest layer, which has nothing to be added to it."""
 
 
-class PaperTask:
+class PaperTask(MapsTask):
     """MatNet: LPIPS + L1 for albedo, L1 for roughness and metallic, SiLog for depth, cosine for normals."""
 
-    def __init__(self, init: str | Path | None = None):
-        """`init` is a Depth Anything or DINOv2 checkpoint; it gives what it has, the rest starts at random."""
-        self.init = None if init is None else Path(init)
+    name: ClassVar[str] = "paper"
+
+    def __init__(
+        self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
+        size: str | Size = "vitb",
+    ):  # fmt: skip
+        """`init`: a Depth Anything or DINOv2 checkpoint; it gives what it has, the rest starts at random."""
+        self.size, self.lpips = size, backbone("vgg")
         start = (
             "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)." if init is None
-            else f"MatNet starts from {self.init}."
+            else f"MatNet starts from {init}."
         )  # fmt: skip
-        self.lpips = backbone("vgg")
         perceptual = (
             "Albedo: L1 and LPIPS (VGG)." if self.lpips is not None
             else "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
             "package or backbone is not installed."
         )  # fmt: skip
-        self.notes: tuple[str, ...] = (perceptual, start)
+        self.notes = (perceptual, start)
+        super().__init__(source, recipe, init=init, score_samples=score_samples)
 
-    def network(self, recipe: Recipe) -> nn.Module:
-        """MatNet of the recipe's size, its encoder frozen and of its depth decoder all but the RefineNet layers."""
-        network = MatNet(**(recipe.network or {"size": "vitb"}))
+    def identity(self) -> dict[str, Any]:
+        """The size of MatNet."""
+        return {"name": self.name, "network": self.size if isinstance(self.size, str) else asdict(self.size)}
+
+    def network(self) -> nn.Module:
+        """MatNet, its encoder frozen and of its depth decoder all but the RefineNet layers."""
+        network = MatNet(self.size)
         if self.init is not None:
             load_start(network, self.init)
         freeze(network)
         return network
 
-    def prepare(self, sample: Sample, size: int, rng: np.random.Generator) -> Sample:
-        """The paper's augmentation and no other: a random vertical flip and a random size x size crop."""
+    def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
+        """The paper's augmentation and no other: a random vertical flip and a random side x side crop."""
         height, width = sample.depth.shape
-        if min(height, width) < size:
-            factor = size / min(height, width)
-            sample = augment.resized(sample, max(size, round(height * factor)), max(size, round(width * factor)))
+        if min(height, width) < side:
+            factor = side / min(height, width)
+            sample = augment.resized(sample, max(side, round(height * factor)), max(side, round(width * factor)))
             height, width = sample.depth.shape
-        top, left = int(rng.integers(0, height - size + 1)), int(rng.integers(0, width - size + 1))
-        sample = augment.window(sample, top, left, size, size)
+        top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
+        sample = augment.window(sample, top, left, side, side)
         if rng.random() < 0.5:
             sample = augment.flip_vertical(sample)
         return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
 
-    def terms(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
+    def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """The five losses of L_MatNet, all with weight 1."""
         image, mask = batch["image"], batch["mask"]
         height, width = image.shape[-2:]
@@ -100,6 +117,10 @@ class PaperTask:
         normal = maps["normal"] / np.maximum(np.linalg.norm(maps["normal"], axis=-1, keepdims=True), 1e-6)
         unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
         return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
+
+    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
+        """Write the network as `--predictor matnet:FILE` reads it."""
+        write_weights(path, network.state_dict(), {"format": FORMAT, "facts": json.dumps(facts)})
 
 
 def freeze(network: MatNet) -> None:

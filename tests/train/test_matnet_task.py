@@ -1,5 +1,7 @@
 """The paper's recipe on a MatNet of a few thousand parameters."""
 
+import json
+
 import made_samples
 import numpy as np
 import pytest
@@ -8,12 +10,23 @@ import torch
 from materialist.errors import WeightsError
 from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet, Size
-from materialist.train import tasks
-from materialist.train.paper_task import PaperTask, freeze, load_start
-from materialist.train.recipes import recipe
+from materialist.predict.matnet.predictor import FORMAT
+from materialist.predict.weights import metadata
+from materialist.train import matnet
+from materialist.train.matnet import RECIPE, PaperTask, freeze, load_start
 from materialist.train.stream import epoch
 
 TINY = Size(width=12, blocks=4, heads=2, layers=(0, 1, 2, 3), pyramid=(8, 8, 8, 8), fused=8, grid=4)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    return SampleFolder(made_samples.write_set(tmp_path_factory.mktemp("set"), 2))
+
+
+@pytest.fixture
+def task(source):
+    return PaperTask(source, size=TINY)
 
 
 @pytest.fixture
@@ -23,8 +36,8 @@ def network():
 
 
 def test_the_recipe_is_the_papers():
-    paper = recipe("paper")
-    assert (paper.rate, paper.size, paper.clip, paper.ema, paper.warm_up, paper.last_rate) == (1e-5, 512, 1e9, 0, 0, 1)
+    paper = RECIPE
+    assert (paper.rate, paper.side, paper.clip, paper.ema, paper.warm_up, paper.last_rate) == (1e-5, 512, 1e9, 0, 0, 1)
 
 
 def test_what_is_frozen(network):
@@ -38,56 +51,44 @@ def test_what_is_frozen(network):
     assert {name.split(".refinenet")[1][0] for name in depth} == set("1234")
 
 
-def test_a_step_moves_only_what_learns(network, tmp_path):
+def test_a_step_moves_what_learns_and_nothing_else(network, task):
+    """And all of it has a gradient: processes that train together wait for every one."""
     freeze(network)
     before = {k: v.clone() for k, v in network.state_dict().items()}
-    task = PaperTask()
-    source = SampleFolder(made_samples.write_set(tmp_path, 2))
-    batch = next(iter(epoch(source, task, number=1, size=32, batch=2, seed=0, workers=0)))
+    batch = next(iter(epoch(task.examples, number=1, side=32, batch=2, seed=0)))
     optimizer = torch.optim.AdamW([p for p in network.parameters() if p.requires_grad], lr=1e-3)
-    terms = task.terms(network, batch)
+    terms = task.losses(network, batch)
     assert set(terms) == {"albedo", "roughness", "metallic", "normal", "depth"}
     sum(terms.values()).backward()
+    assert [name for name, p in network.named_parameters() if p.requires_grad and p.grad is None] == []
     optimizer.step()
     moved = {k for k, v in network.state_dict().items() if not torch.equal(v, before[k])}
     assert moved and not any(name.startswith("pretrained.") for name in moved)
 
 
-def test_everything_that_learns_has_a_gradient(network, tmp_path):
-    """Processes that train together wait for all of them."""
-    freeze(network)
-    source = SampleFolder(made_samples.write_set(tmp_path, 2))
-    batch = next(iter(epoch(source, PaperTask(), number=1, size=32, batch=2, seed=0, workers=0)))
-    sum(PaperTask().terms(network, batch).values()).backward()
-    assert [name for name, p in network.named_parameters() if p.requires_grad and p.grad is None] == []
-
-
-def test_lpips_is_taken_where_it_is(monkeypatch):
-    from materialist.train import paper_task
-
+def test_lpips_is_taken_where_it_is(monkeypatch, source):
     class Distance(torch.nn.Module):
         def forward(self, a, b):
             assert a.min() >= -1 and a.max() <= 1
             return (a - b).abs().mean((1, 2, 3), keepdim=True)
 
-    monkeypatch.setattr(paper_task, "backbone", lambda name: Distance())
-    task = PaperTask()
+    monkeypatch.setattr(matnet, "backbone", lambda name: Distance())
+    task = PaperTask(source, size=TINY)
     assert task.notes[0] == "Albedo: L1 and LPIPS (VGG)."
     found, true, mask = torch.rand(2, 3, 8, 8), torch.full((2, 3, 8, 8), 0.5), torch.zeros(2, 1, 8, 8)
     assert task._perceptual(found, true, mask) == 0, "nothing counts where there is no surface"
     assert task._perceptual(found, true, mask + 1) > 0.05
 
 
-def test_the_notes_say_what_stands_in_for_lpips():
-    assert any("in place of LPIPS" in note for note in PaperTask().notes)
-    assert any("random weights" in note for note in PaperTask().notes)
+def test_the_notes_say_what_stands_in_for_lpips(task):
+    assert any("in place of LPIPS" in note for note in task.notes)
+    assert any("random weights" in note for note in task.notes)
 
 
-def test_only_flips_upside_down_and_crops(tmp_path):
-    source = SampleFolder(made_samples.write_set(tmp_path, 1))
+def test_only_flips_upside_down_and_crops(task, source):
     seen = set()
     for seed in range(8):
-        sample = PaperTask().prepare(source.read(0), 32, np.random.default_rng(seed))
+        sample = task.prepare(source.read(0), 32, np.random.default_rng(seed))
         assert sample.image.shape == (32, 32, 3) and sample.image.max() <= 1
         surface = sample.mask > 0
         seen.add(bool(sample.normal[surface][0, 1] < 0))
@@ -95,9 +96,8 @@ def test_only_flips_upside_down_and_crops(tmp_path):
     assert seen == {True, False}
 
 
-def test_small_pictures_are_enlarged_to_the_crop(tmp_path):
-    sample = SampleFolder(made_samples.write_set(tmp_path, 1)).read(0)
-    assert PaperTask().prepare(sample, 96, np.random.default_rng(0)).image.shape == (96, 96, 3)
+def test_small_pictures_are_enlarged_to_the_crop(task, source):
+    assert task.prepare(source.read(0), 96, np.random.default_rng(0)).image.shape == (96, 96, 3)
 
 
 def test_starting_from_other_checkpoints(network, tmp_path):
@@ -116,13 +116,15 @@ def test_starting_from_other_checkpoints(network, tmp_path):
         load_start(MatNet(TINY), tmp_path / "else.pth")
 
 
-def test_its_answers_are_maps(network, tmp_path):
-    sample = SampleFolder(made_samples.write_set(tmp_path, 1)).read(0)
-    prediction = PaperTask().predict(network, sample)
+def test_its_answers_are_maps(network, task, source):
+    sample = source.read(0)
+    prediction = task.predict(network, sample)
     assert prediction.depth.shape == sample.depth.shape and (prediction.depth > 0).all()
     assert prediction.materials.albedo.max() <= 1
 
 
-def test_the_task_is_chosen_by_the_recipe():
-    assert isinstance(tasks.task(recipe("paper")), PaperTask)
-    assert isinstance(tasks.task(recipe("bundled")), tasks.BundledTask)
+def test_a_run_leaves_weights_that_the_predictor_takes_for_its_own(task, tmp_path):
+    file = tmp_path / "w.safetensors"
+    task.save(file, task.network(), {"step": 1})
+    assert metadata(file)["format"] == FORMAT and json.loads(metadata(file)["facts"]) == {"step": 1}
+    assert not any(p.requires_grad for n, p in task.network().named_parameters() if n.startswith("pretrained."))

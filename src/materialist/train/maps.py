@@ -1,0 +1,145 @@
+"""What the networks that predict all maps have in common: pictures with true maps, scores and a sheet."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from torch import nn
+
+from materialist.errors import InputError
+from materialist.io.map_sheet import strip, write_sheet
+from materialist.io.samples import Sample, Source
+from materialist.metrics.maps import score, summary
+from materialist.procedural.photographic import as_photo
+from materialist.train.task import Recipe
+from materialist.types import Array, Prediction
+
+HELD_OUT_EVERY = 40
+"""Of every so many samples the last one is never trained on, but scored."""
+SHEET_ROWS = 6
+HELD_OUT, TRAINED_ON = "samples kept aside", "samples trained on"
+
+
+@dataclass
+class Pictures:
+    """The samples of a set that are trained on, changed at random by `prepare`."""
+
+    source: Source
+    prepare: Callable[[Sample, int, np.random.Generator], Sample]
+
+    def __post_init__(self) -> None:
+        self._places = trained_on(self.source)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def refresh(self) -> None:
+        """List the set again."""
+        self.source.refresh()
+        self._places = trained_on(self.source)
+
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """The arrays of a variant as [C, side, side] float32; see `arrays_of`."""
+        return arrays_of(self.prepare(self.source.read(self._places[index]), side, rng))
+
+
+class MapsTask(ABC):
+    """A network from a picture to all maps, on procedural samples or on InteriorVerse."""
+
+    kind: ClassVar[str] = "matnet"
+    name: ClassVar[str]
+    """The --config of the command."""
+    notes: tuple[str, ...] = ()
+    scored_on = ""
+    """What the last scores are of: HELD_OUT or TRAINED_ON."""
+
+    def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
+        """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""
+        if score_samples < 0:
+            raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
+        self.source, self.recipe, self.init, self.score_samples = source, recipe, init, score_samples
+        self.examples = Pictures(source, self.prepare)
+        self.notes = (*self.notes, *getattr(source, "notes", list)())
+
+    @abstractmethod
+    def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
+        """A random variant of a sample at side x side pixels."""
+
+    @abstractmethod
+    def predict(self, network: nn.Module, sample: Sample) -> Prediction:
+        """The maps of a sample, as the predictor finds them."""
+
+    def data(self) -> dict[str, Any]:
+        """How many samples there are, and the seeds they were made with."""
+        return {"samples": len(self.source), "seed": getattr(self.source, "seed", lambda: None)()}
+
+    def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
+        """Means over held-out samples, seen as photographs (always the same ones); draws FOLDER/sheet.png.
+
+        Of a set that is too small to hold any out, samples that it learns from are scored, and `of` says so.
+        """
+        samples = held_out(self.source, self.score_samples) if self.score_samples else []
+        rows, strips = [], []
+        for k, sample in enumerate(samples):
+            photo = as_photo(sample, np.random.default_rng((7, k)))
+            predicted = self.predict(network, photo)
+            rows.append(score(predicted, photo.truth()))
+            if k < SHEET_ROWS:
+                strips.append(strip(photo.image, predicted, photo.truth()))
+        write_sheet(strips, folder / "sheet.png")
+        if not samples:
+            return {}
+        self.scored_on = TRAINED_ON if none_held_out(self.source) else HELD_OUT
+        found = summary([row for row in rows if row])
+        shown = {name: value for name, value in found.items() if not name.endswith(("_mse", "_raw", "_scale"))}
+        return {"of": self.scored_on, **shown}
+
+
+def arrays_of(sample: Sample) -> dict[str, Array]:
+    """[C, H, W] float32: image, rays, albedo (linear), roughness, metallic, normal, depth, mask."""
+    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__ if name != "shading"}
+    return {
+        name: np.ascontiguousarray(np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None], np.float32)
+        for name, a in arrays.items()
+    }
+
+
+def trained_on(source: Source) -> list[int]:
+    """Places of the samples to train on; the others are held out. All, when there are too few."""
+    count = len(source)
+    return [k for k in range(count) if count < HELD_OUT_EVERY or not _is_held_out(source, k)]
+
+
+def _is_held_out(source: Source, place: int) -> bool:
+    """Whether the sample at a place is never trained on: its own number decides, so that others may come and go."""
+    number = getattr(source, "number", lambda k: k)(place)
+    return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+
+
+def none_held_out(source: Source) -> bool:
+    """Whether `held_out` has to take samples that are trained on."""
+    return len(trained_on(source)) == len(source) and getattr(source, "validation", lambda: None)() is None
+
+
+def held_out(source: Source, most: int) -> list[Sample]:
+    """Up to `most` samples that are not trained on, spread over the set (the first ones of a tiny set).
+
+    They come from the source's own validation split where it has one. Those that cannot be read are left out.
+    """
+    validation = getattr(source, "validation", lambda: None)()
+    if validation is not None:
+        chosen, source = list(range(len(validation))), validation
+    else:
+        chosen = sorted(set(range(len(source))) - set(trained_on(source))) or list(range(min(len(source), most)))
+    found = []
+    for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
+        try:
+            found.append(source.read(chosen[k]))
+        except InputError:
+            continue
+    return found

@@ -1,1 +1,0 @@
-"""Training of RefractionNet: shapes, their thickness along camera rays, and the trainer."""

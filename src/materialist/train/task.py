@@ -1,0 +1,123 @@
+"""What a run trains: a network, what it learns from, its losses and its scores."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+from torch import Tensor, nn
+
+from materialist.errors import InputError
+from materialist.predict.network import shared_tensors
+from materialist.predict.weights import load_weights, read_state
+from materialist.types import Array
+
+Batch = Mapping[str, Tensor]
+"""Names of an example's arrays -> [B, ...] float32."""
+
+MULTIPLE = 32
+"""Sides of training pictures are multiples of this: the networks halve them five times."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Settings of the optimiser (AdamW) and of the size of training pictures; stored with the weights."""
+
+    side: int
+    """Pixels on a side of training pictures, at the end where `growth` has smaller ones before."""
+    batch: int
+    """Pictures a step, on each device."""
+    rate: float
+    """Peak learning rate."""
+    weight_decay: float = 0.02  # of weights, not of biases and gains; tuned by eye
+    betas: tuple[float, float] = (0.9, 0.98)  # of AdamW; tuned by eye
+    warm_up: int = 100  # steps in which the rate rises to its peak; tuned by eye
+    last_rate: float = 0.01  # rate at the end of the cosine, as a part of the peak; 1 keeps it constant
+    ema: float = 0.998  # decay a step of the averaged weights; 0 averages nothing; tuned by eye
+    clip: float = 1.0  # largest norm of the gradient; tuned by eye
+    bfloat16: bool = False  # whether convolutions and products run in bfloat16
+    growth: tuple[tuple[float, int], ...] = ()
+    """(part of the run, side of the pictures up to there), in order: several small pictures cost one large one."""
+
+    def __post_init__(self) -> None:
+        for side in (self.side, *(size for _, size in self.growth)):
+            if side < MULTIPLE or side % MULTIPLE:
+                raise InputError(f"The size of training pictures is {side}; give a multiple of {MULTIPLE}.")
+        if self.batch < 1:
+            raise InputError(f"The batch is {self.batch}; give at least 1.")
+        if not 0 < self.rate < 1:
+            raise InputError(f"The learning rate is {self.rate:g}; give a number between 0 and 1.")
+
+    def side_at(self, progress: float) -> int:
+        """Side of the pictures when `progress` of the run, in [0, 1], is done."""
+        return next((side for end, side in self.growth if progress < end), self.side)
+
+    def changed(self, **changes: Any) -> Recipe:
+        """The recipe with those changes that are not None; a given `side` holds for the whole run."""
+        given = {k: v for k, v in changes.items() if v is not None}
+        return replace(self, **(({"growth": ()} if "side" in given else {}) | given))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return asdict(self)
+
+
+class Examples(Protocol):
+    """What a network learns from."""
+
+    def __len__(self) -> int:
+        """How many there are at present."""
+        ...
+
+    def draw(self, index: int, side: int, rng: Any) -> dict[str, Array]:
+        """A random variant of example `index` at side x side pixels, float32; raises InputError when it is damaged."""
+        ...
+
+    def refresh(self) -> None:
+        """Look again: a set may grow while it is used."""
+        ...
+
+
+class Task(Protocol):
+    """One of the networks, and everything that its training needs."""
+
+    kind: ClassVar[str]
+    """What checkpoints call its runs: the name of the command."""
+    notes: tuple[str, ...]
+    """What the log must say at the start."""
+    recipe: Recipe
+    examples: Examples
+
+    def identity(self) -> dict[str, Any]:
+        """Plain values that a resumed run must share, such as the network's architecture."""
+        ...
+
+    def data(self) -> dict[str, Any]:
+        """Plain values about the data, stored with the weights."""
+        ...
+
+    def network(self) -> nn.Module:
+        """A network to begin from; parameters that do not learn have requires_grad False."""
+        ...
+
+    def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
+        """Weighted terms of the loss by name; their sum is minimised."""
+        ...
+
+    def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
+        """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
+        ...
+
+    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
+        """Write the network as `predict` reads it."""
+        ...
+
+
+def load_initial(network: nn.Module, path: Path) -> None:
+    """Give the network the weights in a file that an earlier run wrote.
+
+    Raises WeightsError for a file that is damaged or of another architecture.
+    """
+    load_weights(network, dict(read_state(path)) | shared_tensors(network), path)

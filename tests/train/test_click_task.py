@@ -1,0 +1,118 @@
+"""The training of ClickNet, on pictures of two things."""
+
+import os
+import shutil
+
+import made_runs
+import numpy as np
+import pytest
+import torch
+from made_samples import write_set
+from typer.testing import CliRunner
+
+from materialist.cli import app
+from materialist.errors import InputError
+from materialist.predict.clicks.features import CHANNELS
+from materialist.procedural.dataset import options_for
+from materialist.procedural.dataset import produce as produce_set
+from materialist.train import checkpoint, click_views
+from materialist.train.click_views import ClickView, click_in, draw_click, worse
+from materialist.train.clicks import click_losses
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return made_runs.write_click_views(tmp_path_factory.mktemp("views"))
+
+
+def test_clicks_lie_on_what_they_ask_for():
+    rng = np.random.default_rng(0)
+    view = ClickView(**made_runs.click_view(0))
+    seen = set()
+    for _ in range(60):
+        maps, mask = draw_click(view, 64, rng)
+        assert maps.shape == (CHANNELS, 64, 64) and mask.shape == (64, 64) and mask.any()
+        spots = maps[-2] == 1
+        assert spots.any() and mask[spots].all(), "every click lies on the object"
+        seen.add(bool(mask.mean() > 0.5))
+    assert seen == {True, False}, "things mostly, the floor at times"
+
+
+def test_a_view_without_anything_large_enough_has_no_click():
+    view = ClickView(**{**made_runs.click_view(0), "thing": np.zeros((64, 80), np.int16)})
+    assert draw_click(view, 64, np.random.default_rng(0)) is None
+    assert click_in(np.zeros((9, 9), bool), np.random.default_rng(0), 2.5) is None
+
+
+def test_worse_maps_lose_edges_and_keep_what_they_are():
+    depth = np.full((96, 96), 2, np.float32)
+    depth[:, 48:], depth[:10] = 4, 0
+    normal = np.zeros((96, 96, 3), np.float32)
+    normal[:, :48, 2], normal[:, 48:, 0] = 1, 1
+    steps = []
+    for seed in range(12):
+        turned, bent = worse(normal, depth, np.random.default_rng(seed))
+        assert ((bent > 0) == (depth > 0)).all(), "pixels without depth keep none, and give their neighbours none"
+        known = depth > 0
+        np.testing.assert_allclose(np.linalg.norm(turned[known], axis=-1), 1, atol=1e-4)
+        assert abs(np.log(bent[known]).mean() - np.log(depth[known]).mean()) < 0.15
+        steps.append(float(np.log(bent[40:, 50] / bent[40:, 45]).mean() / np.log(2)))
+    assert np.median(steps) < 0.9 and min(steps) < 0.3, "an edge is softer, at times much; waves may add a little"
+
+
+def test_the_loss_falls(folder, tmp_path):
+    trainer = made_runs.trainer(made_runs.clicks(folder), tmp_path / "run", steps=40)
+    batch = next(trainer._batches())
+    history = [trainer._step(batch)["loss"] for _ in range(30)]
+    assert history[-1] < 0.8 * history[0]
+
+
+def test_the_loss_has_a_closed_form():
+    mask = torch.zeros(1, 4, 4)
+    mask[0, :2] = 1
+    found = click_losses(torch.zeros(1, 4, 4), mask)
+    assert found["entropy"].item() == pytest.approx(np.log(2), rel=1e-6)
+    assert found["overlap"].item() == pytest.approx(1 - (2 * 4 + 1) / (8 + 8 + 1), rel=1e-6)
+    sure = click_losses(40 * (2 * mask - 1), mask)
+    assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
+
+
+def test_scores_of_views_kept_aside(folder, tmp_path):
+    task = made_runs.clicks(folder, side=64)
+    assert task.scores(task.network(), tmp_path) == {}, "three views are too few"
+    task.held_out = task.examples.views[:1]
+    assert 0 <= task.scores(task.network().eval(), tmp_path)["iou"] <= 1
+
+
+def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
+    sets = tmp_path / "first", tmp_path / "second"
+    for seed, data in enumerate(sets):
+        produce_set(data, options_for(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
+    views = tmp_path / "run" / "views"
+    assert click_views.produce(sets[0], views) == 1
+    (made,) = click_views.load(views)
+    assert made.rgb.shape == (64, 64, 3) and made.rgb.dtype == np.uint8
+    length = np.linalg.norm(made.normal.astype(float) / 127, axis=-1)
+    assert np.abs(length[made.depth > 0] - 1).max() < 0.03
+    assert 1 in np.sign(made.thing)
+    before = (views / "0000000.npz").stat().st_mtime_ns
+    shutil.move(sets[0], tmp_path / "elsewhere")
+    assert click_views.produce(tmp_path / "elsewhere", views) == 1, "a set may move"
+    with pytest.raises(InputError, match="seed 11, not 12"):
+        click_views.produce(sets[1], views)
+    assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
+
+
+def test_input_that_cannot_be(folder, tmp_path):
+    with pytest.raises(InputError, match="no views"):
+        made_runs.clicks(tmp_path)
+    shutil.copytree(folder, tmp_path / "views")
+    os.truncate(tmp_path / "views" / "0000001.npz", 500)
+    with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
+        click_views.load(tmp_path / "views")
+    checkpoint.save(tmp_path, {"kind": "matnet"})
+    command = ["train", "clicks", "-o", tmp_path, "--data", write_set(tmp_path / "set", 1), "--steps", 1, "--resume"]
+    with pytest.raises(InputError, match="holds a run of `train matnet`"):
+        CliRunner().invoke(app, [str(word) for word in command], catch_exceptions=False)
+    with pytest.raises(InputError, match="describes no data set"):
+        click_views.produce(tmp_path / "set", tmp_path / "other")

@@ -1,0 +1,109 @@
+"""The training of RefractionNet, on two shapes."""
+
+import json
+import os
+import shutil
+import signal
+
+import made_runs
+import numpy as np
+import pytest
+import torch
+from torch.utils.data import default_collate
+from typer.testing import CliRunner
+
+from materialist.cli import app
+from materialist.cli.outcome import run_to_exit_code
+from materialist.errors import InputError
+from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.predict.refraction.network import RefractionNet
+from materialist.procedural.thickness import dataset
+from materialist.procedural.thickness.errors import mean_errors
+from materialist.train import checkpoint
+from materialist.train.refraction import RECIPE, RefractionTask, ViewExamples
+from materialist.train.trainer import Trainer
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("views")
+    dataset.produce(folder, dataset.Plan(shapes=2, views=3))
+    return folder
+
+
+def batch(views, side, seed=0):
+    examples = ViewExamples(dataset.load(views))
+    return default_collate([examples.draw(k, side, np.random.default_rng([seed, k])) for k in range(6)])
+
+
+def test_ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(Trainer, "_step", lambda self, batch: os.kill(os.getpid(), signal.SIGINT) or {"loss": 0.0})
+    plan = ["--shapes", "1", "--views", "2", "--heldout", "1", "--batch", "1"]
+    code = run_to_exit_code(app, ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "9", *plan])
+    assert code == 130 and checkpoint.load(tmp_path / "run", "refraction")["schedule"]["step"] == 0
+
+
+def test_it_leaves_weights_that_score_as_it_said_and_begin_another_run(views, tmp_path):
+    trainer = made_runs.trainer(made_runs.refraction(views, views), tmp_path / "run", steps=3)
+    figures = trainer.fit()
+    assert figures.keys() >= {"solid", "symmetry", "hollow", "back", "back_symmetry"}
+    file = tmp_path / "run" / checkpoint.WEIGHTS
+    network, facts = RefractionNet.load(file)
+    assert facts["step"] == 3 and facts["recipe"]["batch"] == 2
+    assert mean_errors(network, dataset.load(views))["solid"] == pytest.approx(figures["solid"], rel=1e-2)
+    again = made_runs.trainer(made_runs.refraction(views, init=file), tmp_path / "second", steps=1)
+    for found, wanted in zip(again.network.parameters(), trainer.averaged.parameters(), strict=True):
+        torch.testing.assert_close(found.detach(), wanted.detach(), atol=1e-6, rtol=1e-3)  # stored as float16
+
+
+def test_bad_weights_to_begin_with_are_said_before_views_are_made(tmp_path):
+    (tmp_path / "bad.safetensors").write_bytes(b"nothing")
+    command = ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "1", "--init"]
+    for name in ("bad.safetensors", "missing.safetensors"):
+        assert run_to_exit_code(app, [*command, str(tmp_path / name)]) == 2
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_loss_falls(views, tmp_path):
+    trainer = made_runs.trainer(made_runs.refraction(views), tmp_path / "run", steps=30)
+    one = batch(views, 32)
+    history = [trainer._step(one)["loss"] for _ in range(20)]
+    assert history[-1] < 0.9 * history[0]
+
+
+def test_smaller_views_keep_their_thickness(views):
+    a, b = batch(views, SIDE), batch(views, 32)
+    assert b["maps"].shape[-1] == b["target"].shape[-1] == 32
+    for name, channel in (("maps", MIRROR), ("target", 0)):
+        mean = [(x[name][:, channel] * x["maps"][:, MASK]).sum() / x["maps"][:, MASK].sum() for x in (a, b)]
+        assert mean[0].item() == pytest.approx(mean[1].item(), rel=0.06)
+
+
+def test_a_mirrored_view_is_a_view_of_the_mirrored_shape(views):
+    """Mirrored views keep what the mirror image of a shape would have: x turns around, in front and behind."""
+    full = dataset.load(views)
+    seed = next(s for s in range(20) if np.random.default_rng(s).random() < 0.5)
+    flipped = ViewExamples(full).draw(0, SIDE, np.random.default_rng(seed))
+    for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
+                                ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
+        np.testing.assert_array_equal(flipped[name][channel], sign * full[name][0, channel, :, ::-1])
+
+
+def test_views_that_cannot_be_used(views, tmp_path):
+    shutil.copytree(views, tmp_path / "views")
+    os.truncate(tmp_path / "views" / "00001.npz", 500)
+    with pytest.raises(InputError, match=r"00001\.npz cannot be read .*; delete it"):
+        dataset.load(tmp_path / "views")
+    (tmp_path / "views" / dataset.DESCRIPTION).write_text("")
+    with pytest.raises(InputError, match="name another folder"):
+        dataset.produce(tmp_path / "views", dataset.Plan(shapes=1, views=3))
+    with pytest.raises(InputError, match="views have 64"):
+        RefractionTask(views, None, RECIPE.changed(side=96))
+
+
+def test_the_command_makes_views(tmp_path):
+    options = ["--shapes", "1", "--views", "1", "--heldout", "1", "--data-only", "--json"]
+    result = CliRunner().invoke(app, ["train", "refraction", "-o", str(tmp_path / "run"), *options])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout.splitlines()[-1])["data"].endswith("views")
+    assert (tmp_path / "run" / "views" / "train" / "00000.npz").is_file()

@@ -1,0 +1,93 @@
+"""The stream of batches: shares of processes, files that cannot be read, samples that are held out."""
+
+import made_runs
+import made_samples
+import numpy as np
+import pytest
+import torch
+
+from materialist.errors import InputError
+from materialist.io.samples import SampleFolder
+from materialist.predict.bundled.network import srgb
+from materialist.train import maps
+from materialist.train.bundled import relative_log_depth
+from materialist.train.processes import Processes
+from materialist.train.stream import epoch
+
+ARGS = {"number": 1, "side": 32, "seed": 0}
+
+
+def spoil(folder, *names):
+    for path in (folder / "samples").iterdir():
+        if not names or path.name in names:
+            path.write_bytes(b"no sample")
+
+
+def test_processes_share_the_samples_and_passes_may_be_entered_in_the_middle(tmp_path):
+    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    alone = list(epoch(examples, batch=4, **ARGS))
+    shares = [list(epoch(examples, batch=2, processes=Processes(rank, 2), **ARGS)) for rank in range(2)]
+    assert len(alone) == len(shares[0]) == len(shares[1]) == 1
+    together = torch.cat([shares[0][0]["image"], shares[1][0]["image"]])
+    key = lambda x: sorted(float(p.sum()) for p in x)  # noqa: E731
+    np.testing.assert_allclose(key(together), key(alone[0]["image"]), rtol=1e-6)
+    first, second = epoch(examples, batch=2, **ARGS)
+    (rest,) = epoch(examples, batch=2, skip=1, **ARGS)
+    torch.testing.assert_close(rest["image"], second["image"])
+    assert not torch.equal(first["image"], second["image"])
+
+
+def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
+    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    spoil(tmp_path, "0000002.npz")
+    assert len(list(epoch(examples, batch=4, **ARGS))) == 1
+    assert "0000002.npz" in caplog.text
+
+
+def test_the_error_of_a_loading_worker_is_one_sentence_and_ends_them(tmp_path):
+    """Not the worker's traceback; and no process is left that could keep the command from ending."""
+    import multiprocessing
+
+    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    spoil(tmp_path)
+    with pytest.raises(InputError, match="cannot be read") as caught:
+        list(epoch(examples, workers=1, batch=2, **ARGS))
+    assert "Traceback" not in str(caught.value)
+    del caught
+    assert not multiprocessing.active_children()
+
+
+def test_held_out_samples_are_never_trained_on(tmp_path):
+    """Their own numbers, not their places, say which samples are held out."""
+    assert maps.trained_on(range(5)) == [0, 1, 2, 3, 4]
+    (tmp_path / "samples").mkdir()
+    for k in range(90):
+        (tmp_path / "samples" / f"{k:07d}.npz").touch()
+    source = SampleFolder(tmp_path)
+    before = {source.number(k) for k in maps.trained_on(source)}
+    assert len(before) == 88 and not {39, 79} & before
+    (tmp_path / "samples" / "0000005.npz").unlink()
+    source.refresh()
+    assert {source.number(k) for k in maps.trained_on(source)} == before - {5}
+
+
+def test_scores_say_what_they_are_of(tmp_path):
+    small = made_runs.bundled(made_samples.write_set(tmp_path / "small", 3), samples=3)
+    network = small.network().eval()
+    assert small.scores(network, tmp_path)["of"] == maps.TRAINED_ON
+    spoil(tmp_path / "small", "0000001.npz")
+    assert len(maps.held_out(small.source, 3)) == 2, "what cannot be read is left out"
+    spoil(tmp_path / "small")
+    assert small.scores(network, tmp_path) == {}
+    enough = made_samples.write_set(tmp_path / "enough", maps.HELD_OUT_EVERY)
+    assert made_runs.bundled(enough, samples=1).scores(network, tmp_path)["of"] == maps.HELD_OUT
+    with pytest.raises(InputError, match="--score-samples is -1"):
+        made_runs.bundled(enough, samples=-1)
+
+
+def test_targets_of_the_bundled_network():
+    values = torch.tensor([0.0, 0.002, 0.18, 1.0])
+    np.testing.assert_allclose(srgb(values), [0, 0.02584, 0.46135, 1], atol=1e-4)
+    depth = torch.tensor([1.0, 2.0, 4.0, 0.0]).view(1, 1, 2, 2)
+    found = relative_log_depth(depth, (depth > 0).float()).flatten()
+    np.testing.assert_allclose(found, [-np.log(2), 0, np.log(2), 0], atol=1e-6)
