@@ -91,7 +91,7 @@ class Glass(Removal):
         choices=("closed", "two-interface"))
     thickness: Array | str | Path = option(
         "auto", "How thick it is; a file has scene units.", kind="file",
-        choices=("auto", "half-turn", "network", "symmetry"), metavar="auto|half-turn|network|symmetry|FILE")
+        choices=("auto", "network", "symmetry", "half-turn"), metavar="auto|network|symmetry|FILE")
     """One of the methods, or [H, W] along the camera rays, or a file of that."""
 
 

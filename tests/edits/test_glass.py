@@ -66,8 +66,8 @@ def test_thickness_is_given_mirrored_or_predicted():
     given = object_thickness(scene, MASK, np.full(MASK.shape, 0.5, np.float32))
     assert given.method == "given" and (given.solid[MASK] == 0.5).all() and (given.solid[~MASK] == 0).all()
     assert object_thickness(scene, MASK, "symmetry").method == "symmetry"
-    assert object_thickness(scene, MASK, "half-turn").method == "half-turn"
-    assert object_thickness(scene, MASK).method in ("half-turn", "network", "symmetry")
+    methods = {object_thickness(scene, MASK, name).method for name in ("auto", "half-turn")}
+    assert len(methods) == 1 and methods <= {"revolution", "network", "symmetry"}
     for wrong, message in (
         (np.ones((3, 3)), "thickness map is"), (-np.ones(MASK.shape), "negative"), (np.zeros(MASK.shape), "0 all over"),
         ("guess", "give a file, or one of"),
@@ -110,7 +110,7 @@ def test_masks_at_the_frame_in_parts_and_over_everything():
             glass(scene, bad)
 
 
-def test_open_vessels_are_of_the_lathe_and_others_say_so():
+def test_open_vessels_are_surfaces_of_revolution_and_others_say_so():
     from materialist.edits.glass import glass as module
 
     scene = flat_scene()
@@ -124,33 +124,31 @@ def test_open_vessels_are_of_the_lathe_and_others_say_so():
         glass(scene, MASK, hollow="half")
 
 
-def test_the_papers_glass_has_the_front_of_the_lathe_s_body():
+def test_the_papers_glass_has_the_front_of_the_surface_of_revolution():
     """Not that of the maps, whose normals have the photo's texture in them; blurred where there is no such body."""
-    import sys
     from dataclasses import replace
-    from pathlib import Path
 
-    sys.path.append(str(Path(__file__).parents[1] / "geometry"))
-    from test_lathe import CAMERA, UP, prism, solid
+    from solid_scenes import CAMERA, UP, lines, turned, view
 
     from materialist.edits.glass.glass import _front
     from materialist.edits.glass.thickness import ObjectThickness
-    from materialist.solids.lathe import lathed
+    from materialist.solids.finder import surface_of_revolution
 
-    depth, normal, mask, _ = solid(prism(180))
-    lathe = lathed(depth, normal, mask, CAMERA, up=UP)
+    seen, mask = view(turned(lines((0, 0), (0.35, 0), (0.35, 0.7), (0, 0.7))))
+    depth, normal = np.where(mask, seen.depth, 6.0), seen.normal
+    body, thick = surface_of_revolution(depth, normal, mask, CAMERA, up=UP)
     rng = np.random.default_rng(0)
     noisy = normal + 0.3 * rng.normal(size=normal.shape)
     noisy /= np.linalg.norm(noisy, axis=-1, keepdims=True)
     scene = replace(flat_scene(), camera=CAMERA, depth=1.2 * depth, normal=noisy)
     off = lambda n, where: np.degrees(np.arccos(np.clip((n * normal).sum(-1), -1, 1)))[where].mean()  # noqa: E731
 
-    own, front, lean = _front(scene, mask, ObjectThickness(lathe.thickness, 0.1, "lathe", None, lathe), 0.01)
+    own, front, lean = _front(scene, mask, ObjectThickness(thick, 0.1, "revolution", None, body), 0.01)
     assert (own & mask).sum() > 0.95 * mask.sum() and not (own & ~mask).any()
     np.testing.assert_allclose(front[own], depth[own], rtol=0.02)
     assert off(lean, own) < 4 < off(noisy, own)
 
-    own, front, lean = _front(scene, mask, ObjectThickness(lathe.thickness, 0.1, "network"), 0.03)
+    own, front, lean = _front(scene, mask, ObjectThickness(thick, 0.1, "network"), 0.03)
     assert (own == mask).all() and front is scene.depth
     assert off(lean, mask) < 0.7 * off(noisy, mask)
 
@@ -211,7 +209,7 @@ def test_two_objects_are_as_thick_together_as_alone():
     parts = objects_in(number >= 0, scene.depth)
     assert [part.sum() for part in parts] == [(number == 0).sum(), (number == 1).sum()]
     edited = glass(scene, number >= 0)
-    assert edited.provenance["edits"][-1]["thickness"] == "lathe"
+    assert edited.provenance["edits"][-1]["thickness"] == "revolution"
     vertices = edited.bodies[0].vertices
     for centre, radius in (((-0.7, -0.2, -3), 0.4), ((0.75, -0.3, -3.6), 0.3)):
         own = vertices[np.abs(vertices[:, 0] - centre[0]) < 0.6]

@@ -82,9 +82,12 @@ def closed_proxy(
 
 def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
-    from materialist.solids.standing import standing_body
+    from materialist.solids.closed import closed_proxy
 
-    return standing_body(scene.front.depth, scene.front.normal, scene.mask, found, scene.camera, behind=depth)
+    if found.revolution is not None:
+        return found.revolution.body(scene.camera)
+    front, mask = scene.front, scene.mask
+    return closed_proxy(front.depth, front.normal, mask, found.solid, scene.camera, behind=depth, back=found.back)
 
 
 def before(
@@ -144,7 +147,7 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
 def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
     from materialist.predict.refraction.choice import best_thickness
-    from materialist.solids.half_turn import upright
+    from materialist.solids.finder import upright
 
     up = upright(depth, normal, planes_of(scene, depth, normal), scene.camera)
     front = scene.front

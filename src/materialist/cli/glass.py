@@ -60,7 +60,7 @@ def glass(
     model: Annotated[Model, typer.Option(help="closed: path-traced; two-interface: as in the paper.")] = Model.closed,
     thickness: Annotated[
         str,
-        typer.Option(metavar="auto|half-turn|network|symmetry|FILE", help="How thick it is; a file has scene units."),
+        typer.Option(metavar="auto|network|symmetry|FILE", help="How thick it is; a file has scene units."),
     ] = "auto",
     background: Background = None,
     inpaint: Inpainter = None,

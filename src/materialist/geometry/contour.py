@@ -59,7 +59,9 @@ def region(field: Array) -> Region:
             fan = [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
             faces.append(cells[:, np.array(fan)].reshape(-1, 3))
     joined = np.concatenate(faces)
-    return Region(points, joined, open_edges(joined, len(points)))
+    edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
+    lone = ~np.isin(edges[:, 0] * len(points) + edges[:, 1], edges[:, 1] * len(points) + edges[:, 0])
+    return Region(points, joined, edges[lone])
 
 
 def _crossings(field: Array, inside: Array, first: int) -> tuple[Array, Array]:
@@ -71,20 +73,3 @@ def _crossings(field: Array, inside: Array, first: int) -> tuple[Array, Array]:
     left, right = field[rows, columns], field[rows, columns + 1]
     part = np.clip(left / (left - right), _CLEAR, 1 - _CLEAR)
     return number, np.stack([columns + part, rows], -1).astype(np.float64)
-
-
-def open_edges(faces: Array, count: int) -> Array:
-    """[B, 2] directed edges of faces [F, 3] (over `count` vertices) that no other face runs through backwards."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    lone = ~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])
-    return edges[lone]
-
-
-def silhouette_field(inside: Array) -> Array:
-    """[H, W] pixels to the silhouette, > 0 inside: the pixels' stairs smoothed, straight edges where they were."""
-    from scipy.ndimage import distance_transform_edt, gaussian_filter
-
-    framed = np.pad(inside, 1)
-    signed = distance_transform_edt(framed) - distance_transform_edt(~framed)
-    signed = signed - 0.5 * np.sign(signed)  # pixel centres lie half a pixel from the border between pixels
-    return gaussian_filter(np.clip(signed, -6, 6), 0.8)[1:-1, 1:-1]

@@ -1,4 +1,4 @@
-"""What a normal says about the depth next to it, and the depth that follows what normals say."""
+"""Depth and normals of one surface: the slopes each of them demands of the other."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from materialist.geometry.silhouette import spacing
 from materialist.types import Array
 
 Pairs = tuple[Array, Array, Array, Array]
-"""Linked neighbours, [P] each: the one, the other, the step wanted between them, and its weight."""
+"""Linked neighbours, [P] each: the first, the second, the step wanted between them, and its weight."""
 STEEPEST = 0.12
 """Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
+SHARP = 0.5
+"""Least standard deviation of the window of `depth_slopes`, pixels: hardly more than the four neighbours."""
+FAR = 1.5
+"""Pixels over which `continued` follows a plane; farther out values stay."""
 
 
 def slopes(normal: Array, rays: Array, steepest: float = STEEPEST) -> tuple[Array, Array]:
@@ -33,10 +38,10 @@ def slopes(normal: Array, rays: Array, steepest: float = STEEPEST) -> tuple[Arra
 
 
 def between(demanded: tuple[Array, Array]) -> Iterator[tuple[Any, Any, Array]]:
-    """Neighbours in a row, then in a column: index of the one, index of the other, and the slope midway.
+    """Neighbours in a row, then in a column: index of the first, index of the second, and the slope midway.
 
     Args:
-        demanded: [H, W] both, what `slopes` gives; the slope midway is [H, W - 1], then [H - 1, W].
+        demanded: [H, W] both, as `slopes` gives them; the slope midway is [H, W - 1], then [H - 1, W].
     """
     for slope, near, far in (
         (demanded[0], np.s_[:, :-1], np.s_[:, 1:]),
@@ -64,3 +69,71 @@ def least_squares_change(
     system = (step.T @ step + diags(pull)).tocsr()
     change, _ = cg(system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal()))
     return change
+
+
+def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Array, Array]:
+    """[H, W] change of a map [H, W] from one pixel to the next, to the right and downwards, where it is known.
+
+    Least squares over a window with Gaussian weights of `sigma` pixels, of known [H, W] bool pixels alone: next to
+    the end of the map the window is one-sided.
+    """
+    from scipy.ndimage import correlate
+
+    reach = int(np.ceil(2 * max(sigma, SHARP)))
+    y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
+    weight = np.exp(-(x**2 + y**2) / (2 * max(sigma, SHARP) ** 2))
+    basis = np.ones_like(x), x, y
+    total = lambda a, kernel: correlate(a, kernel * weight, mode="constant")  # noqa: E731
+    # Numbers near 1 keep the sums exact.
+    mean, spread = values[known].mean(), max(float(values[known].std()), 1e-30)
+    own = np.where(known, (values - mean) / spread, 0)
+    inside = known.astype(np.float64)
+    moments = np.stack([np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2)  # [H, W, 3, 3]
+    # A window without a spread in some direction says that the map is level along it.
+    moments = moments + np.diag([1e-9, 1e-6, 1e-6]) + np.eye(3) * ~known[..., None, None]
+    found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[..., 0]
+    return found[..., 1] * spread, found[..., 2] * spread
+
+
+def continued(values: Array, known: Array) -> Array:
+    """[H, W] float64: a map carried on along the planes of its last known pixels."""
+    from scipy.ndimage import distance_transform_edt
+
+    right, down = depth_slopes(values, known)
+    away, (i, j) = distance_transform_edt(~known, return_indices=True)
+    rows, columns = np.indices(known.shape)
+    part = np.minimum(1, FAR / np.maximum(away, 1e-9))
+    beyond = values[i, j] + part * (right[i, j] * (columns - j) + down[i, j] * (rows - i))
+    return np.where(known, values, beyond).astype(np.float64)
+
+
+def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -> Array:
+    """[H, W, 3] unit normals, away from the camera, of a surface that is seen from within.
+
+    Planes are planes in 1/z, too, whatever the perspective, so slopes of 1/z are exact on flat backs.
+
+    Args:
+        back: [H, W] planar depth, scene units. known: [H, W] bool; 0 is returned elsewhere.
+        rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
+        sigma: of the window of `depth_slopes`, pixels.
+    """
+    depth = np.where(known, back, 1).astype(np.float64)
+    right, down = depth_slopes(1 / depth, known, sigma)
+    step = spacing(rays)
+    # d log z = -z d(1/z); the tangents of z r are z (r d log z + dr).
+    across = -(right * depth)[..., None] * rays + np.array([step, 0, 0])
+    upright = -(down * depth)[..., None] * rays - np.array([0, step, 0])
+    normal = np.cross(upright, across)
+    normal *= np.sign((normal * rays).sum(-1, keepdims=True))
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-30)
+    return np.where(known[..., None], normal, 0)
+
+
+def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
+    """[H, W, 3] unit: the Gaussian mean (`sigma` pixels) of the normals inside [H, W] bool."""
+    from scipy.ndimage import gaussian_filter
+
+    mean = np.where(inside[..., None], normal, 0).astype(np.float64)
+    if sigma > 0.1:
+        mean = gaussian_filter(mean, (sigma, sigma, 0))
+    return mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-9)

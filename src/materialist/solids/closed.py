@@ -13,35 +13,37 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.geometry.contour import region, silhouette_field
+from materialist.geometry.contour import region
 from materialist.geometry.membrane import membrane
-from materialist.geometry.ridges import at_edges, blurred_normals
-from materialist.geometry.tangents import SHARP, back_normals, continued, sampled
+from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in
+from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
 from materialist.solids.front import smooth_front
-from materialist.solids.sheets import COLLAR, Sheets, closed
-from materialist.solids.shell import Shell, joined, turned
-from materialist.solids.symmetry import border_distance, spacing, surface_in
+from materialist.solids.shell import DEFAULT as SHELL
+from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined
 from materialist.types import Array, Camera
 
-MARGIN = 3
-"""Pixels by which an object that the frame cuts goes on beyond it: the wall that closes it stays out of view."""
-GRID = 300
-"""Grid points along a small object; larger ones have one a pixel."""
-FINEST = 6
-"""Grid points along a pixel, at most."""
-NEAREST = 0.995
-"""The back keeps before this part of the depth of what stands behind the object."""
+
+@dataclass(frozen=True)
+class ClosedSettings:
+    """How the closed object is made of its front and its thickness."""
+
+    margin: int = 3  # pixels by which an object that the frame cuts goes on, so that its wall stays out of view
+    grid: int = 300  # grid points along a small object; larger objects have one a pixel
+    finest: int = 6  # grid points along a pixel, at most
+    nearest: float = 0.995  # the back keeps before this part of the depth behind the object; tuned by eye
+    thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
+    least: float = 1e-4  # the same at the border, part of the depth
+    grazing: float = 0.35  # least n.v by which a wall seen at a slant gets longer; tuned by eye
+
+
+DEFAULT = ClosedSettings()
 NOTHING = 1e9
 """Room behind an object with nothing there."""
-LEAST = 1e-4
-"""Least way between front and back, as a part of the depth."""
-THIN = 0.004
-"""Least thickness, as a part of the object's size: front and back never touch."""
 
 
 def closed_proxy(
     depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *, smooth: float = 0.01,
-    wall: Array | float | None = None, behind: Array | None = None, back: Array | None = None,
+    wall: float | None = None, behind: Array | None = None, back: Array | None = None,
 ) -> Shell:  # fmt: skip
     """The closed object behind a mask.
 
@@ -51,7 +53,7 @@ def closed_proxy(
         mask: [H, W] bool or weights. Its parts become bodies of their own, its holes stay open (unless a pixel wide).
         thickness: [H, W] length of the camera ray inside the solid object, scene units >= 0.
         smooth: blur of the normals of front and back, as a part of the object's size (the root of its area); 0: none.
-        wall: the object is hollow: thickness of its wall, scene units, or [H, W]. A second surface is added inside.
+        wall: the object is hollow: thickness of its wall, scene units. A second surface is added inside.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
         back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
 
@@ -73,7 +75,7 @@ def closed_proxy(
     if wall is None:
         return shell
     inner = _cavity(view, front, thick, wall, smooth, camera)
-    return shell if inner is None else joined([shell, turned(inner)])
+    return shell if inner is None else joined([shell, inside_out(inner)])
 
 
 @dataclass(frozen=True)
@@ -109,14 +111,15 @@ def _check(normal: Array, thickness: Array, inside: Array) -> None:
 
 
 def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
-    edge = MARGIN + 1
+    margin = DEFAULT.margin
+    edge = margin + 1
     rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
     top, left = rows[0] - edge, columns[0] - edge
     bottom, right = rows[-1] + edge + 1, columns[-1] + edge + 1
     y, x = np.arange(top, bottom), np.arange(left, right)
-    # Beyond the frame everything goes on as at its edge, for MARGIN pixels.
+    # Beyond the frame everything goes on as at its edge, for some pixels.
     i, j = np.clip(y, 0, camera.height - 1)[:, None], np.clip(x, 0, camera.width - 1)[None]
-    near = ((y >= -MARGIN) & (y < camera.height + MARGIN))[:, None] & ((x >= -MARGIN) & (x < camera.width + MARGIN))
+    near = ((y >= -margin) & (y < camera.height + margin))[:, None] & ((x >= -margin) & (x < camera.width + margin))
     rays = np.stack(
         np.broadcast_arrays(
             ((x + 0.5 - camera.width / 2) / camera.focal)[None],
@@ -133,24 +136,19 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
 def _thickness(view: _View, front: Array) -> Array:
     """[h, w] along the ray, scene units: never behind what stands there, and never none."""
     pixel = front * spacing(view.rays)  # scene units
-    least = THIN * view.size * np.median(pixel[view.inside])
+    least = DEFAULT.thin * view.size * np.median(pixel[view.inside])
     thick = np.minimum(view.thickness.astype(np.float64), _room(view, front))
     return np.where(view.inside, np.maximum(thick, least), 0)
 
 
-def _cavity(view: _View, front: Array, thick: Array, wall, smooth: float, camera: Camera) -> Shell | None:
+def _cavity(view: _View, front: Array, thick: Array, wall: float, smooth: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     length = np.linalg.norm(view.rays, axis=-1)
     facing = np.abs((view.normal * view.rays).sum(-1)) / length
-    if np.ndim(wall):
-        rows, columns = np.arange(front.shape[0]) + view.top, np.arange(front.shape[1]) + view.left
-        wall = np.asarray(wall)[
-            np.clip(rows, 0, camera.height - 1)[:, None], np.clip(columns, 0, camera.width - 1)[None]
-        ]
-    through = wall / np.clip(facing, 0.35, 1)  # [h, w] along the ray, of one wall
+    through = wall / np.clip(facing, DEFAULT.grazing, 1)  # [h, w] along the ray, of one wall
     left = thick - 2 * through
     pixel = front * spacing(view.rays)
-    room = view.inside & (left > THIN * view.size * pixel) & (border_distance(view.inside) * pixel > wall)
+    room = view.inside & (left > DEFAULT.thin * view.size * pixel) & (border_distance(view.inside) * pixel > wall)
     if room.sum() < 16:
         return None
     inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
@@ -163,35 +161,27 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
 
     known, length = view.inside, np.linalg.norm(view.rays, axis=-1)
     edge = silhouette_field(known)  # [h, w] pixels
-    factor = int(np.clip(round(GRID / max(known.shape)), 1, FINEST))
+    factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
-    found = region(_ended(cv2.resize((edge - COLLAR).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)))
+    within = cv2.resize((edge - SHELL.collar).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    found = region(_ended(within))
     if not len(found.faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
     place = (found.points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
-    at = lambda values: sampled(values, place, order=1)  # noqa: E731
+    at = lambda values: _sampled(values, place, order=1)  # noqa: E731
     # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
     # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
     through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
     own = np.exp(at(middle)) - through / (2 * at(length))
-    room = at(_room(view, front))
-    through = np.maximum(np.minimum(through, room), LEAST * own)
+    through = np.maximum(np.minimum(through, at(_room(view, front))), DEFAULT.least * own)
     sigma = smooth * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
         back = blurred_normals(view.back, known, sigma)
-    facing = blurred_normals(view.normal, known, sigma)
-    front_normal, back_normal = _between(facing, known, place), _between(back, known, place)
-    depth = own + through / at(length)
-    k, z, n = at_edges(front, facing, known, view.rays, place)
-    own[k], front_normal[k] = z, n
-    if view.back is not None:  # those fitted to its depth are no face's next to an edge
-        k, z, n = at_edges(front + thick / length, back, known, view.rays, place)
-        depth[k], back_normal[k] = z, n
-        depth = np.minimum(depth, own + room / at(length))
-    through = np.maximum((depth - own) * at(length), LEAST * own)
+    front_normal = _between(blurred_normals(view.normal, known, sigma), known, place)
+    back_normal = _between(back, known, place)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)
     place = place + np.array([view.left, view.top])
@@ -204,7 +194,7 @@ def _between(normal: Array, known: Array, place: Array) -> Array:
     from scipy.ndimage import distance_transform_edt
 
     i, j = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    found = sampled(normal[i, j], place)
+    found = _sampled(normal[i, j], place)
     return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
 
 
@@ -212,7 +202,7 @@ def _room(view: _View, front: Array) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
     length = np.linalg.norm(view.rays, axis=-1)
     known = view.inside & (view.behind > 0)
-    room = np.where(known, np.maximum(NEAREST * view.behind - front, 0) * length, NOTHING)
+    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - front, 0) * length, NOTHING)
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
 
@@ -222,3 +212,12 @@ def _ended(field: Array) -> Array:
     field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
     # No crossing exactly on a grid point.
     return np.where(np.abs(field) < 1e-4, 1e-4, field)
+
+
+def _sampled(values: Array, place: Array, order: int = 3) -> Array:
+    """[V, ...] of a map [H, W, ...] at places [V, 2] (x, y), by splines: with cubic ones normals turn evenly."""
+    from scipy.ndimage import map_coordinates
+
+    flat = np.asarray(values, np.float64).reshape(*values.shape[:2], -1)
+    read = [map_coordinates(flat[..., k], place.T[::-1], order=order, mode="nearest") for k in range(flat.shape[-1])]
+    return np.stack(read, -1).reshape(len(place), *values.shape[2:])

@@ -1,113 +1,99 @@
-"""What was turned on a lathe, known by its outline: predicted normals are rarely clean enough to meet one axis.
+"""A surface of revolution by its outline.
 
-The outline of such a thing is its own image in the plane through the camera and the axis. What of the half plane beside
-the axis stays inside the outline at every turn is the largest body with that outline (its visual hull), and for what
-bulges and waves gently it is the thing itself, but for the two ends that the camera sees from above and below.
+The outline of a surface of revolution is its own image in the plane through the camera and the axis. The part of the
+half plane beside the axis that stays inside the outline at every turn is the largest body with that outline (its visual
+hull). For bodies that bulge and wave gently the hull is the body itself, but for the two ends that the camera sees from
+above and below.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from materialist.camera import pixel_rays, project
-from materialist.geometry.contour import silhouette_field
-from materialist.solids.lathe import FEWEST, Lathed
+from materialist.geometry.silhouette import silhouette_field
 from materialist.solids.profile import Profile, fitted
-from materialist.solids.revolution import AIR, Meridian, along, ground_height, thickness_of
-from materialist.solids.symmetry import surface_in
-from materialist.solids.turning import Axis
+from materialist.solids.revolution import DEFAULT as REVOLUTION
+from materialist.solids.revolution import Axis, Revolution, ground_height
 from materialist.types import Array, Camera
 
-ALIKE, COVERED = 0.964, 0.955
-"""Shares of the mask that must lie in its image, and that the body must cover: boxes have edges where it is round."""
-LEANING = 0.12
-"""Least slope of how far the map's normals lean sideways over how far the body's do: a face seen straight on has 0, and
-predicted normals of round things, however blurred, 0.2 and more."""
-ABOVE = 0.3
-"""Sine of the angle between the axis and the way to the object below which its outline, from above, says nothing."""
-STEPPED, SIDE = 0.9, 0.5
-"""Least `_stepped`, over what of the body looks up or down by less than this."""
-TILTS = (0.05, 0.15, 0.28, 0.42)
-"""Radians that the camera may look down, where no ground tells it, or the body does not fill the outline then."""
-ELSEWHERE = 0.3
-"""How far, relatively, the place on the ground may be from where the depth map has the object."""
-TURNS = 40
-"""Turns at which a place beside the axis must stay inside the outline."""
-FINE = 120
-"""Cells of the hull along the object."""
-FLAT = 1.25
-"""Slopes up to this multiple of that at which the camera looks down are of the end caps, of which the outline says no
-more than how high they are."""
+
+@dataclass(frozen=True)
+class OutlineSettings:
+    """When an outline is taken for that of a surface of revolution, and how its hull is made."""
+
+    alike: float = 0.964  # least share of the mask that lies in its image: boxes have edges where it is round
+    covered: float = 0.955  # least share of the mask that the body covers
+    leaning: float = 0.12  # least slope of the map's sideways normals over the body's: a face seen straight on has 0
+    stepped: float = 0.9  # least `_stepped`, over normals that look up or down by less than `side`
+    side: float = 0.5  # see `stepped`
+    above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
+    tilts: tuple[float, ...] = (0.05, 0.15, 0.28, 0.42)  # radians the camera may look down where no ground tells it
+    elsewhere: float = 0.3  # relative distance from the depth map's place up to which the ground is believed
+    turns: int = 40  # turns at which a place beside the axis must stay inside the outline
+    fine: int = 120  # cells of the hull along the object
+    flat: float = 1.25  # slopes up to this multiple of the camera's are of the end caps, which the outline hides
 
 
-def outlined(
-    depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
-) -> Lathed | None:
-    """An object turned on a lathe by its outline, or None where that, or the normals, are of something else.
+DEFAULT = OutlineSettings()
 
-    Arguments and errors as of `lathe.lathed`; where nothing tells the upright direction, or it does not fit, the camera
-    looks down as the body fills the outline best. An object that the frame cuts is none.
+
+def by_outline(
+    depth: Array, normal: Array, inside: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
+) -> Revolution | None:
+    """A surface of revolution with this outline, or None where the outline or the normals are of something else.
+
+    Arguments as of `finder.surface_of_revolution`, inside [H, W] bool. Where nothing tells the upright direction, or it
+    does not fit, the camera looks down at the angle at which the body fills the outline best. An object that the frame
+    cuts is none.
     """
-    inside = surface_in(mask, depth, camera)
-    if inside.sum() < FEWEST:
+    if inside[[0, -1]].any() or inside[:, [0, -1]].any():
         return None
-    edge = np.zeros_like(inside)
-    edge[[0, -1]] = edge[:, [0, -1]] = True
-    if (inside & edge).any():
-        return None
-    rays, depth, normal = pixel_rays(camera).astype(np.float64), np.asarray(depth, np.float64), np.asarray(normal)
-    told = [] if up is None else [(np.asarray(up, np.float64), behind)]
+    rays = pixel_rays(camera).astype(np.float64)
+    told = [] if up is None else [(up, behind)]
     # A predicted ground may lean: then the outline says how far the camera looks down, and the ground says nothing.
-    guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in TILTS]
-    best: tuple[float, Standing | None] = (COVERED, None)
+    guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in DEFAULT.tilts]
     for tries in (told, guessed):
-        for upright, below in tries:
-            found = _standing_along(upright, inside, depth, normal, rays, below, camera)
-            best = max(best, found, key=lambda one: one[0])
-        if best[1] is not None:
-            break
-    if best[1] is None or not best[1].profile.lines():
-        return None
-    alike, axis, profile = best[1]
-    front, _ = seen_from(profile, axis, inside, rays)
-    thick = thickness_of(profile, axis, np.where(front > 0, front, depth), inside, rays)
-    return Lathed(thick, 1 - alike, axis, profile)
+        standing = (_along(upright, _Seen(inside, depth, normal, rays, below, camera)) for upright, below in tries)
+        share, best = max(standing, key=lambda one: one[0], default=(0.0, None))
+        if best is not None and share > DEFAULT.covered:
+            return best if best.profile.lines() else None
+    return None
 
 
-class Standing(NamedTuple):
-    """A body that an outline may be of."""
+class _Seen(NamedTuple):
+    """The maps of the object."""
 
-    alike: float
-    """Share of the mask that lies in its image."""
-    axis: Axis
-    profile: Profile
+    inside: Array
+    depth: Array
+    normal: Array
+    rays: Array
+    behind: Array | None
+    camera: Camera
 
 
-def _standing_along(
-    up: Array, inside: Array, depth: Array, normal: Array, rays: Array, behind: Array | None, camera: Camera
-) -> tuple[float, Standing | None]:
-    """The body that stands along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
-    middle = rays[inside].mean(0)
-    if np.linalg.norm(np.cross(up, middle)) < ABOVE * np.linalg.norm(middle):
+def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
+    """The body whose axis points along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
+    middle = seen.rays[seen.inside].mean(0)
+    if np.linalg.norm(np.cross(up, middle)) < DEFAULT.above * np.linalg.norm(middle):
         return 0.0, None
-    across, alike = _mirror(inside, rays, up, camera)
-    if alike < ALIKE:
+    across, alike = _mirror(seen.inside, seen.rays, up, seen.camera)
+    if alike < DEFAULT.alike:
         return 0.0, None
     ahead = np.cross(across, up)
-    ahead *= np.sign(ahead @ middle)
-    body = _standing(silhouette_field(inside), inside, depth, rays, up, ahead, behind, camera)
+    body = _placed(up, ahead * np.sign(ahead @ middle), seen)
     if body is None:
         return 0.0, None
-    axis, profile = body
-    found, leaning = seen_from(profile, axis, inside, rays)
-    there = inside & (found > 0)
-    own, other = ((values @ across)[there] for values in (leaning, normal))
-    side = np.abs((leaning @ up)[there]) < SIDE
-    if (own * other).sum() < LEANING * (own * own).sum() or _stepped(own[side], other[side]) < STEPPED:
+    front, leaning = body.front(seen.inside, seen.rays)
+    there = seen.inside & (front > 0)
+    own, other = ((values @ across)[there] for values in (leaning, seen.normal))
+    side = np.abs((leaning @ up)[there]) < DEFAULT.side
+    if (own * other).sum() < DEFAULT.leaning * (own * own).sum() or _stepped(own[side], other[side]) < DEFAULT.stepped:
         return 0.0, None
-    return float(there.sum() / inside.sum()), Standing(alike, axis, profile)
+    return float(there.sum() / seen.inside.sum()), body
 
 
 def _stepped(own: Array, other: Array) -> float:
@@ -152,24 +138,22 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
     return plane(angle), 1 - unlike(angle)
 
 
-def _standing(
-    field: Array, inside: Array, depth: Array, rays: Array, up: Array, ahead: Array, behind: Array | None,
-    camera: Camera,
-) -> tuple[Axis, Profile] | None:  # fmt: skip
-    """The axis and profile: as far away as the ground that the object stands on, or as the depth map has its front."""
-    first = Axis(up, ahead, True)  # at distance 1
-    trial = _profile(field, first, camera, None)
+def _placed(up: Array, ahead: Array, seen: _Seen) -> Revolution | None:
+    """The body as far away as the ground that the object stands on, or as the depth map has its front."""
+    field = silhouette_field(seen.inside)
+    first = Axis(up, ahead)  # at distance 1
+    trial = _profile(field, first, seen.camera, None)
     if trial is None:
         return None
-    front, _ = seen_from(trial, first, inside, rays)
-    both = inside & (front > 0)
-    away = float(np.median(depth[both] / front[both])) if both.any() else 1.0
-    ground = ground_height(Axis(up, np.zeros(3), True), behind, inside, rays)
-    if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < ELSEWHERE:
+    front, _ = Revolution(first, trial).front(seen.inside, seen.rays)
+    both = seen.inside & (front > 0)
+    away = float(np.median(seen.depth[both] / front[both])) if both.any() else 1.0
+    ground = ground_height(Axis(up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
+    if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < DEFAULT.elsewhere:
         away = ground / trial.floor
-    axis = Axis(up, away * ahead, True)
-    profile = _profile(field, axis, camera, ground if np.isfinite(ground) else None)
-    return None if profile is None else (axis, profile)
+    axis = Axis(up, away * ahead)
+    profile = _profile(field, axis, seen.camera, ground if np.isfinite(ground) else None)
+    return None if profile is None else Revolution(axis, profile)
 
 
 def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> Profile | None:
@@ -182,7 +166,7 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
     if not len(rows):  # thinner than a pixel
         return None
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
-    cell = extent / FINE
+    cell = extent / DEFAULT.fine
     place, _ = project(axis.foot[None], camera)
     middle = (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
     base = middle - float((camera.height / 2 - place[0, 1]) * pixel) / max(float(axis.up[1]), 0.3)
@@ -211,7 +195,7 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     halves = []
     for half in (0.0, np.pi):
         least = np.full((len(h), len(r)), np.inf)
-        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, TURNS // 2):
+        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, DEFAULT.turns // 2):
             out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
             points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
             x, y = np.moveaxis(project(points, camera)[0], -1, 0)
@@ -232,7 +216,7 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
-    limit = FLAT * np.where(half, lower, upper)
+    limit = DEFAULT.flat * np.where(half, lower, upper)
     steep = np.abs(step[:, 1]) > limit * np.abs(step[:, 0])
     if steep.sum() < 4:
         return None
@@ -250,23 +234,5 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     high = float(np.ptp(seen[:, 1]))
     floor = float(side[0, 1])
     if ground is not None:
-        floor = float(np.clip(ground + AIR * high, floor - 0.1 * high, floor + 0.1 * high))
+        floor = float(np.clip(ground + REVOLUTION.air * high, floor - 0.1 * high, floor + 0.1 * high))
     return fitted(seen, leaning, np.zeros((0, 2)), cell, floor)
-
-
-def seen_from(profile: Profile, axis: Axis, inside: Array, rays: Array) -> tuple[Array, Array]:
-    """[H, W] planar depth at which rays enter a body, 0 where they pass, and its unit normals [H, W, 3] there."""
-    ray, plane = rays[inside], Meridian(axis)
-    length = np.linalg.norm(ray, axis=-1)
-    reach = 1.2 * float(np.hypot(profile.seen[:, 0].max(), np.ptp(profile.seen[:, 1]) / 2))
-    middle = axis.foot + profile.seen[:, 1].mean() * axis.up
-    first, steps = (ray @ middle) / length**2, np.arange(-reach, reach, 0.5 * profile.cell)
-    hit, front = np.zeros(len(ray), bool), first.copy()
-    for part, values in along(profile, axis, ray, first, steps):
-        hit[part] = (values < 0).any(1)
-        front[part] += steps[(values < 0).argmax(1)] / length[part]
-    points = ray * front[:, None]
-    depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
-    depth[inside] = np.where(hit, front, 0)
-    normal[inside] = plane.spread(points, profile.slope(plane.of(points)))
-    return depth, normal

@@ -8,24 +8,29 @@ position and perspective, and needs no guess of how deep the object is.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
+from materialist.geometry.silhouette import border_distance, object_size, spacing, surface_in
 from materialist.types import Array, Camera
 
-RING = (3.0, 0.06)
-"""Distance from the silhouette within which the surface tells where the silhouette's plane is: at least so many
-pixels, and at least this part of the object's size."""
-STEEPEST = 0.06
-"""Smallest n.v that is believed: maps are not exact at a silhouette."""
-GRAZING = 4
-"""How quickly pixels lose weight where the surface does not turn away at its border: the power of 1 - n.v."""
-FLOOR = 0.25
-"""A body is nowhere thinner than this part of what it would be if it were as deep as wide: seen face on, a box shows
-no silhouette that turns away, and the mirror would make it flat."""
-DEEPEST = 2.0
-"""Largest thickness, as a multiple of the object's size (see `object_size`)."""
+
+@dataclass(frozen=True)
+class SymmetrySettings:
+    """Where the plane of the silhouette is, and how thick a mirrored body may be; RefractionNet is trained on these."""
+
+    ring: float = 3.0  # pixels from the silhouette within which the surface tells where its plane is, at least
+    ring_share: float = 0.06  # the same as a part of the object's size
+    steepest: float = 0.06  # smallest n.v that is believed: maps are not exact at a silhouette
+    grazing: float = 4.0  # power of 1 - n.v by which pixels lose weight where the surface does not turn away
+    floor: float = 0.25  # least thickness, part of that of a body as deep as wide: a box seen face on has no silhouette
+    deepest: float = 2.0  # largest thickness, in object sizes
+
+
+DEFAULT = SymmetrySettings()
 
 
 def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera) -> Array:
@@ -68,58 +73,25 @@ def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
     widest = width[inside].max()
     inflated = 2 * np.sqrt(np.maximum(width * (2 * widest - width), 0))  # a body with a round section
-    limit = DEEPEST * object_size(inside, depth, rays)
-    thickness = np.clip((back - front) * length, np.minimum(FLOOR * inflated, limit), limit)
+    limit = DEFAULT.deepest * object_size(inside, depth, rays)
+    thickness = np.clip((back - front) * length, np.minimum(DEFAULT.floor * inflated, limit), limit)
     return np.where(inside, thickness, 0).astype(np.float32)
-
-
-def object_size(inside: Array, depth: Array, rays: Array) -> float:
-    """The square root of the area of the mask [H, W] bool at its median depth, scene units."""
-    return float(np.sqrt(inside.sum()) * np.median(depth[inside]) * spacing(rays))
-
-
-def spacing(rays: Array) -> float:
-    """Distance of neighbouring rays [H, W, 3] at z = -1: one over the focal length in pixels."""
-    last = rays.shape[1] - 1
-    return float(rays[0, last, 0] - rays[0, 0, 0]) / last if last else 1.0
-
-
-def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
-    """[H, W] bool: pixels of the mask that have a surface. Raises InputError for other sizes or when none is left."""
-    size = (camera.height, camera.width)
-    if np.shape(mask) != size or np.shape(depth) != size:
-        raise InputError(f"The mask is {np.shape(mask)} and the depth {np.shape(depth)}; the camera needs {size}.")
-    inside = (np.asarray(mask) > 0.5) & (np.asarray(depth) > 0)
-    if not inside.any():
-        raise InputError("The mask covers no surface; mark an object.")
-    return inside
-
-
-def border_distance(inside: Array) -> Array:
-    """[H, W] pixels from each pixel's centre to the silhouette, 0 outside; the picture's border is no silhouette."""
-    from scipy.ndimage import distance_transform_edt
-
-    # An object that the border cuts goes on beyond it.
-    padded = np.pad(inside, 1, mode="edge")
-    if padded.all():
-        padded = np.pad(inside, 1)
-    return np.where(inside, np.maximum(distance_transform_edt(padded)[1:-1, 1:-1] - 0.5, 0.5), 0)
 
 
 def _silhouette_plane(front: Array, normal: Array, rays: Array, border: Array, inside: Array) -> Array:
     """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
-    widest = max(RING[0], RING[1] * np.sqrt(inside.sum()))
+    widest = max(DEFAULT.ring, DEFAULT.ring_share * np.sqrt(inside.sum()))
     # The outermost pixels are known too badly: where in them the silhouette runs is open.
     ring = inside & (border <= widest) & (border > 0.6)
     if not ring.any():
         ring = inside
     length = np.linalg.norm(rays, axis=-1)[ring]
-    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, STEEPEST, 1)
+    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, DEFAULT.steepest, 1)
     # The surface just inside lies before the silhouette. With a round section of radius r, a point at distance e from
     # the border has e = r (1 - sin) and lies r cos before it. The picture's plane is not across a slanting ray.
     gap = border[ring] * front[ring] * spacing(rays) / length
     before = gap * cosine / (1 - np.sqrt(1 - cosine**2))
-    weight = (1 - cosine) ** GRAZING + 1e-4
+    weight = (1 - cosine) ** DEFAULT.grazing + 1e-4
     a, b, c = _robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
     return a + b * rays[..., 0] + c * rays[..., 1]
 

@@ -1,4 +1,4 @@
-"""A lathed body as an open vessel: a wall around air, and no lid."""
+"""A body of revolution as an open vessel: a wall around air, and no lid."""
 
 from __future__ import annotations
 

@@ -16,15 +16,15 @@ from materialist.edits.glass.thickness import ObjectThickness, object_thickness
 from materialist.edits.remove.background import Inpaint, without
 from materialist.edits.remove.hole import GROW
 from materialist.errors import InputError
+from materialist.solids.closed import closed_proxy
 from materialist.solids.shell import Shell, cavities, joined
-from materialist.solids.standing import room, standing_body
 from materialist.types import Array, Body, Scene, Surface
 
 MODELS = ("closed", "two-interface")
 OPEN = "open"
 """Value of `hollow`: a vessel without a lid."""
 SOLID = "The two-interface model knows no walls: this glass is solid."
-LID = "Only what was turned on a lathe can be open at the top; this glass is hollow, and closed."
+LID = "Only a surface of revolution can be open at the top; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
 IOR = (1.0, 3.0)
 NAME = "photo glass"
@@ -47,12 +47,12 @@ def glass(
         tint: colour of white light after a way in and a way out, linear, in [0, 1].
         roughness: perceptual, in [0, 1]; below 0.03 the glass is smooth.
         hollow: a wall around air, as thick as RefractionNet says (else 5 % of the object's size); `open`: and no lid,
-            for what was turned on a lathe (anything else stays closed, and the report says so).
-        model: `closed` path-traces a closed object (`geometry.closed`); `two-interface` is the paper's: every camera
+            for a surface of revolution (anything else stays closed, and the report says so).
+        model: `closed` path-traces a closed object (`solids.closed`); `two-interface` is the paper's: every camera
             ray is bent twice and looks up the background, and there are no shadows.
         thickness: see `thickness.object_thickness`.
         background, inpaint, grow, shadow, fitted: see `background.without`.
-        smooth: see `geometry.closed.closed_proxy`.
+        smooth: see `solids.closed.closed_proxy`.
 
     Raises:
         InputError: an option out of its range, or a mask that cannot be used. WeightsError: a network without weights.
@@ -91,9 +91,12 @@ def glass(
 def _shell(
     scene: Scene, removed: Scene, part: Array, found: ObjectThickness, hollow: bool | str, smooth: float
 ) -> Shell:
-    return standing_body(
-        scene.depth, scene.normal, part, found, scene.camera, behind=removed.depth,
-        wall=found.wall if hollow else None, smooth=smooth, open_top=hollow == OPEN,
+    wall = found.wall if hollow else None
+    if found.revolution is not None:
+        return found.revolution.body(scene.camera, wall=wall, open_top=hollow == OPEN)
+    return closed_proxy(
+        scene.depth, scene.normal, part, found.solid, scene.camera,
+        smooth=smooth, wall=wall, behind=removed.depth, back=found.back,
     )  # fmt: skip
 
 
@@ -101,7 +104,7 @@ def _unlike(each: list[tuple[Array, ObjectThickness]], shells: list[Shell], holl
     """What of a hollow could not be made, in words."""
     notes = []
     for (_, found), shell in zip(each, shells, strict=True):
-        opened = hollow == OPEN and found.lathe is not None and found.lathe.opens(found.wall)
+        opened = hollow == OPEN and found.revolution is not None and found.revolution.opens(found.wall)
         notes += [LID] * (hollow == OPEN and not opened)
         notes += [NO_ROOM] * (bool(hollow) and not opened and not cavities(shell))
     return list(dict.fromkeys(notes))
@@ -133,11 +136,9 @@ def _two_interface(
     photo, picture = removed.photo, np.zeros(scene.photo.linear.shape, np.float32)
     for part, found in each:
         seen, front, facing = _front(scene, part, found, smooth)
-        factor = room(front, found.solid, seen, removed.depth, scene.camera)
-        front, thick = factor * front, factor * found.solid
         one = two_interface(
-            scene.camera, facing, front, seen, thick, removed.depth, photo.linear, envmap,
-            back=back_of(front, seen, thick, found.back, scene.camera), **{**look, "transmission": 1.0},
+            scene.camera, facing, front, seen, found.solid, removed.depth, photo.linear, envmap,
+            back=back_of(front, seen, found.solid, found.back, scene.camera), **{**look, "transmission": 1.0},
         )  # fmt: skip
         picture = np.where(seen[..., None], one, picture)
         own |= seen
@@ -154,17 +155,15 @@ def _two_interface(
 
 
 def _front(scene: Scene, own: Array, found: ObjectThickness, smooth: float) -> tuple[Array, Array, Array]:
-    """Where glass is seen, [H, W] bool, and its front's depth and normals: those of the lathe's body, or of the maps.
+    """Where glass is seen, [H, W] bool, and its front's depth and normals: of a surface of revolution, or the maps.
 
     Normals of the maps are blurred as for the closed proxy.
     """
-    from materialist.geometry.ridges import blurred_normals
-    from materialist.solids.outline import seen_from
+    from materialist.geometry.slopes import blurred_normals
 
-    if found.lathe is None:
+    if found.revolution is None:
         return own, scene.depth, blurred_normals(scene.normal, own, smooth * float(np.sqrt(own.sum())))
-    rays = pixel_rays(scene.camera).astype(np.float64)
-    depth, normal = seen_from(found.lathe.profile, found.lathe.axis, own, rays)
+    depth, normal = found.revolution.front(own, pixel_rays(scene.camera).astype(np.float64))
     return depth > 0, depth, normal
 
 

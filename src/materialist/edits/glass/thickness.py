@@ -1,4 +1,4 @@
-"""How thick the object under a mask is: its front turned around, predicted by RefractionNet, mirrored, or given."""
+"""How thick the object under a mask is: given, of a surface of revolution, by RefractionNet, or mirrored."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
+from materialist.geometry.silhouette import object_size, surface_in
 from materialist.solids.front import smooth_front
-from materialist.solids.lathe import Lathed
-from materialist.solids.symmetry import object_size, surface_in, symmetric_thickness
+from materialist.solids.revolution import Revolution
+from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
-METHODS = ("auto", "half-turn", "network", "symmetry")
+METHODS = ("auto", "network", "symmetry", "half-turn")
+"""Names of `--thickness`; `half-turn`, of older recipes, is `auto`."""
 WALL = 0.05
 """Wall of a hollow object, as a part of its size, where nothing tells it."""
 WALLS = (0.015, 0.12)
@@ -33,8 +35,8 @@ class ObjectThickness:
     """Which method it comes from: one of those of `choice.Choice`, or `given`."""
     back: Array | None = None
     """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
-    lathe: Lathed | None = None
-    """The whole object, where it was turned on a lathe."""
+    revolution: Revolution | None = None
+    """The whole object, where it is a surface of revolution."""
 
 
 def object_thickness(
@@ -44,10 +46,9 @@ def object_thickness(
 
     Args:
         mask: [H, W] bool at working size.
-        method: `half-turn` (the front turned around an upright axis), `network` (RefractionNet), `symmetry` (the
-            paper's assumption), `auto` (the front swept around where its normals meet one axis, the turn where it fits
-            and agrees with the network, else the network, without weights symmetry), a map [H, W] of scene units along
-            the rays, or a file with one.
+        method: `auto` (a surface of revolution where its normals or its outline say so, else RefractionNet, without
+            weights symmetry), `network` (RefractionNet), `symmetry` (the paper's assumption), a map [H, W] of scene
+            units along the rays, or a file with one.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
 
     Raises:
@@ -60,7 +61,7 @@ def object_thickness(
         if method == "network":
             return _by_network(scene, inside, size)
         if method != "symmetry":
-            return _chosen(scene, inside, size, method, behind)
+            return _chosen(scene, inside, size, behind)
         return ObjectThickness(_mirrored(scene, inside), WALL * size, "symmetry")
     given = _given(method, inside.shape)
     if not (given[inside] > 0).any():
@@ -75,19 +76,14 @@ def _by_network(scene: Scene, inside: Array, size: float) -> ObjectThickness:
     return ObjectThickness(found.solid, _wall(scene, inside, found, size), "network", found.back)
 
 
-def _chosen(scene: Scene, inside: Array, size: float, method: str, behind: Array | None) -> ObjectThickness:
+def _chosen(scene: Scene, inside: Array, size: float, behind: Array | None) -> ObjectThickness:
     from materialist.predict.refraction.choice import best_thickness
-    from materialist.solids.half_turn import upright
+    from materialist.solids.finder import upright
 
     up = upright(scene.depth, scene.normal, np.where(inside, -1, scene.geometry.plane_label), scene.camera)
-    choice = best_thickness(
-        scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, behind=behind, prefer=method,
-    )  # fmt: skip
-    solid = choice.thickness.solid
-    if choice.method == "symmetry":
-        solid = _mirrored(scene, inside)
-    wall = _wall(scene, inside, choice.thickness, size)
-    return ObjectThickness(solid, wall, choice.method, choice.thickness.back, choice.thickness.lathe)
+    choice = best_thickness(scene.photo.linear, inside, scene.normal, scene.depth, scene.camera, up=up, behind=behind)
+    found = choice.thickness
+    return ObjectThickness(found.solid, _wall(scene, inside, found, size), choice.method, found.back, found.revolution)
 
 
 def _wall(scene: Scene, inside: Array, found, size: float) -> float:

@@ -23,8 +23,8 @@ from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, re
 from materialist.camera import pixel_rays, project
 from materialist.envmap import bilinear, environment
 from materialist.errors import InputError
-from materialist.geometry.tangents import back_normals
-from materialist.solids.symmetry import surface_in
+from materialist.geometry.silhouette import surface_in
+from materialist.geometry.slopes import back_normals
 from materialist.types import Array, Camera
 
 BACKS = ("mirrored", "same")

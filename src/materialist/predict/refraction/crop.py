@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.solids.symmetry import border_distance, mirrored, object_size, spacing
+from materialist.geometry.silhouette import border_distance, object_size, spacing
+from materialist.solids.symmetry import mirrored
 from materialist.types import Array
 
 SIDE = 64

@@ -11,9 +11,9 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
+from materialist.geometry.silhouette import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
-from materialist.solids.lathe import Lathed
-from materialist.solids.symmetry import surface_in
+from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ class Thickness:
     """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`."""
     back: Array | None = None
     """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
-    lathe: Lathed | None = None
-    """The whole object, where it was turned on a lathe."""
+    revolution: Revolution | None = None
+    """The whole object, where it is a surface of revolution."""
 
 
 def thickness(

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from solid_scenes import volume
 
+from materialist.bench.glass_scenes import is_closed
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.contour import open_edges, region, silhouette_field
+from materialist.geometry.contour import region
+from materialist.geometry.silhouette import silhouette_field
 from materialist.solids.closed import closed_proxy
 from materialist.types import Camera
 
@@ -33,11 +36,6 @@ def plate(mask, camera=None):
     return np.full(mask.shape, 2.0), normal, mask, np.where(mask, 0.3, 0), camera
 
 
-def volume(shell):
-    a, b, c = np.moveaxis(shell.vertices[shell.faces].astype(float), 1, 0)
-    return float((a * np.cross(b, c)).sum() / 6)
-
-
 def euler(shell):
     edges = np.sort(np.concatenate([shell.faces[:, [0, 1]], shell.faces[:, [1, 2]], shell.faces[:, [2, 0]]]), 1)
     return len(np.unique(shell.faces)) - len(np.unique(edges, axis=0)) + len(shell.faces)
@@ -49,7 +47,7 @@ def assert_watertight(shell):
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     code = edges[:, 0] * len(shell.vertices) + edges[:, 1]
     assert len(np.unique(code)) == len(code), "an edge is run through twice in one direction"
-    assert not len(open_edges(faces, len(shell.vertices)))
+    assert is_closed(shell)
     assert np.isfinite(shell.vertices).all() and len(np.unique(faces)) == len(shell.vertices)
 
 

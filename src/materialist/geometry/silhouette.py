@@ -1,0 +1,51 @@
+"""The silhouette of one object in a picture: its pixels, their distance to it, the object's size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.types import Array, Camera
+
+
+def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
+    """[H, W] bool: pixels of the mask that have a surface. Raises InputError for other sizes or when none is left."""
+    size = (camera.height, camera.width)
+    if np.shape(mask) != size or np.shape(depth) != size:
+        raise InputError(f"The mask is {np.shape(mask)} and the depth {np.shape(depth)}; the camera needs {size}.")
+    inside = (np.asarray(mask) > 0.5) & (np.asarray(depth) > 0)
+    if not inside.any():
+        raise InputError("The mask covers no surface; mark an object.")
+    return inside
+
+
+def border_distance(inside: Array) -> Array:
+    """[H, W] pixels from each pixel's centre to the silhouette, 0 outside; the picture's border is no silhouette."""
+    from scipy.ndimage import distance_transform_edt
+
+    # An object that the border cuts goes on beyond it.
+    padded = np.pad(inside, 1, mode="edge")
+    if padded.all():
+        padded = np.pad(inside, 1)
+    return np.where(inside, np.maximum(distance_transform_edt(padded)[1:-1, 1:-1] - 0.5, 0.5), 0)
+
+
+def silhouette_field(inside: Array) -> Array:
+    """[H, W] pixels to the silhouette, > 0 inside: the pixels' stairs are smoothed, straight edges keep their place."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    framed = np.pad(inside, 1)
+    signed = distance_transform_edt(framed) - distance_transform_edt(~framed)
+    signed = signed - 0.5 * np.sign(signed)  # pixel centres lie half a pixel from the border between pixels
+    return gaussian_filter(np.clip(signed, -6, 6), 0.8)[1:-1, 1:-1]
+
+
+def spacing(rays: Array) -> float:
+    """Distance of neighbouring rays [H, W, 3] at z = -1: one over the focal length in pixels."""
+    last = rays.shape[1] - 1
+    return float(rays[0, last, 0] - rays[0, 0, 0]) / last if last else 1.0
+
+
+def object_size(inside: Array, depth: Array, rays: Array) -> float:
+    """The square root of the area of the mask [H, W] bool at its median depth, scene units."""
+    return float(np.sqrt(inside.sum()) * np.median(depth[inside]) * spacing(rays))

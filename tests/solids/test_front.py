@@ -1,0 +1,54 @@
+"""The smooth front of an object, against a ball of known depth."""
+
+import numpy as np
+
+from materialist.camera import pixel_rays
+from materialist.solids.front import smooth_front
+from materialist.types import Camera
+
+RAYS = pixel_rays(Camera(64, 64, 30.0))
+
+
+def _ball() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Planar depth [64, 64], unit normals and mask of a ball of radius 0.5 at depth 3."""
+    centre = np.array([0, 0, -3.0])
+    along, squared = RAYS @ centre, (RAYS**2).sum(-1)
+    rest = along**2 - squared * (centre @ centre - 0.25)
+    depth = (along - np.sqrt(np.maximum(rest, 0))) / squared
+    return depth, (RAYS * depth[..., None] - centre) / 0.5, rest > 0.1  # 0.25 in the middle, 0 at the outline
+
+
+def test_exact_depth_and_normals_stay():
+    depth, normal, inside = _ball()
+    front = smooth_front(depth, normal, inside, RAYS, smooth=0.0)
+    assert np.abs(front / depth - 1)[inside].max() < 4e-4  # the ball is a sixth as deep as it is far
+    np.testing.assert_array_equal(front[~inside], depth[~inside])
+    few = np.zeros((64, 64), bool)
+    few[30:32, 30:34] = True
+    np.testing.assert_array_equal(smooth_front(depth, normal, few, RAYS), depth)
+
+
+def test_an_edge_stays_where_it_is():
+    """A roof: neither side is moved by the mean of the two slopes at its ridge."""
+    roof = [np.array([0.6, 0, 0.8]), np.array([-0.8, 0, 0.6])]
+    left, right = (float(n @ [0, 0, -3]) / (RAYS @ n) for n in roof)
+    depth = np.maximum(left, right)
+    normal = np.where((left > right)[..., None], roof[0], roof[1])
+    front = smooth_front(depth, normal, np.ones(depth.shape, bool), RAYS, smooth=0.0)
+    assert np.abs(front / depth - 1)[4:-4, 4:-4].max() < 2e-4
+
+
+def test_normals_take_away_the_noise_of_the_depth():
+    depth, normal, inside = _ball()
+    noisy = depth * np.exp(np.random.default_rng(0).normal(0, 0.005, depth.shape))
+    front = smooth_front(noisy, normal, inside, RAYS, smooth=0.0)
+    error = lambda z: np.sqrt(np.mean(np.log(z / depth)[inside] ** 2))  # noqa: E731
+    assert error(front) < 0.15 * error(noisy)
+
+
+def test_a_part_that_hides_another_stays_in_front_of_it():
+    depth = np.full((64, 64), 3.0)
+    depth[:, 32:] = 4.0
+    front = smooth_front(depth, -RAYS / np.linalg.norm(RAYS, axis=-1, keepdims=True), np.ones((64, 64), bool), RAYS)
+    steps = np.diff(np.log(front[32]))
+    assert np.argmax(steps) == 31 and steps[31] > 0.8 * np.log(4 / 3)
