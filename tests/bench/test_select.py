@@ -41,7 +41,7 @@ def test_both_maps_are_scored(tmp_path, mitsuba):
 def test_boxes_are_exact_and_loose():
     mask = np.zeros((40, 50), bool)
     mask[10:30, 10:40] = True
-    assert boxes(mask) == {"exact box": (10, 10, 40, 30), "loose box": (8, 8, 42, 32)}
+    assert boxes(mask, 0.1) == {"exact box": (10, 10, 40, 30), "loose box": (8, 8, 42, 32)}
 
 
 def test_bad_input(tmp_path):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -46,14 +46,10 @@ COLUMNS = (
     Column("reached", "s to the goal", "lower", 1),
     Column("steps", "steps", "", 0),
 )
-DELTAS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
-STEPS = (50, 200, 1000, 2000)
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
-INITS = 5
-FOVS = (0.8, 1.0, 1.2)
 LIGHTS = {"mlp": "envmap, MLP", "texels": "envmap, texels", "sh": "SH coefficients"}
-SHORT, EARLY = 200, {"patience": 20, "min_improvement": 0.05}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
+EARLY = {"patience": 20, "min_improvement": 0.05}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +61,12 @@ class AblationBench(Benchmark):
     DATA/meshes and light from DATA/envmaps. Raises InputError for a table that is not there.
     """
 
-    least = {"scenes": 1, "size": 16, "spp": 1, "longest": 1}
+    least: ClassVar = {"scenes": 1, "size": 16, "spp": 1, "longest": 1}
+
+    deltas: ClassVar = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)  # paper, table delta_ab
+    steps: ClassVar = (50, 200, 1000, 2000)  # paper, table steps_ab
+    fovs: ClassVar = (0.8, 1.0, 1.2)  # factors on the true field of view
+    short: ClassVar = 200  # steps of every other table, paper
 
     tables: str = "delta,steps,init,field,fov,light"
     scenes: int = 3
@@ -103,7 +104,7 @@ class _Photo:
         import torch
 
         self.sample, self.number, self.data = sample, number, data
-        self.predictor, self.longest, self.goal = bench.predictor, bench.longest, bench.goal
+        self.bench, self.predictor, self.longest, self.goal = bench, bench.predictor, bench.longest, bench.goal
         self.spp, self.seed, self.device = bench.spp, bench.seed, bench.device
         self.camera = sample.photo.camera
         self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
@@ -184,28 +185,30 @@ def _stages(names: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tup
 def _delta(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table delta_ab."""
     for name, targets in (("ARM", EACH[1:]), ("RM&A", (EACH[0], ("albedo",)))):
-        for delta in DELTAS:
-            settings = replace(PAPER.materials, delta=delta, stages=_stages(targets, SHORT, **EARLY))
+        for delta in photo.bench.deltas:
+            settings = replace(PAPER.materials, delta=delta, stages=_stages(targets, photo.bench.short, **EARLY))
             yield photo.materials(f"delta {delta:g}, {name}", settings)
 
 
 def _steps(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table steps_ab."""
-    for steps in STEPS:
+    for steps in photo.bench.steps:
         yield photo.materials(f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps)))
 
 
 def _init(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Figure ab_init: first weights of the material network."""
-    for seed in range(INITS):
-        yield photo.materials(f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, SHORT)), seed=seed)
+    for seed in range(5):
+        yield photo.materials(
+            f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, photo.bench.short)), seed=seed
+        )
 
 
 def _field(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Figure net_ab and table min_L_re."""
     for field, name in FIELDS.items():
-        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], SHORT))
-        yield photo.materials(f"{name}, {SHORT} steps", settings)
+        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.short))
+        yield photo.materials(f"{name}, {photo.bench.short} steps", settings)
     for field in ("maps", "mlp"):
         settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.longest))
         yield photo.materials(f"{FIELDS[field]} w/o R, M", settings, blind=True)
@@ -220,7 +223,7 @@ def _fov(photo: _Photo) -> Iterator[dict[str, Any]]:
     size = truth.depth.shape
     other = make_sample(photo.number, 0, photo.number + 1, size=size, data=photo.data, seed=photo.seed).envmap
     relit = sample.render(other, spp=photo.spp, seed=photo.seed + 3)
-    for factor in FOVS:
+    for factor in photo.bench.fovs:
         camera = replace(photo.camera, fov=factor * photo.camera.fov)
         geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=photo.seed)
         mesh = RenderScene(geometry, camera, device=photo.device)
@@ -236,7 +239,7 @@ def _light(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table sh: how fast the light explains the photo, true materials given."""
     engine = photo.begun(photo.sample.truth).fit.engine
     problem = engine.light_problem(photo.sample.truth.materials)
-    schedule = Schedule(max_steps=max(SHORT, photo.longest), patience=0)
+    schedule = Schedule(max_steps=max(photo.bench.short, photo.longest), patience=0)
     for field, name in LIGHTS.items():
         settings = replace(PAPER.light, field=field, height=256 if field == "mlp" else 32, schedule=schedule)
         light = envmap_field(settings, seed=photo.seed)

@@ -11,7 +11,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from materialist.batches.photos import list_photos
 from materialist.batches.results import package_hash, together
@@ -48,7 +48,7 @@ class BatchBench(Benchmark):
     Raises InputError for bad options, MaterialistError where the ways give different results.
     """
 
-    least = {"photos": 1, "size": 16}
+    least: ClassVar = {"photos": 1, "size": 16}
 
     photos: int = 4
     size: int = 128

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Photo, Scene
 
 KINDS = ("hue", "metal", "relight", "insert")
-LARGE, GRAIN = 4900, 0.03
-"""Sides of the large photo that an edit is brought into, pixels, and its noise."""
 COLUMNS = (
     Column("inside", "PSNR inside", "higher", 2),
     Column("outside", "PSNR outside", "higher", 2),
@@ -53,7 +51,7 @@ class EditBench(Benchmark):
     is written after every row.
     """
 
-    least = {"size": 32, "spp": 2, "truth_spp": 1}
+    least: ClassVar = {"size": 32, "spp": 2, "truth_spp": 1}
 
     scenes: int = 3
     size: int = 96
@@ -176,15 +174,15 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     photo = _enlarged(scene.photo)
     clock = Clock()
     into_photo(photo, layers)
-    yield {"method": "final: into a large photo", "sample": f"{LARGE} x {LARGE}", **clock.read()}
+    yield {"method": "final: into a large photo", "sample": "4900 x 4900", **clock.read()}
 
 
-def _enlarged(photo: Photo) -> Photo:
-    """The same photo with an original of LARGE pixels, and grain."""
+def _enlarged(photo: Photo, side: int = 4900, noise: float = 0.03) -> Photo:
+    """The same photo with an original of `side` pixels, and grain."""
     import cv2
 
-    large = np.asarray(cv2.resize(photo.original, (LARGE, LARGE), interpolation=cv2.INTER_CUBIC))
-    grain = GRAIN * np.random.default_rng(0).standard_normal((LARGE, LARGE, 1), np.float32)
+    large = np.asarray(cv2.resize(photo.original, (side, side), interpolation=cv2.INTER_CUBIC))
+    grain = noise * np.random.default_rng(0).standard_normal((side, side, 1), np.float32)
     return replace(photo, original=np.clip(large * (1 + grain), 0, 1))
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -85,7 +85,7 @@ class GlassBench(Benchmark):
     `shapes` may then be 0. `model` 'closed' or 'two-interface' leaves out the rows of the other.
     """
 
-    least = {"envmaps": 1, "spp": 1, "reference": 1, "size": 32}
+    least: ClassVar = {"envmaps": 1, "spp": 1, "reference": 1, "size": 32}
 
     shapes: int = 2
     envmaps: int = 2

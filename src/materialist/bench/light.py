@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -99,7 +99,7 @@ class LightBench(Benchmark):
     are the samples a pixel of all pictures that are compared. The report is written after every row.
     """
 
-    least = {"scenes": 1, "views": 1, "lights": 1, "size": 1, "spp": 1}
+    least: ClassVar = {"scenes": 1, "views": 1, "lights": 1, "size": 1, "spp": 1}
 
     scenes: int = 3
     views: int = 1

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,7 +36,7 @@ NOTE = (
 class PredictorBench(Benchmark):
     """Time predictors (comma-separated) on a square of `size` pixels; `threads` 0 leaves their number as it is."""
 
-    least = {"runs": 1, "size": 32}
+    least: ClassVar = {"runs": 1, "size": 32}
 
     predictor: str = "auto"
     size: int = 512

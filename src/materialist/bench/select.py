@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,14 +27,6 @@ COLUMNS = (
 )
 METHODS = ("network", "grabcut")
 """Ways to select that need nothing but the package."""
-LEAST = 400
-"""Pixels of an object that is clicked on."""
-INSIDE = 2.5
-"""Pixels from an object's border at which it is clicked on anywhere."""
-LOOSE = 0.1
-"""How much larger than the object a loose box is on every side, in units of its shorter side."""
-SPP = 100
-"""Samples a pixel of the pictures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,10 +36,13 @@ class SelectBench(Benchmark):
     Raises InputError for counts below 1.
     """
 
-    least = {"scenes": 1, "size": 64}
+    least: ClassVar = {"scenes": 1, "size": 64}
 
     scenes: int = 12
     size: int = 256
+    smallest: int = 400  # pixels of an object that is clicked on
+    loose: float = 0.1  # how much larger a loose box is on each side, in units of the object's shorter side
+    spp: int = 100
 
     def run(self, data: Path | None, output: Path) -> None:
         from materialist.predict.bundled.predictor import BundledPredictor
@@ -61,41 +56,41 @@ class SelectBench(Benchmark):
         predictor = BundledPredictor()
         for folder in (None,) if data is None else (None, data):
             for k in range(self.scenes):
-                sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=SPP)
+                sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp)
                 kind = "captured" if folder else "procedural"
                 for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
                     for method in METHODS:
-                        rows += _rows(sample, _scene(sample, found), maps, method, f"{kind} {sample.name}", k)
+                        rows += self._rows(sample, found, f"{maps} maps", method, f"{kind} {sample.name}")
                 write(report, output)
 
+    def _rows(
+        self, sample: SyntheticSample, prior: Prediction, maps: str, method: str, name: str
+    ) -> list[dict[str, Any]]:
+        """A row a click, and a box."""
+        from materialist.edits.select.select import select
 
-def clicks(mask: Array, usable: Array, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """Two (column, row) in a mask [H, W] bool: its middle, and any place a little inside; both `usable` [H, W] bool."""
+        rows, scene = [], _scene(sample, prior)
+        for j, mask in enumerate(sample.things):
+            if mask.sum() < self.smallest:
+                continue
+            for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([self.seed, j]))):
+                found = select(scene, click=click, method=method)
+                rows.append(_row(found, mask, f"{method}, {maps}", f"{name} object {j} click {k}"))
+            for what, box in boxes(mask, self.loose).items():
+                found = select(scene, box=box, method=method)
+                rows.append(_row(found, mask, f"{method}, {what}, {maps}", f"{name} object {j}"))
+        return rows
+
+
+def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5) -> list[tuple[int, int]]:
+    """Two (column, row) in a mask [H, W] bool: its middle, and any place `inside` pixels from its border or more; both
+    `usable` [H, W] bool."""
     from scipy.ndimage import distance_transform_edt
 
     away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
-    places = [np.argwhere(away == away.max()), np.argwhere((away > INSIDE) & usable)]
+    places = [np.argwhere(away == away.max()), np.argwhere((away > inside) & usable)]
     chosen = [places[0][0], *([places[1][rng.integers(len(places[1]))]] if len(places[1]) else [])]
     return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
-
-
-def _rows(
-    sample: SyntheticSample, scene: Scene, maps: str, method: str, name: str, number: int
-) -> list[dict[str, Any]]:
-    """A row a click, and a box."""
-    from materialist.edits.select.select import select
-
-    rows = []
-    for j, mask in enumerate(sample.things):
-        if mask.sum() < LEAST:
-            continue
-        for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
-            found = select(scene, click=click, method=method)
-            rows.append(_row(found, mask, f"{method}, {maps} maps", f"{name} object {j} click {k}"))
-        for what, box in boxes(mask).items():
-            found = select(scene, box=box, method=method)
-            rows.append(_row(found, mask, f"{method}, {what}, {maps} maps", f"{name} object {j}"))
-    return rows
 
 
 def _row(found: Array, mask: Array, method: str, sample: str) -> dict[str, Any]:
@@ -103,11 +98,11 @@ def _row(found: Array, mask: Array, method: str, sample: str) -> dict[str, Any]:
     return {"method": method, "sample": sample, "iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
 
 
-def boxes(mask: Array) -> dict[str, Box]:
-    """The boxes around a mask [H, W] bool: exact, and LOOSE."""
+def boxes(mask: Array, loose: float) -> dict[str, Box]:
+    """The boxes around a mask [H, W] bool: exact, and larger by `loose` of its shorter side on every side."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     exact = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-    return {"exact box": exact, "loose box": grown(exact, LOOSE, mask.shape)}
+    return {"exact box": exact, "loose box": grown(exact, loose, mask.shape)}
 
 
 def _scene(sample: SyntheticSample, found: Prediction) -> Scene:

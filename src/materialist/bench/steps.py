@@ -10,21 +10,16 @@ import numpy as np
 
 from materialist.types import Photo, Prediction
 
-LIGHT = 0.6
-"""Radiance of the grey light of both measurements; what the light is does not change what a step costs."""
-CACHED_STEPS = 24
-WARM_UP = 4
-"""Cached steps that are not counted: memory is allocated in them."""
-PRB_STEPS = 2
-"""Path-traced steps that are counted, after one that compiles the kernels."""
 
-
-def step_costs(photo: Photo, prior: Prediction, *, seed: int = 0, device: str = "auto") -> dict[str, float]:
+def step_costs(
+    photo: Photo, prior: Prediction, *, seed: int = 0, device: str = "auto", cached_steps: int = 24, prb_steps: int = 2
+) -> dict[str, float]:
     """Median seconds of a material step, and their ratio; in one process, one after the other.
 
     Both are steps of the default preset's own fit (the maps as parameters, its loss with all regularisers, Adam), at
     full resolution and with gradients of all maps; only the engine differs: cached transport, or Mitsuba's path replay
-    backpropagation with the paper's 64 samples a pixel and depth 4.
+    backpropagation with the paper's 64 samples a pixel and depth 4. The first four of `cached_steps` allocate memory,
+    and the one before `prb_steps` compiles kernels; neither counts. The light is a grey one, which changes no cost.
 
     Returns `cached_step`, `prb_step` (seconds), `prb_per_cached`, and `cache_seconds`, what tracing the cache took.
     """
@@ -34,15 +29,15 @@ def step_costs(photo: Photo, prior: Prediction, *, seed: int = 0, device: str = 
     from materialist.render.variant import setup
 
     setup(device)
-    camera, light = photo.camera, np.full((256, 512, 3), LIGHT, np.float32)
+    camera, light = photo.camera, np.full((256, 512, 3), 0.6, np.float32)
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     start = time.perf_counter()
     engine: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
     problem = engine.material_problem(light)
     cache_seconds = time.perf_counter() - start
-    cached = _seconds_per_step(engine, problem, photo, prior, CACHED_STEPS)[WARM_UP:]
+    cached = _seconds_per_step(engine, problem, photo, prior, cached_steps)[4:]
     path: Any = PathEngine(RenderScene(geometry, camera, device=device), camera, engine.pixels.numpy(), seed=seed)
-    prb = _seconds_per_step(path, path.material_problem(light), photo, prior, 1 + PRB_STEPS)[1:]
+    prb = _seconds_per_step(path, path.material_problem(light), photo, prior, 1 + prb_steps)[1:]
     return {
         "cached_step": float(np.median(cached)),
         "prb_step": float(np.median(prb)),

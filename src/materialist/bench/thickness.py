@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class ThicknessBench(Benchmark):
     where there are no weights. `device` is not used: the network is small.
     """
 
-    least = {"shapes": 1, "views": 1, "mesh_views": 1}
+    least: ClassVar = {"shapes": 1, "views": 1, "mesh_views": 1}
 
     shapes: int = 64
     views: int = 8
