@@ -6,10 +6,10 @@ import pytest
 from studio_scenes import package
 from studio_server import start
 
-from materialist.studio.hub import Hub
-from materialist.studio.jobs import Jobs
-from materialist.studio.stack import Stack
-from materialist.studio.work import WorkFolder
+from materialist.jobs.queue import JobQueue
+from materialist.studio.edit_list import EditList
+from materialist.studio.studio import Studio
+from materialist.studio.workspace import WorkFolder
 
 
 @pytest.fixture(scope="session")
@@ -50,19 +50,19 @@ def page(browser):
 
 
 @pytest.fixture(scope="module")
-def hub(tmp_path_factory):
+def studio(tmp_path_factory):
     folder = tmp_path_factory.mktemp("studio")
     work = WorkFolder(folder / "work")
-    made = Hub(work, Jobs(1))
+    made = Studio(work, JobQueue(1))
     made.start = work.new("Room", "me", scene=package(folder))
     yield made
     made.jobs.close()
 
 
 @pytest.fixture(scope="module")
-def opened(hub):
-    session = hub.session("page", "me")
-    hub.open(session, hub.start.name)
+def opened(studio):
+    session = studio.session("page", "me")
+    studio.open(session, studio.start.name)
     session.live.wait()
     return session
 
@@ -70,10 +70,10 @@ def opened(hub):
 @pytest.fixture
 def session(opened):
     """The open session without edits."""
-    opened.stack, opened.thing = Stack(), {}
+    opened.edits, opened.next_object = EditList(), {}
     opened.deselect()
     opened._past = []
-    (opened.desk / "edits.yaml").unlink(missing_ok=True)  # a test may have left another page's
+    (opened.workspace / "edits.yaml").unlink(missing_ok=True)  # a test may have left another page's
     opened._kept = None
     opened.save()
     return opened

@@ -10,8 +10,8 @@ import numpy as np
 
 from materialist.geometry.build import build_geometry
 from materialist.io.package import save_scene
-from materialist.studio.context import Context
 from materialist.studio.selection import read_pick
+from materialist.studio.widgets import PageContext
 from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
 
 HEIGHT, WIDTH = 48, 64
@@ -69,6 +69,6 @@ class _Names(dict):
         return name
 
 
-def named(hub=None) -> Context:
+def named(studio=None) -> PageContext:
     """What the tabs share, without a page: updates come under the names of components."""
-    return Context(hub, _Names())
+    return PageContext(studio, _Names())

@@ -1,59 +1,41 @@
 """Glass that follows its sliders: the tracing process, what is asked of it, and what the stage shows meanwhile."""
 
-import sys
+import os
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import studio_glass_task
 from studio_scenes import block, package, room
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
-from materialist.studio import child, glass_worker
 from materialist.studio import glass as studio_glass
-from materialist.studio.glass import Pane, Tracer, checked, traced
-from materialist.studio.live import Live
-from materialist.studio.tab_glass import tint_colour, tint_text
-
-WORKER = """
-import base64, json, os, sys, time
-tell = lambda **entry: print(json.dumps(entry), flush=True)
-b64 = lambda data: base64.b64encode(data).decode()
-log = open(os.environ["GLASS_LOG"], "a")
-for line in sys.stdin:
-    asked = json.loads(line)
-    print(os.getpid(), asked["glass"].get("ior"), file=log, flush=True)
-    tell(ask=asked["ask"], stage="build")
-    ior = float(asked["glass"].get("ior", 1.5))
-    if ior == 1.9: time.sleep(60)
-    if ior == 1.8: sys.exit(1)
-    if ior == 1.7: tell(ask=asked["ask"], error="The camera sees nothing of the object; mark another one."); continue
-    time.sleep(0.2)
-    tell(ask=asked["ask"], stage="trace")
-    import struct
-    half = struct.pack("<6e", *([ior] * 6))
-    tell(ask=asked["ask"], pane={"box": [4, 5, 8, 10], "picture": b64(half), "share": b64(bytes([255, 51])),
-                                 "filled": b64(bytes([0, 1]))})
-"""
+from materialist.studio.glass import GlassBodies, GlassClient, Pane, body_key, checked, is_traced
+from materialist.studio.preview import LivePreview
+from materialist.studio.widgets import tint_colour, tint_text
+from materialist.studio.workspace import write_mask
 
 
 @pytest.fixture
 def log(tmp_path, monkeypatch):
-    """A tracing process that answers at once; the file says what it was asked, and which process it was."""
-    script, written = tmp_path / "worker.py", tmp_path / "log.txt"
-    script.write_text(WORKER)
+    """A tracing task that answers at once; the file says what it was asked, and which process it was."""
+    written = tmp_path / "log.txt"
     written.touch()
     monkeypatch.setenv("GLASS_LOG", str(written))
-    real = child.subprocess.Popen
-    monkeypatch.setattr(child.subprocess, "Popen", lambda command, **more: real([sys.executable, str(script)], **more))
+    path = [str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
+    monkeypatch.setattr(studio_glass, "trace", studio_glass_task.trace)
     return written
 
 
 @pytest.fixture
 def tracer(log, tmp_path):
-    made = Tracer(tmp_path / "room.scene")
+    made = GlassClient(tmp_path / "room.scene")
     yield made
-    made.rest()
+    made.stop()
 
 
 def glass(ior, mask="mask-1.png", **more):
@@ -121,12 +103,12 @@ def test_failures_are_told_and_the_next_value_is_tried(tracer):
 def test_nothing_stays_when_the_glass_is_gone(tracer):
     tracer.ask((), glass(1.4))
     until(lambda: not tracer.state.waiting)
-    process = tracer._process
+    worker = tracer._worker
     tracer.keep((glass(1.2), Step("remove", {"mask": "mask-3.png"})))
-    assert tracer.pane(glass(1.4)) is not None and process.poll() is None
+    assert tracer.pane(glass(1.4)) is not None and worker.running
     tracer.keep((Step("remove", {"mask": "mask-1.png"}),))
     assert tracer.pane(glass(1.4)) is None and not tracer.state.waiting
-    until(lambda: process.poll() is not None)
+    until(lambda: not worker.running)
     tracer.ask((), glass(1.4))  # undone: it is made again
     until(lambda: tracer.pane(glass(1.4)) is not None)
 
@@ -135,12 +117,10 @@ def test_too_little_memory_is_a_sentence(tracer, monkeypatch):
     monkeypatch.setattr(studio_glass, "LEAST_FREE", 1e18)
     tracer.ask((), glass(1.4))
     assert not tracer.state.waiting and tracer.state.bad and "too little memory" in tracer.state.words
-    assert tracer._process is None
+    assert tracer._worker is None
 
 
 def test_bad_glass_is_refused_at_once(tmp_path):
-    from materialist.studio.desk import write_mask
-
     name = write_mask(tmp_path, block())
     good = Step("glass", {"mask": name, "tint": ["1", "0.5", "0.25"]}, tmp_path)
     region, tint = checked(room(), good)
@@ -151,7 +131,7 @@ def test_bad_glass_is_refused_at_once(tmp_path):
     sky[:3] = True
     with pytest.raises(InputError, match="only sky"):
         checked(room(), Step("glass", {"mask": write_mask(tmp_path, sky)}, tmp_path))
-    assert traced(good) and not traced(Step("glass", {"mask": name, "model": "two-interface"}))
+    assert is_traced(good) and not is_traced(Step("glass", {"mask": name, "model": "two-interface"}))
 
 
 class _Told:
@@ -165,9 +145,7 @@ class _Told:
 
 
 def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
-    from materialist.studio.desk import write_mask
-
-    live = Live(room())
+    live = LivePreview(room())
     step = Step("glass", {"mask": write_mask(tmp_path, block()), "tint": "0.2,1,0.2"}, tmp_path)
     sketch = live.picture((step,))
     before = room().photo.linear
@@ -177,7 +155,7 @@ def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
     filled = np.zeros((2, 3), bool)
     filled[0, 0] = True
     share = np.array([[0, 1, 0.5], [0, 0, 0]], np.float32)
-    pane = Pane("", (20, 22, 20, 23), np.full((2, 3, 3), 0.9, np.float32), share, filled)
+    pane = Pane((20, 22, 20, 23), np.full((2, 3, 3), 0.9, np.float32), share, filled)
     dim = Step("relight", {"ambient": "0.5"}, tmp_path)
     with_pane, alone = live.picture((step, dim), _Told(pane)), live.picture((dim,))
     np.testing.assert_allclose(with_pane[20, 20:22], 0.9)
@@ -188,20 +166,27 @@ def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
     live.close()
 
 
-def test_the_process_answers_with_the_preview_of_the_edit_package(tmp_path):
-    from materialist.edits.glass.preview import GlassPreview
-    from materialist.studio.desk import write_mask
+class _Report:
+    """Notes the stages."""
 
-    scene, told, bench = package(tmp_path), [], glass_worker.Bench()
+    def __init__(self, outdated=False):
+        self.stages, self.outdated = [], outdated
+
+    def __call__(self, stage, done, total):
+        self.stages.append(stage)
+
+
+def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path, monkeypatch):
+    from materialist.edits.glass.preview import GlassPreview
+
+    monkeypatch.setattr(studio_glass, "_BODIES", GlassBodies())
     request = {
-        "ask": 7, "scene": str(scene), "folder": str(tmp_path), "others": [["relight", {"ambient": "0.5"}]],
+        "scene": str(package(tmp_path)), "folder": str(tmp_path), "others": [["relight", {"ambient": "0.5"}]],
         "glass": {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"},
     }  # fmt: skip
-    glass_worker.answer(bench, request, told.append, lambda: True)
-    assert [entry.get("stage") for entry in told] == ["load", "build", "trace", None]
-    pane = studio_glass._pane(told[-1]["pane"], "")
-    from dataclasses import replace
-
+    first = _Report()
+    pane = studio_glass.trace(first, request)
+    assert first.stages == ["load", "build", "trace"]
     dim = replace(room(), envmap=room().envmap * 0.5)
     truth = GlassPreview(dim, block(), thickness="symmetry").picture(ior=1.2, tint=(1, 0.5, 0.5))
     top, bottom, left, right = pane.box
@@ -210,18 +195,19 @@ def test_the_process_answers_with_the_preview_of_the_edit_package(tmp_path):
     outside[top:bottom, left:right] = False
     assert np.array_equal(truth[outside], room().photo.linear[outside])
     assert pane.share.max() == 1 and (pane.share > 0.5).sum() > 0.8 * block().sum()
-    told.clear()
-    changed = {**request, "ask": 8, "glass": {**request["glass"], "ior": "1.4"}}
-    glass_worker.answer(bench, changed, told.append, lambda: False)  # a newer one came
-    assert [entry.get("stage") for entry in told] == ["load"]  # the body is kept, and nothing is traced
-    glass_worker.answer(bench, {**request, "glass": {"ior": "1.4", "box": "0,0,9"}}, told.append, lambda: True)
-    assert "must be 4 numbers" in told[-1]["error"]
+    late = _Report(outdated=True)
+    assert studio_glass.trace(late, {**request, "glass": {**request["glass"], "ior": "1.4"}}) is None
+    assert late.stages == ["load"]  # the body is kept, and nothing is traced
+    with pytest.raises(InputError, match="must be 4 numbers"):
+        studio_glass.trace(_Report(), {**request, "glass": {"ior": "1.4", "box": "0,0,9"}})
 
 
 def test_bodies_are_told_apart_by_what_they_depend_on():
-    key = lambda **glass: glass_worker.body_key("s", [], {"mask": "a.png", **glass})  # noqa: E731
+    def key(others=(), **glass):
+        return body_key({"scene": "s", "others": list(others), "glass": {"mask": "a.png", **glass}})
+
     assert key(ior="1.2", tint="1,1,0") == key(roughness="0.4", transmission="0.2")
-    assert key(hollow="true") != key() != glass_worker.body_key("s", [["relight", {}]], {"mask": "a.png"})
+    assert key(hollow="true") != key() != key([["relight", {}]])
 
 
 @pytest.mark.parametrize("colour", ["#ffffff", "#80ff10", "#010203"])

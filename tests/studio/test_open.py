@@ -5,36 +5,38 @@ from concurrent.futures import Future
 import pytest
 from studio_scenes import click, named
 
-from materialist.studio.follow import failure
-from materialist.studio.jobs import DONE, FAILED, STOPPED, Job
+from materialist.jobs.queue import STOPPED, Job
+from materialist.jobs.worker import DONE, FAILED
+from materialist.studio import tasks
+from materialist.studio.progress import failure
 from materialist.studio.session import Session
 from materialist.studio.tab_open import _following, _opened
 
 
 @pytest.mark.parametrize("end", [FAILED, STOPPED])
-def test_a_photo_that_fails_leaves_the_open_one_known(hub, session, end):
-    project = hub.work.new("Too dark", "me")
-    job = Job("invert", "me", {}, project.folder, state=end)
-    updates = list(_following(named(hub), session, project, job))
-    assert updates[0]["last"] == hub.kept(project) and updates[-1]["last"] == hub.kept(session.project)
+def test_a_photo_that_fails_leaves_the_open_one_known(studio, session, end):
+    project = studio.work.new("Too dark", "me")
+    job = Job("invert", "me", project.folder, tasks.invert, state=end)
+    updates = list(_following(named(studio), session, project, job))
+    assert updates[0]["last"] == studio.bookmark(project) and updates[-1]["last"] == studio.bookmark(session.project)
     assert not project.folder.exists()
-    nothing = hub.session("an empty page", "me")
-    project = hub.work.new("Too dark", "me")
-    assert list(_following(named(hub), nothing, project, job))[-1]["last"] == ""
-    hub.leave("an empty page")
+    nothing = studio.session("an empty page", "me")
+    project = studio.work.new("Too dark", "me")
+    assert list(_following(named(studio), nothing, project, job))[-1]["last"] == ""
+    studio.leave("an empty page")
 
 
-def test_a_click_before_the_preview_is_ready_shows_at_once(hub, session, monkeypatch):
+def test_a_click_before_the_preview_is_ready_shows_at_once(studio, session, monkeypatch):
     click(session)
-    session.material("hue", "90")
-    steps = _opened(named(hub), session, session.project)
+    session.material(hue="90")
+    steps = _opened(named(studio), session, session.project)
     next(steps)
     first = next(steps)
     assert len(first["steps"]) == 1 and first["stage"]["picture"] and "materialist apply" in first["commands"]
     with monkeypatch.context() as patch:
         patch.setattr(session.live, "_preview", Future())  # in the making
         click(session, 50, 40)
-        shown = named(hub).everything(session)
+        shown = named(studio).everything(session)
     assert len(shown["steps"]) == 1 and shown["stage"]["fill"] and "picture" not in shown["stage"]
     assert "ready" in shown["stage"]["badge"]
     session.live.wait()
@@ -42,15 +44,15 @@ def test_a_click_before_the_preview_is_ready_shows_at_once(hub, session, monkeyp
     assert last["stage"]["badge"] == "Live preview" and last["stage"]["picture"] and "Ready" in last["progress"]
 
 
-def test_the_list_and_what_is_wrong_with_it_are_shown(hub, session):
-    (session.desk / "edits.yaml").write_text("- edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 50}\n")
-    last = list(_opened(named(hub), session, session.project))[-1]
+def test_the_list_and_what_is_wrong_with_it_are_shown(studio, session):
+    (session.workspace / "edits.yaml").write_text("- edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 50}\n")
+    last = list(_opened(named(studio), session, session.project))[-1]
     assert len(last["steps"]) == 1 and "exactly one" in last["stage"]["badge"] and "alert" in last["progress"]
     session.act("remove", 0)
 
 
-def test_the_commands_are_those_of_the_list(hub, session):
-    context = named(hub)
+def test_the_commands_are_those_of_the_list(studio, session):
+    context = named(studio)
     assert "materialist apply" not in context.picture(session)["commands"]
     session.light(rotate="20")
     assert "materialist apply" in context.picture(session)["commands"]
@@ -59,12 +61,19 @@ def test_the_commands_are_those_of_the_list(hub, session):
 
 def test_what_failed_is_called_by_its_name(tmp_path):
     spec = {"photo": str(tmp_path / "original.jpg"), "scene": str(tmp_path / "photo.scene"), "title": "Kitchen.JPG"}
-    job = Job("invert", "me", spec, tmp_path, message=f"{tmp_path}/original.jpg is cut off; {tmp_path}/x.exr as well.")
+    job = Job(
+        "invert",
+        "me",
+        tmp_path,
+        tasks.invert,
+        spec,
+        message=f"{tmp_path}/original.jpg is cut off; {tmp_path}/x.exr as well.",
+    )
     assert failure(job) == "Kitchen.JPG is cut off; x.exr as well."
 
 
-def test_a_photo_that_is_done_stays_known(hub, session):
-    project = hub.work.new("Fine", "me")
-    job = Job("invert", "me", {}, project.folder, state=DONE)
-    updates = list(_following(named(hub), session, project, job))
-    assert [update["last"] for update in updates if "last" in update] == [hub.kept(project)]
+def test_a_photo_that_is_done_stays_known(studio, session):
+    project = studio.work.new("Fine", "me")
+    job = Job("invert", "me", project.folder, tasks.invert, state=DONE)
+    updates = list(_following(named(studio), session, project, job))
+    assert [update["last"] for update in updates if "last" in update] == [studio.bookmark(project)]

@@ -7,6 +7,7 @@ from studio_scenes import block, click, named, room
 from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio.session import Session
+from materialist.studio.stage import stage
 
 
 def loaded(session, folder, text):
@@ -23,7 +24,7 @@ def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
     session.act("choose", 0)
     assert (session.selection.mask & block()).sum() > 0.8 * block().sum()
     click(session, 50, 40, "add")
-    (step,) = read_recipe(session.desk / "edits.yaml")
+    (step,) = read_recipe(session.workspace / "edits.yaml")
     assert set(step.options) == {"mask", "hue"}
     changed = (apply(room(), [step]).materials.albedo != room().materials.albedo).any(-1)
     assert np.array_equal(changed, session.selection.mask) and changed[40, 50]
@@ -32,7 +33,7 @@ def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
 def test_a_region_that_cannot_be_changed_changes_nothing(session, tmp_path):
     loaded(session, tmp_path, "- edit: {click: [25, 24], hue: 50}")
     session.act("choose", 0)
-    stack, selection, past = session.stack, session.selection, session._past
+    stack, selection, past = session.edits, session.selection, session._past
 
     def refuse(steps):
         raise InputError("no")
@@ -41,14 +42,14 @@ def test_a_region_that_cannot_be_changed_changes_nothing(session, tmp_path):
         patch.setattr(session.live, "edited", refuse)
         with pytest.raises(InputError, match="no"):
             click(session, 50, 40, "add")
-    assert (session.stack, session.selection, session._past) == (stack, selection, past)
+    assert (session.edits, session.selection, session._past) == (stack, selection, past)
 
 
 def test_choosing_what_has_no_region_changes_nothing(session, tmp_path):
     loaded(session, tmp_path, "- edit: {click: [25, 24], hue: 50}\n- edit: {click: [3, 1], hue: 50, skip: true}")
     with pytest.raises(InputError, match="sky"):
         session.act("choose", 1)
-    assert session.stack.current is None
+    assert session.edits.current is None
 
 
 @pytest.mark.parametrize(
@@ -57,8 +58,8 @@ def test_choosing_what_has_no_region_changes_nothing(session, tmp_path):
      ("relight: {lamps: [[a, b, 1, 2700, 1]]}", "lamp"), ("insert: {mesh: thing-cube.ply}", "at")],
 )  # fmt: skip
 def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, words):
-    (session.desk / "thing-cube.ply").touch()
-    (session.desk / "edits.yaml").write_text(f"- edit: {{click: [25, 24], hue: 50}}\n- {bad}\n")
+    (session.workspace / "thing-cube.ply").touch()
+    (session.workspace / "edits.yaml").write_text(f"- edit: {{click: [25, 24], hue: 50}}\n- {bad}\n")
     other = Session("me")
     other.open(session.project)
     other.live.wait()
@@ -66,9 +67,9 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     assert len(shown["steps"]) == 2 and shown["stage"]["picture"] and shown["stage"]["bad"]
     assert words in shown["stage"]["badge"] and shown["steps"][1]["text"] in shown["stage"]["badge"]
     other.act("remove", 1)
-    assert other.stage()["badge"] == "Live preview" and not other.stage()["bad"]
+    assert stage(other)["badge"] == "Live preview" and not stage(other)["bad"]
     other.close()
-    (session.desk / "thing-cube.ply").unlink()
+    (session.workspace / "thing-cube.ply").unlink()
 
 
 def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
@@ -76,24 +77,24 @@ def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
     click(session)
     session.live.wait()
     session.region_step("remove", shadow=None)
-    session.stack = session.stack.chosen(None)
-    session.material("hue", "90")
+    session.edits = session.edits.chosen(None)
+    session.material(hue="90")
     for check in (session.live.edited, lambda steps: apply(session.scene, list(steps))):
         with pytest.raises(InputError, match="An earlier step took away what is there"):
-            check(session.stack.active)
-    assert "took away" in session.stage()["badge"]
-    session.stack = session.stack.without(0)
-    assert "took away" not in session.stage()["badge"]
+            check(session.edits.active)
+    assert "took away" in stage(session)["badge"]
+    session.edits = session.edits.without(0)
+    assert "took away" not in stage(session)["badge"]
 
 
 def test_no_folders_in_what_is_said_of_a_region(session):
     click(session)
     session.live.wait()
-    session.material("hue", "20")
-    (session.desk / session.stack.steps[0].options["mask"]).write_bytes(b"no mask")
+    session.material(hue="20")
+    (session.workspace / session.edits.steps[0].options["mask"]).write_bytes(b"no mask")
     session.live._edited.clear()
-    session.stack = session.stack.chosen(None)
+    session.edits = session.edits.chosen(None)
     with pytest.raises(InputError, match="mask-") as error:
         session.act("choose", 0)
-    assert str(session.desk) not in str(error.value) and str(session.desk) not in session.stage()["badge"]
-    assert "mask-" in session.stage()["badge"]
+    assert str(session.workspace) not in str(error.value) and str(session.workspace) not in stage(session)["badge"]
+    assert "mask-" in stage(session)["badge"]

@@ -42,15 +42,15 @@ def test_it_is_asked_for_clicks_and_boxes_and_not_for_the_brush(monkeypatch):
 @pytest.mark.parametrize("missing", [None, "Its weights are not here."])
 def test_the_page_offers_it_or_says_why_not(monkeypatch, tmp_path, missing):
     pytest.importorskip("gradio", reason="needs gradio")
+    from materialist.jobs.queue import JobQueue
     from materialist.studio import page
-    from materialist.studio.hub import Hub
-    from materialist.studio.jobs import Jobs
-    from materialist.studio.work import WorkFolder
+    from materialist.studio.studio import Studio
+    from materialist.studio.workspace import WorkFolder
 
     monkeypatch.setattr(page, "sam_missing", lambda: missing)
-    hub = Hub(WorkFolder(tmp_path), Jobs(1))
+    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
     try:
-        (box,) = (b for b in page.build(hub).blocks.values() if getattr(b, "elem_id", None) == "sam")
+        (box,) = (b for b in page.build(studio).blocks.values() if getattr(b, "elem_id", None) == "sam")
     finally:
-        hub.jobs.close()
+        studio.jobs.close()
     assert box.interactive == (missing is None) and (missing is None or box.info == missing) and not box.value

@@ -9,52 +9,53 @@ from studio_scenes import block, click, room
 
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
-from materialist.studio.context import light_values, material_values
+from materialist.studio import objects
+from materialist.studio.edit_list import EditList
+from materialist.studio.objects import LIBRARY, library_file, shape
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
-from materialist.studio.stack import Stack
+from materialist.studio.stage import stage
 from materialist.studio.tab_light import place_lamp
-from materialist.studio.tab_object import LIBRARY, library_file, shape
-from materialist.studio.tab_take import commands
-from materialist.studio.work import Project
+from materialist.studio.widgets import commands, light_values, material_values
+from materialist.studio.workspace import Project
 
 
 def test_an_edit_from_click_to_recipe(session):
     with pytest.raises(InputError, match="Click the object"):
-        session.material("hue", "30")
+        session.material(hue="30")
     click(session)
-    session.material("hue", "120")
-    session.material("roughness", "0.2")
-    steps = read_recipe(session.desk / "edits.yaml")
+    session.material(hue="120")
+    session.material(roughness="0.2")
+    steps = read_recipe(session.workspace / "edits.yaml")
     assert len(steps) == 1 and steps[0].options == {"mask": steps[0].options["mask"], "hue": "120", "roughness": "0.2"}
     edited = apply(room(), steps)
     changed = (edited.materials.albedo != room().materials.albedo).any(-1)
     assert changed[block()].mean() > 0.9 and not changed[~block()].any()
-    session.material("hue", None)
-    session.material("roughness", None)
-    assert apply(room(), read_recipe(session.desk / "edits.yaml")).materials.roughness.min() == 0.5
+    session.material(hue=None)
+    session.material(roughness=None)
+    assert apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min() == 0.5
 
 
 def test_the_picture_follows(session):
-    before = session.stage()
+    before = stage(session)
     assert before["badge"] == "Photo" and before["picture"].startswith("data:image/jpeg")
     click(session)
-    session.material("hue", "120")
-    after = session.stage()
+    session.material(hue="120")
+    after = stage(session)
     assert after["badge"] == "Live preview" and after["picture"] != before["picture"] and after["fill"]
     session.act("toggle", 0)
-    assert session.stage()["picture"] == before["picture"]
+    assert stage(session)["picture"] == before["picture"]
     session.act("toggle", 0)
-    assert session.stage()["picture"] == after["picture"]
+    assert stage(session)["picture"] == after["picture"]
     assert session.undo() and session.undo() and session.undo()
-    assert session.stage()["picture"] == before["picture"]
+    assert stage(session)["picture"] == before["picture"]
 
 
 def test_quick_pictures_agree_with_slow_ones(session):
     click(session)
-    session.material("hue", "120")
-    session.material("metallic", "1")
-    edited = session.live.edited(session.stack.active)
+    session.material(hue="120")
+    session.material(metallic="1")
+    edited = session.live.edited(session.edits.active)
     preview = session.live._preview.result()
     whole = preview._image(preview._shaded(edited.materials, preview._tables), preview._sky(edited.envmap))
     np.testing.assert_allclose(preview.render(edited), whole, atol=2e-6)
@@ -70,73 +71,73 @@ def test_quick_pictures_agree_with_slow_ones(session):
 def test_undo_takes_a_whole_drag_back(session):
     click(session)
     for hue in range(10, 100, 10):
-        session.material("hue", str(hue))
+        session.material(hue=str(hue))
     session.undo()
-    assert session.stack.steps[0].options.get("hue") in (None, "10")
+    assert session.edits.steps[0].options.get("hue") in (None, "10")
     while session.undo():
         pass
-    assert session.stack.steps == () and not (session.desk / "edits.yaml").exists()
+    assert session.edits.steps == () and not (session.workspace / "edits.yaml").exists()
 
 
 def test_a_selection_that_grows_takes_its_edit_along(session):
     click(session)
-    session.material("hue", "90")
-    first = session.stack.steps[0].options["mask"]
+    session.material(hue="90")
+    first = session.edits.steps[0].options["mask"]
     click(session, 50, 40, "add")
-    assert session.stack.current == 0 and session.stack.steps[0].options["mask"] != first
+    assert session.edits.current == 0 and session.edits.steps[0].options["mask"] != first
     click(session, 25, 24, "new")  # inside the mask: taken away, so nothing of it is left in hand
     click(session, 25, 24, "new")
-    session.material("value", "0.5")
-    assert len(session.stack.steps) == 2
+    session.material(value="0.5")
+    assert len(session.edits.steps) == 2
 
 
 @pytest.mark.parametrize("what", ["toggle", "up", "down"])
 def test_another_edit_is_ticked_or_moved_and_keeps_its_region(session, what):
     click(session)
-    session.material("hue", "90")
+    session.material(hue="90")
     session.deselect()
     click(session, 50, 40)
-    session.material("hue", "20")
-    masks = {step.options["hue"]: step.options["mask"] for step in session.stack.steps}
+    session.material(hue="20")
+    masks = {step.options["hue"]: step.options["mask"] for step in session.edits.steps}
     session.act(what, 0 if what != "up" else 1)
     click(session, 25, 38, "add")  # still the second is in hand
-    after = {step.options["hue"]: step.options["mask"] for step in session.stack.steps}
-    assert after["90"] == masks["90"] and session.stack.steps[session.stack.current].options["hue"] == "20"
+    after = {step.options["hue"]: step.options["mask"] for step in session.edits.steps}
+    assert after["90"] == masks["90"] and session.edits.steps[session.edits.current].options["hue"] == "20"
 
 
 def test_an_edit_that_is_switched_off_is_out_of_hand(session):
     click(session)
-    session.material("hue", "90")
+    session.material(hue="90")
     session.act("toggle", 0)
     assert session.in_hand is None
-    session.material("hue", "20")  # of the selection, which is still there
-    assert [step.options["hue"] for step in session.stack.steps] == ["90", "20"]
+    session.material(hue="20")  # of the selection, which is still there
+    assert [step.options["hue"] for step in session.edits.steps] == ["90", "20"]
 
 
 def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
     place_lamp(session, 40, 40)
     session.act("toggle", 0)
-    assert session.stage()["lamps"] == [] and not light_values(session)["sun_on"]
+    assert stage(session)["lamps"] == [] and not light_values(session)["sun_on"]
     session.light(rotate="30")
     place_lamp(session, 10, 40)
-    assert [step.skipped for step in session.stack.steps] == [True, False]
-    assert len(session.stack.steps[0].options["lamps"]) == len(session.stack.steps[1].options["lamps"]) == 1
+    assert [step.skipped for step in session.edits.steps] == [True, False]
+    assert len(session.edits.steps[0].options["lamps"]) == len(session.edits.steps[1].options["lamps"]) == 1
     session.act("toggle", 1)
     session.act("toggle", 0)
     session.light(ambient="0.5")  # of the one that is on
-    assert session.stack.steps[0].options["ambient"] == "0.5" and len(session.stack.steps) == 2
+    assert session.edits.steps[0].options["ambient"] == "0.5" and len(session.edits.steps) == 2
     session.act("choose", 1)
-    assert session.stack.current == 1 and light_values(session)["rotate"] == 30
-    assert "the edit in hand is switched off" in session.stage()["badge"]
+    assert session.edits.current == 1 and light_values(session)["rotate"] == 30
+    assert "the edit in hand is switched off" in stage(session)["badge"]
     session.act("toggle", 1)
-    assert session.stack.current == 1 and "off" not in session.stage()["badge"]
+    assert session.edits.current == 1 and "off" not in stage(session)["badge"]
 
 
 def test_choosing_a_step_brings_its_region_and_values_back(session):
     click(session)
-    session.material("hue", "90")
+    session.material(hue="90")
     session.light(rotate="30", ambient="0.5", sun=["10", "20"])
-    assert session.stack.current == 1 and len(session.stack.steps) == 2
+    assert session.edits.current == 1 and len(session.edits.steps) == 2
     session.deselect()
     session.act("choose", 0)
     assert (session.selection.mask & block()).sum() > 0.9 * block().sum()
@@ -144,7 +145,7 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
     values = light_values(session)
     assert (values["rotate"], values["ambient"], values["sun_on"], values["elevation"]) == (30, 0.5, True, 20)
     session.act("up", 1)
-    assert [s.kind for s in session.stack.steps] == ["relight", "edit"]
+    assert [s.kind for s in session.edits.steps] == ["relight", "edit"]
     with pytest.raises(InputError, match="no longer"):
         session.act("remove", 7)
     with pytest.raises(InputError, match="not known"):
@@ -154,12 +155,12 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
 def test_light_and_lamps(session):
     place_lamp(session, 40, 40)
     place_lamp(session, 10, 40)
-    assert len(session.stack.steps) == 1 and len(apply(room(), list(session.stack.steps)).lamps) == 2
-    assert session.stage()["lamps"] == [[40, 40], [10, 40]]
+    assert len(session.edits.steps) == 1 and len(apply(room(), list(session.edits.steps)).lamps) == 2
+    assert stage(session)["lamps"] == [[40, 40], [10, 40]]
     with pytest.raises(InputError, match="no surface"):
         place_lamp(session, 5, 1)
     session.light(lamps=None)
-    assert session.stack.steps == ()
+    assert session.edits.steps == ()
 
 
 @pytest.mark.parametrize("name", LIBRARY)
@@ -174,19 +175,19 @@ def test_things_are_closed_and_stand_up(name):
 
 def test_an_object_is_placed_moved_and_seen(session):
     with pytest.raises(InputError, match="Choose an object"):
-        session.place(45, 40)
-    session.thing_option("mesh", library_file(session, "Cube"))
-    session.place(50, 40)
-    before = session.stage()["picture"]
-    session.place(15, 40)
-    session.thing_option("scale", "1.5")
-    assert len(session.stack.steps) == 1 and session.stack.steps[0].options["at"] == ["15", "40"]
-    assert session.stage()["picture"] != before
-    steps = session.stack.steps
+        objects.place(session, 45, 40)
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
+    objects.place(session, 50, 40)
+    before = stage(session)["picture"]
+    objects.place(session, 15, 40)
+    objects.set_option(session, "scale", "1.5")
+    assert len(session.edits.steps) == 1 and session.edits.steps[0].options["at"] == ["15", "40"]
+    assert stage(session)["picture"] != before
+    steps = session.edits.steps
     with pytest.raises(InputError):
-        session.thing_option("scale", "1e9")
-    assert session.stack.steps == steps
-    assert len(apply(room(), read_recipe(session.desk / "edits.yaml")).bodies) == 1
+        objects.set_option(session, "scale", "1e9")
+    assert session.edits.steps == steps
+    assert len(apply(room(), read_recipe(session.workspace / "edits.yaml")).bodies) == 1
 
 
 def test_uploaded_recipes_stay_on_the_desk(session, tmp_path):
@@ -202,25 +203,25 @@ def test_uploaded_recipes_stay_on_the_desk(session, tmp_path):
         file.write_text(text)
         with pytest.raises(InputError, match=message):
             session.read_edits(file)
-    assert session.stack.steps == ()
+    assert session.edits.steps == ()
     file.write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n- relight: {rotate: 20, skip: true}\n")
     session.read_edits(file)
-    assert len(session.stack.steps) == 2 and len(session.stack.active) == 1
+    assert len(session.edits.steps) == 2 and len(session.edits.active) == 1
 
 
-def test_reopened_where_it_was_left(hub, session):
+def test_reopened_where_it_was_left(studio, session):
     click(session)
-    session.material("hue", "77")
-    other = hub.session("another page", "me")
-    hub.open(other, hub.start.name)
-    assert other.stack.steps[0].options["hue"] == "77" and other.selection == Selection()
+    session.material(hue="77")
+    other = studio.session("another page", "me")
+    studio.open(other, studio.start.name)
+    assert other.edits.steps[0].options["hue"] == "77" and other.selection == Selection()
     assert "materialist apply" in commands(other) and "edits-me/edits.yaml" in commands(other)
     other.light(rotate="5")
-    assert len(session.stack.steps) == 1  # in memory they are apart
-    hub.leave("another page")
+    assert len(session.edits.steps) == 1  # in memory they are apart
+    studio.leave("another page")
     assert other.live is None and session.live is not None
     with pytest.raises(InputError, match="Open a photo"):
-        other.material("hue", "1")
+        other.material(hue="1")
 
 
 USUAL = {
@@ -239,7 +240,7 @@ def typed(tmp_path):
         if there:
             (folder / "photo.scene").mkdir(exist_ok=True)
         project = Project(folder, "Jug", "me", folder / "photo.scene", folder / "original.jpg" if photo else None)
-        page = SimpleNamespace(project=project, desk=folder / "edits-me", stack=Stack(steps))
+        page = SimpleNamespace(project=project, workspace=folder / "edits-me", edits=EditList(steps))
         page.scene = SimpleNamespace(provenance=made)
         program = 'materialist() { pwd -P; printf "%s\\n" "$@" .; }\nset -e\n'
         done = subprocess.run(["bash", "-c", program + commands(page)], capture_output=True, text=True, check=True)
@@ -278,11 +279,11 @@ def test_the_commands_have_the_options_of_the_inversion(typed, made, options):
     assert typed({**USUAL, **made}, there=False)[0] == ["invert", "original.jpg", "-o", "photo.scene", *options]
 
 
-def test_edits_that_cannot_be_read_are_left_as_they_are(hub, session):
+def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
     """What somebody wrote by hand must not vanish with the next button."""
     click(session)
-    session.material("roughness", "0.2")
-    file, project = session.desk / "edits.yaml", session.project
+    session.material(roughness="0.2")
+    file, project = session.workspace / "edits.yaml", session.project
     text = file.read_text().replace("0.2", "0.2\n    texture: ../wood.png")
     file.write_text(text)
     other = Session("me")
@@ -295,14 +296,14 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(hub, session):
 
 def test_another_page_s_edits_are_not_overwritten(session):
     click(session)
-    session.material("roughness", "0.2")
+    session.material(roughness="0.2")
     other = Session("me")
     other.open(session.project)
     other.light(ambient="0.5")
-    written = (session.desk / "edits.yaml").read_bytes()
+    written = (session.workspace / "edits.yaml").read_bytes()
     with pytest.raises(InputError, match="changed in another place"):
-        session.material("roughness", "0.9")
-    assert (session.desk / "edits.yaml").read_bytes() == written
+        session.material(roughness="0.9")
+    assert (session.workspace / "edits.yaml").read_bytes() == written
     assert other.final_file != session.final_file
     other.close()
 
@@ -310,9 +311,9 @@ def test_another_page_s_edits_are_not_overwritten(session):
 def test_a_job_has_the_edits_of_its_click(session):
     assert session.edits_now() == ""
     click(session)
-    session.material("roughness", "0.1")
+    session.material(roughness="0.1")
     job = session.edits_now()
-    session.material("roughness", "0.9")
+    session.material(roughness="0.9")
     (step,) = read_recipe(job)
     assert step.options["roughness"] == "0.1" and (step.folder / step.options["mask"]).is_file()
     assert session.edits_now() != job

@@ -4,8 +4,9 @@ import pytest
 from studio_scenes import click
 
 from materialist.errors import InputError
+from materialist.studio import objects
+from materialist.studio.objects import library_file
 from materialist.studio.tab_light import place_lamp
-from materialist.studio.tab_object import library_file
 
 
 def back(session) -> int:
@@ -19,12 +20,12 @@ def test_each_change_of_light_is_taken_back_alone(session):
         place_lamp(session, x, 40)
     assert back(session) == before + 3
     session.undo()
-    assert len(session.stack.steps[0].options["lamps"]) == 2
+    assert len(session.edits.steps[0].options["lamps"]) == 2
     for envmap in ("light-window.exr", "light-noon.exr", "light-noon.exr"):
         session.light(envmap=envmap, gain="auto")
     assert back(session) == before + 4  # the same again changes nothing
     session.undo()
-    assert session.stack.steps[0].options["envmap"] == "light-window.exr"
+    assert session.edits.steps[0].options["envmap"] == "light-window.exr"
 
 
 def test_a_sun_is_switched_and_moved(session):
@@ -35,10 +36,10 @@ def test_a_sun_is_switched_and_moved(session):
     for power in ("1.2", "1.4"):
         session.light(sun=["80", "40"], sun_power=power)
     session.light(sun=None, sun_power=None)
-    assert back(session) == before + 4 and session.stack.steps == ()
+    assert back(session) == before + 4 and session.edits.steps == ()
     for sun, power in ((["80", "40"], "1.4"), (["80", "40"], "1"), (["45", "40"], "1")):
         session.undo()
-        assert (session.stack.steps[0].options["sun"], session.stack.steps[0].options["sun_power"]) == (sun, power)
+        assert (session.edits.steps[0].options["sun"], session.edits.steps[0].options["sun_power"]) == (sun, power)
 
 
 @pytest.mark.parametrize("name", ["rotate", "ambient"])
@@ -54,18 +55,18 @@ def test_a_slider_of_light_is_one_change(session, name):
 
 def test_a_colour_is_dragged_and_a_texture_is_not(session):
     click(session)
-    session.material("hue", "10")
+    session.material(hue="10")
     before = back(session)
     for colour in ("#101010", "#202020", "#303030"):
-        session.materials({"texture": None, "albedo": colour})
+        session.material(texture=None, albedo=colour)
     assert back(session) == before + 1
     for texture in ("a.png", "b.png"):
-        session.materials({"albedo": None, "texture": texture})
-    assert back(session) == before + 3 and "albedo" not in session.stack.steps[0].options
-    session.materials(dict.fromkeys(("albedo", "texture", "hue")))
+        session.material(albedo=None, texture=texture)
+    assert back(session) == before + 3 and "albedo" not in session.edits.steps[0].options
+    session.material(**dict.fromkeys(("albedo", "texture", "hue")))
     assert back(session) == before + 4
     session.undo()
-    assert session.stack.steps[0].options["texture"] == "b.png"
+    assert session.edits.steps[0].options["texture"] == "b.png"
 
 
 def test_what_is_pressed_again_adds_no_way_back(session):
@@ -75,45 +76,45 @@ def test_what_is_pressed_again_adds_no_way_back(session):
         session.region_step("remove", shadow=None)
     assert back(session) == before + 1
     session.region_step("remove", shadow="0")
-    assert back(session) == before + 2 and len(session.stack.steps) == 1
+    assert back(session) == before + 2 and len(session.edits.steps) == 1
 
 
 def test_an_object_put_elsewhere_is_a_change_each_time(session):
-    session.thing_option("mesh", library_file(session, "Cube"))
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
     before = back(session)
     for x in (50, 15, 30):
-        session.place(x, 40)
+        objects.place(session, x, 40)
     assert back(session) == before + 3
     for scale in ("0.5", "0.6"):
-        session.thing_option("scale", scale)
+        objects.set_option(session, "scale", scale)
     for made_of in ("glass", "mirror", "#101010", "#202020", "#303030"):
-        session.thing_option("material", made_of)
+        objects.set_option(session, "material", made_of)
     assert back(session) == before + 7
     session.undo()
-    assert session.stack.steps[0].options["material"] == "mirror"
+    assert session.edits.steps[0].options["material"] == "mirror"
 
 
 def test_a_drag_after_undo_is_a_change_of_its_own(session):
     click(session)
     for hue in ("10", "20", "30"):
-        session.material("hue", hue)
-    session.material("roughness", "0.4")
+        session.material(hue=hue)
+    session.material(roughness="0.4")
     session.undo()
-    session.material("hue", "70")
+    session.material(hue="70")
     session.undo()
-    assert session.stack.steps[0].options["hue"] == "30"
+    assert session.edits.steps[0].options["hue"] == "30"
 
 
 def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_way_back(session):
     click(session)
-    session.material("hue", "10")
-    stack, past = session.stack, session._past
-    (session.desk / "edits.yaml").write_text("- relight: {rotate: 20}\n")
+    session.material(hue="10")
+    stack, past = session.edits, session._past
+    (session.workspace / "edits.yaml").write_text("- relight: {rotate: 20}\n")
     for act in (
-        lambda: session.material("hue", "60"), session.undo, lambda: session.act("toggle", 0),
+        lambda: session.material(hue="60"), session.undo, lambda: session.act("toggle", 0),
         lambda: session.light(rotate="5"),
     ):  # fmt: skip
         with pytest.raises(InputError, match="changed in another place"):
             act()
-        assert session.stack == stack and session._past == past
-    assert "rotate" in (session.desk / "edits.yaml").read_text()
+        assert session.edits == stack and session._past == past
+    assert "rotate" in (session.workspace / "edits.yaml").read_text()

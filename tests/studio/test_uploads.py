@@ -10,7 +10,7 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.io.package import load_scene
-from materialist.studio import uploads
+from materialist.studio import archives, uploads
 
 
 def test_a_photo_keeps_the_ending_alone(tmp_path):
@@ -85,7 +85,7 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
         pack.writestr(f"{root}../evil.txt", "x")
         pack.writestr("/abs.txt", "x")
         pack.writestr(f"{root}maps/extra.py", "x")
-    uploads.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
     assert load_scene(tmp_path / "target").camera.width == 64
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
 
@@ -101,7 +101,7 @@ def test_a_scene_with_bodies_comes_back(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
         for file in sorted((tmp_path / "a.scene").rglob("*")):
             pack.write(file, file.relative_to(tmp_path))
-    uploads.unpack_scene(tmp_path / "a.zip", tmp_path / "b.scene", "a.zip")
+    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "b.scene", "a.zip")
     again = load_scene(tmp_path / "b.scene")
     np.testing.assert_allclose(again.bodies[0].vertices, scene.bodies[0].vertices, atol=1e-6)
     assert (tmp_path / "b.scene" / "bodies").is_dir()
@@ -110,17 +110,17 @@ def test_a_scene_with_bodies_comes_back(tmp_path):
 def test_zips_that_are_none(tmp_path, monkeypatch):
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(InputError, match="not a readable zip"):
-        uploads.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+        archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
     with zipfile.ZipFile(tmp_path / "b.zip", "w") as pack:
         pack.writestr("readme.txt", "x")
     with pytest.raises(InputError, match="no scene package"):
-        uploads.unpack_scene(tmp_path / "b.zip", tmp_path / "target", "b.zip")
+        archives.unpack_scene(tmp_path / "b.zip", tmp_path / "target", "b.zip")
     with zipfile.ZipFile(tmp_path / "c.zip", "w", zipfile.ZIP_DEFLATED) as pack:
         pack.writestr("scene.json", "{}")
         pack.writestr("mesh.ply", b"\0" * 5_000_000)
-    monkeypatch.setattr(uploads, "MAX_UNPACKED", 1_000_000)
+    monkeypatch.setattr(archives, "MAX_UNPACKED", 1_000_000)
     with pytest.raises(InputError, match="unpacks to"):
-        uploads.unpack_scene(tmp_path / "c.zip", tmp_path / "target", "c.zip")
+        archives.unpack_scene(tmp_path / "c.zip", tmp_path / "target", "c.zip")
     assert not (tmp_path / "target").exists()
 
 

@@ -38,8 +38,8 @@ def studio(
     as_json: Json = False,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
-    from materialist.studio.server import check_host, check_port, first_target, new_hub, serve
-    from materialist.studio.work import default_root
+    from materialist.studio.server import check_host, check_port, first_target, new_studio, serve
+    from materialist.studio.workspace import default_root
 
     alone = check_host(host, password, everyone)
     check_port(host, port)
@@ -47,13 +47,13 @@ def studio(
         from materialist.render.variant import setup
 
         setup(device.value)
-    hub = new_hub(work or default_root(), alone=alone, workers=workers, seed=seed, device=device.value)
-    hub.start = first_target(hub.work, target)
+    made = new_studio(work or default_root(), alone=alone, workers=workers, seed=seed, device=device.value)
+    made.start = first_target(made.work, target)
     if not as_json:
-        typer.echo(f"Scenes and edits are kept in {hub.work.root}")
+        typer.echo(f"Scenes and edits are kept in {made.work.root}")
 
     def told(address: str) -> None:
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
-        report_success("studio", as_json, lines, address=address, work=str(hub.work.root))
+        report_success("studio", as_json, lines, address=address, work=str(made.work.root))
 
-    serve(hub, host=host, port=port, password=password, told=told)
+    serve(made, host=host, port=port, password=password, told=told)

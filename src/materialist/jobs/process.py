@@ -130,3 +130,11 @@ def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
         lines = errors.read().decode("utf-8", "replace").strip().splitlines()
         reason += f" Its last words: {lines[-1][:300]}" if lines else ""
     return {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
+
+
+def sentence(facts: dict[str, Any]) -> str:
+    """Why a task failed, for a page; the trace of a bug goes to the terminal."""
+    if not facts["bug"]:
+        return str(facts["reason"])
+    sys.stderr.write(facts["trace"])
+    return f"Something went wrong inside ({facts['error']}: {facts['reason']}); the terminal has the details."

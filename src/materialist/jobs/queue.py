@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from materialist.jobs.process import LOST, Message, Worker
+from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 QUEUED, RUNNING, STOPPED = "queued", "running", "stopped"
@@ -134,7 +133,7 @@ class JobQueue:
         with self._lock:
             if message.kind == DONE:
                 job.result = message.facts
-            job.end(DONE if message.kind == DONE else FAILED, "" if message.kind == DONE else _sentence(message.facts))
+            job.end(DONE if message.kind == DONE else FAILED, "" if message.kind == DONE else sentence(message.facts))
         return job
 
 
@@ -143,14 +142,6 @@ def _note(job: Job, message: Message) -> None:
         job.stage, job.done, job.total = (message.facts[name] for name in ("stage", "done", "total"))
     elif message.kind == FOUND:
         job.found = [*job.found, message.facts]
-
-
-def _sentence(facts: dict[str, Any]) -> str:
-    """Why a job failed; what was not expected goes to the terminal as well."""
-    if not facts["bug"]:
-        return str(facts["reason"])
-    sys.stderr.write(facts["trace"])
-    return f"Something went wrong inside ({facts['error']}: {facts['reason']}); the terminal has the details."
 
 
 def _sweep(folder: Path, pid: int) -> None:

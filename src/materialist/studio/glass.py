@@ -1,12 +1,14 @@
-"""Glass on the page: what is asked of the tracing process of a session, and the last panes that it made."""
+"""Glass that follows its sliders: the client in the studio, and the task that a worker process does for it.
+
+The worker keeps the last few bodies, and makes picture after picture; only the newest request counts.
+"""
 
 from __future__ import annotations
 
-import base64
 import json
-import subprocess
 import threading
 import time
+from collections import OrderedDict
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -15,17 +17,24 @@ from typing import Any
 import numpy as np
 
 from materialist.edits.glass.glass import check_glass
-from materialist.edits.recipe import Step, glass_arguments
+from materialist.edits.recipe import REGION, Step, apply, glass_arguments
 from materialist.errors import InputError
-from materialist.studio import child
-from materialist.studio.glass_worker import body_key
+from materialist.jobs.process import LOST, Message, Worker, sentence
+from materialist.jobs.worker import DONE, FAILED, PROGRESS, Report
 from materialist.types import Array, Scene
 
-WORKER = "materialist.studio.glass_worker"
 LEAST_FREE = 2.0e9
 """Bytes of memory that must be free before the process starts."""
+IDLE = 900.0
+"""Seconds without a request after which the process ends."""
+NICENESS = 3
+"""After live previews, before inversions and final pictures: somebody waits at a slider."""
+BODIES = 2
+"""Bodies that the process keeps: going to and fro between two objects builds nothing anew."""
+VALUES = ("ior", "transmission", "tint", "roughness")
+"""Options of a glass step that its body does not depend on."""
 Tint = tuple[float, float, float]
-_REGION = ("mask", "click", "box", "with")
+Request = dict[str, Any]
 _NUMBERS = count(1)
 """Of requests: two scenes opened on one page have no number in common."""
 _WORDS = {"load": "Getting the glass ready", "build": "Building the glass body", "trace": "Tracing the glass"}
@@ -35,8 +44,6 @@ _WORDS = {"load": "Getting the glass ready", "build": "Building the glass body",
 class Pane:
     """A traced piece of glass, and the ground around it that the object had hidden."""
 
-    shows: str
-    """The request that it answers."""
     box: tuple[int, int, int, int]
     """Rows and columns (top, bottom, left, right) of the working picture, the ends excluded."""
     picture: Array
@@ -48,26 +55,26 @@ class Pane:
 
 
 @dataclass(frozen=True)
-class State:
-    """What a tracer is doing."""
+class GlassState:
+    """What a client waits for."""
 
     asked: int
     """Number of the last request; 0 for none."""
     waiting: bool
     """Whether it is not answered yet."""
     words: str
-    """What to say of it."""
+    """A sentence about it."""
     bad: bool = False
     """Whether that is an error."""
 
 
-def traced(step: Step) -> bool:
-    """Whether a step is glass that the tracer can show: the paper's two-interface model is shown by other means."""
+def is_traced(step: Step) -> bool:
+    """Whether a step is glass that the worker traces: the paper's two-interface model is shown by other means."""
     return step.kind == "glass" and str(step.options.get("model", "closed")) == "closed"
 
 
 def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
-    """Region [H, W] bool and tint of a glass step, in no time.
+    """Region [H, W] bool and tint of a glass step, without building anything.
 
     Raises InputError for values out of range, and for a region without a surface.
     """
@@ -79,8 +86,8 @@ def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
     return region, tint
 
 
-class Tracer:
-    """Glass of one open scene, traced in a process that starts with the first request and keeps what it built.
+class GlassClient:
+    """Glass of one open scene, traced in a process that starts with the first request and keeps its bodies.
 
     Only the newest request counts; pictures of those before it are dropped. Methods may be called from any thread,
     and none of them waits for the process.
@@ -89,88 +96,89 @@ class Tracer:
     def __init__(self, scene: Path):
         self.changed = threading.Condition(threading.RLock())
         self._scene = str(scene)
-        self._process: subprocess.Popen[str] | None = None
+        self._worker: Worker | None = None
         self._number, self._answered, self._since = 0, 0, 0.0
+        self._sent = 0
         self._key, self._body, self._stage, self._message = "", "", "", ""
-        self._next: dict[str, Any] | None = None
-        self._panes: dict[str, Pane] = {}
+        self._panes: dict[str, tuple[str, Pane]] = {}
 
     def ask(self, others: tuple[Step, ...], step: Step) -> None:
-        """Want the picture of a glass step, the other steps of the list being these; the same wish twice is one."""
+        """Request the picture of a glass step, the other steps of the list being these; once for equal requests."""
         request = self._request(others, step)
-        key, body = json.dumps(request, default=str), body_key(self._scene, request["others"], request["glass"])
+        key = json.dumps(request, default=str)
         with self.changed:
             if key == self._key:
                 return
-            known = self._panes.get(_place(step))
-            self._key, self._message = key, ""
-            self._number = next(_NUMBERS)
-            if known is not None and known.shows == key:
-                self._answered = self._number
+            self._key, self._message, self._number = key, "", next(_NUMBERS)
+            if self._panes.get(_place(step), ("",))[0] == key:
+                self._answered, self._sent = self._number, 0
             else:
-                self._send(request, body)
+                self._send(request)
             self.changed.notify_all()
 
     def pane(self, step: Step) -> Pane | None:
         """The last picture of a glass step: of these values, or of values that it had before."""
         with self.changed:
-            return self._panes.get(_place(step))
+            found = self._panes.get(_place(step))
+        return found[1] if found else None
 
     def fresh(self, others: tuple[Step, ...], step: Step) -> bool:
         """Whether `pane` shows exactly this step among these others."""
-        pane = self.pane(step)
-        return pane is not None and pane.shows == json.dumps(self._request(others, step), default=str)
+        with self.changed:
+            return self._panes.get(_place(step), ("",))[0] == json.dumps(self._request(others, step), default=str)
 
     @property
-    def state(self) -> State:
+    def state(self) -> GlassState:
+        """What is under way."""
         with self.changed:
             if self._number == self._answered:
-                return State(self._number, False, self._message, bool(self._message))
+                return GlassState(self._number, False, self._message, bool(self._message))
             words = f"{_WORDS.get(self._stage, _WORDS['load'])} … {time.monotonic() - self._since:.0f} s"
-            return State(self._number, True, words)
+            return GlassState(self._number, True, words)
 
     def keep(self, steps: tuple[Step, ...]) -> None:
-        """Forget panes of what is no longer among the steps, and end the process when there is no glass any more."""
-        places = {_place(step) for step in steps if traced(step)}
+        """Forget panes of other steps than these, and end the process when there is no glass any more."""
+        places = {_place(step) for step in steps if is_traced(step)}
         with self.changed:
             self._panes = {place: pane for place, pane in self._panes.items() if place in places}
         if not places:
-            self.rest()
+            self.stop()
 
-    def rest(self) -> None:
+    def stop(self) -> None:
         """End the process and forget the panes; a later request starts anew."""
         with self.changed:
-            process, self._process = self._process, None
+            worker, self._worker = self._worker, None
             self._panes.clear()
             self._key, self._body, self._message, self._answered = "", "", "", self._number
             self.changed.notify_all()
-        if process is not None:
-            child.kill(process)
+        if worker is not None:
+            worker.kill()
 
-    def _request(self, others: tuple[Step, ...], step: Step) -> dict[str, Any]:
+    def _request(self, others: tuple[Step, ...], step: Step) -> Request:
         return {
             "scene": self._scene, "folder": str(step.folder.resolve()),
             "others": [[one.kind, one.options] for one in others],
             "glass": {name: step.options[name] for name in sorted(step.options) if name != "skip"},
         }  # fmt: skip
 
-    def _send(self, request: dict[str, Any], body: str) -> None:
+    def _send(self, request: Request) -> None:
         """To the process: a new one where none runs, or where it is building another body."""
-        if self._process is not None and self._body != body and self._stage == "build":
-            child.kill(self._process)
-            self._process = None
+        body = body_key(request)
+        if self._worker is not None and self._body != body and self._stage == "build":
+            self._worker.kill()
+            self._worker = None
         try:
-            if self._process is None:
+            if self._worker is None:
                 self._start()
         except (OSError, InputError) as error:
             self._message, self._answered = str(error), self._number
             return
-        assert self._process is not None
+        assert self._worker is not None
         if body != self._body or self._stage == "trace":
             self._since = time.monotonic()
         if body != self._body:
             self._body, self._stage = body, "load"
-        self._next = {"ask": self._number, **request}
+        self._sent = self._worker.begin(trace, {"request": request})
 
     def _start(self) -> None:
         import psutil
@@ -179,61 +187,93 @@ class Tracer:
             raise InputError(
                 "This machine has too little memory free to trace glass while sliders move; press Quick look instead."
             )
-        self._process, self._stage = child.start(WORKER), "load"
-        for work in (self._speak, self._listen):
-            threading.Thread(target=work, args=(self._process,), name="glass", daemon=True).start()
+        self._worker, self._stage = Worker(niceness=NICENESS, idle=IDLE), "load"
+        threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()
 
-    def _speak(self, process: subprocess.Popen[str]) -> None:
-        """Hand a process the newest request, however long it takes to read it."""
-        while True:
-            with self.changed:
-                self.changed.wait_for(lambda: process is not self._process or self._next is not None)
-                if process is not self._process or self._next is None:
-                    return
-                request, self._next = self._next, None
-            child.ask(process, request)
-
-    def _listen(self, process: subprocess.Popen[str]) -> None:
+    def _listen(self, worker: Worker) -> None:
         """Take what a process says until it ends."""
-        try:
-            for entry in child.lines(process):
-                with self.changed:
-                    if process is self._process:
-                        self._take(entry)
-        finally:
-            child.close(process)
+        for message in worker.messages():
             with self.changed:
-                if process is self._process:
-                    self._process = None
-                    if self._answered != self._number:
-                        self._message = "The tracing of glass ended by itself; move a slider to start it again."
-                        self._answered, self._key = self._number, ""
+                if worker is self._worker:
+                    self._take(message)
                 self.changed.notify_all()
 
-    def _take(self, entry: dict[str, Any]) -> None:
-        if "stage" in entry:
-            self._stage = entry["stage"]
-        elif entry.get("ask") == self._number:  # else a newer one is under way
+    def _take(self, message: Message) -> None:
+        if message.kind == PROGRESS:
+            self._stage = message.facts["stage"]
+        elif message.kind == LOST:
+            self._worker = None
+            if self._answered != self._number:
+                self._message = "The tracing of glass ended by itself; move a slider to start it again."
+                self._answered, self._key = self._number, ""
+        elif message.number == self._sent:  # else a newer one is under way
             self._answered = self._number
-            if "pane" in entry:
+            if message.kind == DONE and message.facts is not None:
                 request = json.loads(self._key)
-                self._panes[_place(Step("glass", request["glass"]))] = _pane(entry["pane"], self._key)
-            else:
-                self._message = entry["error"]
-        self.changed.notify_all()
+                self._panes[_place(Step("glass", request["glass"]))] = (self._key, message.facts)
+            elif message.kind == FAILED:
+                self._message = sentence(message.facts)
 
 
 def _place(step: Step) -> str:
     """Which object a glass step is about."""
-    return json.dumps({name: step.options.get(name) for name in _REGION}, default=str)
+    return json.dumps({name: step.options.get(name) for name in REGION}, default=str)
 
 
-def _pane(told: dict[str, Any], shows: str) -> Pane:
-    """A pane as the process tells it; see `glass_worker.pane`."""
-    top, bottom, left, right = told["box"]
-    size = (bottom - top, right - left)
-    array = lambda name, kind: np.frombuffer(base64.b64decode(told[name]), kind)  # noqa: E731
-    return Pane(
-        shows, (top, bottom, left, right), array("picture", "<f2").reshape(*size, 3).astype(np.float32),
-        array("share", np.uint8).reshape(size).astype(np.float32) / 255, array("filled", np.uint8).reshape(size) > 0,
-    )  # fmt: skip
+def body_key(request: Request) -> str:
+    """What a body and its background depend on: two requests with the same key differ in the glass alone."""
+    fixed = {name: value for name, value in request["glass"].items() if name not in VALUES}
+    return json.dumps([request["scene"], request["others"], fixed], default=str)
+
+
+class GlassBodies:
+    """The scene, and the last few glass bodies in it."""
+
+    def __init__(self) -> None:
+        self._scene: tuple[str, Any] | None = None
+        self._built: OrderedDict[str, Any] = OrderedDict()
+
+    def preview(self, report: Report, request: Request) -> tuple[Any, dict[str, Any]]:
+        """(the `GlassPreview` of a request, values for its picture). Raises InputError."""
+        folder, key = Path(request["folder"]), body_key(request)
+        report("load", 0, 1)
+        scene = self._loaded(request["scene"])
+        region, options = glass_arguments(scene, Step("glass", request["glass"], folder))
+        if key not in self._built:
+            from materialist.edits.glass.preview import GlassPreview
+
+            report("build", 0, 1)
+            edited = apply(scene, [Step(kind, given, folder) for kind, given in request["others"]])
+            fixed = {name: value for name, value in options.items() if name not in VALUES}
+            self._built[key] = GlassPreview(edited, region, **fixed)
+        self._built.move_to_end(key)
+        while len(self._built) > BODIES:
+            self._built.popitem(last=False)
+        return self._built[key], {name: options[name] for name in VALUES if name in options}
+
+    def _loaded(self, path: str) -> Any:
+        if self._scene is None or self._scene[0] != path:
+            from materialist.io.package import load_scene
+
+            self._built.clear()
+            self._scene = (path, load_scene(path))
+        return self._scene[1]
+
+
+_BODIES = GlassBodies()
+"""Of this process."""
+
+
+def trace(report: Report, request: Request) -> Pane | None:
+    """The pane of one request; None where a newer one came meanwhile. Raises InputError."""
+    preview, values = _BODIES.preview(report, request)
+    if report.outdated:
+        return None
+    report("trace", 0, 1)
+    picture = preview.picture(**values)
+    shown = (preview.share > 0) | preview.filled
+    rows, columns = np.flatnonzero(shown.any(1)), np.flatnonzero(shown.any(0))
+    top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
+    cut = (slice(top, bottom), slice(left, right))
+    share = np.ascontiguousarray(preview.share[cut], np.float32)
+    return Pane((top, bottom, left, right), np.ascontiguousarray(picture[cut]), share, preview.filled[cut].copy())

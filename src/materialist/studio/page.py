@@ -9,14 +9,12 @@ from typing import Any
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.studio import tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
-from materialist.studio.context import Context, steps
-from materialist.studio.follow import follow
-from materialist.studio.guard import guarded
-from materialist.studio.hub import Hub
+from materialist.studio import objects, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take, tasks
 from materialist.studio.selection import read_pick, sam_missing
-from materialist.studio.session import Session
-from materialist.studio.showing import Final
+from materialist.studio.session import FinalPicture, Session
+from materialist.studio.stage import stage
+from materialist.studio.studio import Studio
+from materialist.studio.widgets import LIVE, LONG, PageContext, handler, steps
 
 TITLE = "Materialist studio"
 DRAFT_SPP = 16
@@ -26,9 +24,9 @@ _HEAD = (
 )
 
 
-def build(hub: Hub) -> Any:
+def build(studio: Studio) -> Any:
     """The Gradio page; `server` shows it."""
-    context = Context(hub)
+    context = PageContext(studio)
     parts = context.parts
     with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
         parts["token"] = gr.BrowserState("", storage_key="materialist-person", secret="page")
@@ -49,17 +47,17 @@ def build(hub: Hub) -> Any:
         for tab in (tab_material, tab_light, tab_object, tab_look, tab_take):
             tab.wire(context)
         tab_open.wire(context, page)
-        page.unload(_leaver(hub))
+
+        def leave(request: gr.Request) -> None:
+            studio.leave(request.session_hash)
+
+        page.unload(leave)
     return page
 
 
+@cache
 def asset(name: str) -> str:
     """The text of a file in assets."""
-    return _asset(name)
-
-
-@cache
-def _asset(name: str) -> str:
     return (files("materialist.studio") / "assets" / name).read_text("utf-8")
 
 
@@ -98,53 +96,44 @@ def _left(parts: dict[str, Any]) -> None:
     parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
 
 
-def _wire(context: Context) -> None:
+def _wire(context: PageContext) -> None:
     """Events of the left side."""
-    quick: dict[str, Any] = {"queue": False, "show_progress": "hidden", "api_visibility": "private"}
     for name in ("tool", "mode", "brush"):
         script = f"(v) => {{ document.body.dataset.{name} = v; }}"
         context[name].change(None, context[name], None, js=script, api_visibility="private")
 
-    @guarded
+    @handler
     def pick(sam: bool, event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session, wanted = context.session(request), read_pick(event._data)
         if wanted["tool"] == "lamp":
             tab_light.place_lamp(session, *wanted["at"])
         elif wanted["tool"] == "place":
-            session.place(*wanted["at"])
+            objects.place(session, *wanted["at"])
         else:
             session.pick(wanted, "sam2" if sam else "network")
         return context.everything(session)
 
-    @guarded
+    @handler
     def act(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
         what = str(event._data.get("what"))
         session.act(what, int(event._data.get("index", -1)))
         return {**context.everything(session), **(_turned_to(context, session) if what == "choose" else {})}
 
-    @guarded
-    def undo(request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if not session.undo():
-            raise InputError("There is nothing to take back.")
-        return context.everything(session)
-
-    @guarded
-    def deselect(request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        session.deselect()
-        return context.everything(session)
-
-    every = {**quick, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
+    every = {**LIVE, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
     context["stage"].pick(pick, context["sam"], context.all_parts, **every)
     context["steps"].act(act, None, [*context.all_parts, context["tabs"], context["glass_part"]], **every)
-    context["undo"].click(undo, None, context.all_parts, **every)
-    context["deselect"].click(deselect, None, context.all_parts, **quick)
+    context.on(context["undo"].click, _undo, everything=True, trigger_mode="multiple")
+    context.on(context["deselect"].click, Session.deselect, everything=True, trigger_mode="once")
     _wire_final(context)
 
 
-def _turned_to(context: Context, session: Session) -> dict[Any, Any]:
+def _undo(session: Session) -> None:
+    if not session.undo():
+        raise InputError("There is nothing to take back.")
+
+
+def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:
     """The tab with the controls of the step in hand."""
     tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
     tab = tabs.get(session.in_hand or "")
@@ -152,47 +141,30 @@ def _turned_to(context: Context, session: Session) -> dict[Any, Any]:
     return found | ({context["glass_part"]: gr.update(open=True)} if session.in_hand == "glass" else {})
 
 
-def _wire_final(context: Context) -> None:
+def _wire_final(context: PageContext) -> None:
     """Path-traced pictures, and the button that stops the one that this page asked for."""
-    hub = context.hub
-    outputs = [*context.picture_parts, context["progress"], context["stop"]]
 
     def render(spp: int) -> Any:
-        @guarded
+        @handler
         def run(request: gr.Request) -> Any:
             session = context.session(request)
             _ = session.scene
-            steps_now = session.stack.active
-            edits = session.edits_now()
+            steps_now, edits = session.edits.active, session.edits_now()
             if not edits or session.project is None:
-                raise gr.Error("There is no edit to render yet: change something first.", print_exception=False)
+                raise InputError("There is no edit to render yet: change something first.")
             target = session.final_file
-            job = hub.jobs.submit(
-                "final", session.person, session.desk, scene=str(session.project.scene), edits=edits,
+            job = context.studio.submit(
+                session, tasks.final, session.workspace, scene=str(session.project.scene), edits=edits,
                 output=str(target), spp=spp,
             )  # fmt: skip
-            session.asked("final", job)
-            for html in follow(hub.jobs, job):
-                yield {context["progress"]: html, context["stop"]: gr.update(visible=not job.over)}
+            yield from context.following(job, "progress", "stop")
             if job.state == "done":
-                session.final = Final(steps_now, target, spp)
-                yield {context["stage"]: session.stage(), context["steps"]: steps(session)}
+                session.final = FinalPicture(steps_now, target, spp)
+                yield {context["stage"]: stage(session), context["steps"]: steps(session)}
 
         return run
 
-    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
-    context["final"].click(render(tab_take.SPP), None, outputs, **free)
-    context["draft"].click(render(DRAFT_SPP), None, outputs, **free)
-
-    @guarded
-    def stop(request: gr.Request) -> None:
-        context.session(request).stop(hub.jobs, "final")
-
-    context["stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
-
-
-def _leaver(hub: Hub) -> Any:
-    def leave(request: gr.Request) -> None:
-        hub.leave(request.session_hash)
-
-    return leave
+    outputs = [*context.picture_parts, context["progress"], context["stop"]]
+    context["final"].click(render(tab_take.SPP), None, outputs, **LONG)
+    context["draft"].click(render(DRAFT_SPP), None, outputs, **LONG)
+    context.stops("stop", "final")

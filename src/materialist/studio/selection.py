@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
+_QUALITY = 88
+"""JPEG quality of live pictures."""
 REPLACE, ADD, REMOVE = "new", "add", "remove"
 PART, INSIDE = 0.4, 0.9
 """An object is a part of what is selected up to this share of it, and with at least this share of itself in it."""
@@ -30,6 +34,25 @@ class Selection:
             return None
         mask = np.logical_or.reduce(self.parts)
         return mask if mask.any() else None
+
+    @cached_property
+    def pictures(self) -> dict[str, str]:
+        """The mask as data URLs of two see-through pictures, `fill` and `outline`; empty texts for none."""
+        import cv2
+
+        mask = self.mask
+        if mask is None:
+            return {"fill": "", "outline": ""}
+        inside = mask.astype(np.uint8)
+        kernel = np.ones((3, 3), np.uint8)
+        light = inside - cv2.erode(inside, kernel)
+        dark = cv2.dilate(inside, kernel) - inside
+        outline = np.zeros((*mask.shape, 4), np.uint8)
+        outline[light > 0] = (255, 255, 255, 255)
+        outline[dark > 0] = (20, 30, 60, 200)
+        fill = np.zeros((*mask.shape, 4), np.uint8)
+        fill[mask] = (255, 255, 255, 255)
+        return {"fill": data_url(fill, ".png", "image/png"), "outline": data_url(outline, ".png", "image/png")}
 
     def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
         """With the object at a pixel: alone, added, or taken away, as a plain click does where it is selected already.
@@ -111,3 +134,13 @@ def read_pick(data: Any) -> dict[str, Any]:
     if not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all():
         raise InputError("The click could not be read; reload the page.")
     return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}
+
+
+def data_url(pixels: Array, suffix: str, kind: str) -> str:
+    """[H, W, 3 or 4] uint8 as a data URL."""
+    import cv2
+
+    order = [2, 1, 0, 3][: pixels.shape[-1]]
+    quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY] if suffix == ".jpg" else []
+    data: Any = cv2.imencode(suffix, np.ascontiguousarray(pixels[..., order]), quality)[1]
+    return f"data:{kind};base64,{base64.b64encode(data.tobytes()).decode()}"

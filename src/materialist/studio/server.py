@@ -1,4 +1,4 @@
-"""Start and stop of the studio, and what it refuses to do."""
+"""Start and stop of the studio, and the requests that it refuses."""
 
 from __future__ import annotations
 
@@ -10,17 +10,21 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from materialist.errors import InputError, SetupError
 from materialist.io.examples import PREFIX, example_path
+from materialist.jobs.queue import JobQueue
 from materialist.studio import uploads
-from materialist.studio.hub import ALONE, Hub
-from materialist.studio.jobs import Jobs
-from materialist.studio.visitors import Guard, names_of
-from materialist.studio.work import Project, WorkFolder
+from materialist.studio.studio import ALONE, Studio
+from materialist.studio.workspace import Project, WorkFolder
+
+LOCAL = ("localhost", "127.0.0.1", "::1")
+"""Names of this machine."""
+Application = Callable[[Any, Any, Any], Awaitable[None]]
 
 
 def check_host(host: str, password: str | None, everyone: bool) -> bool:
@@ -68,12 +72,12 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
 
 
 def serve(
-    hub: Hub, *, host: str, port: int, password: str | None = None, told: Callable[[str], None] | None = None,
+    studio: Studio, *, host: str, port: int, password: str | None = None, told: Callable[[str], None] | None = None,
     stop: threading.Event | None = None,
 ) -> None:  # fmt: skip
     """Show the studio until Ctrl-C, or until `stop` is set. `told` gets the address once the page answers."""
     # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
-    os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(hub.work.cache))
+    os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
     try:
         import gradio as gr
     except ImportError as error:
@@ -82,14 +86,14 @@ def serve(
         ) from error
     from materialist.studio.page import asset, build
 
-    page = build(hub)
+    page = build(studio)
     page.queue(default_concurrency_limit=8, max_size=200)
     try:
         _, address, _ = page.launch(
             server_name=host, server_port=port, share=False, quiet=True, prevent_thread_lock=True, show_error=True,
-            auth=_door(password), auth_message="Any name will do; the password counts.",
+            auth=_login(password), auth_message="Any name will do; the password counts.",
             max_file_size=f"{uploads.MAX_MEGABYTES}mb", allowed_paths=[], theme=_theme(gr),
-            css=asset("style.css"), app_kwargs={"middleware": [_guard(hub, host)]},
+            css=asset("style.css"), app_kwargs={"middleware": [_host_check(studio, host)]},
             js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
         )  # fmt: skip
         if told is not None:
@@ -100,29 +104,29 @@ def serve(
     except KeyboardInterrupt:
         return
     finally:
-        hub.jobs.close()
+        studio.jobs.close()
         page.close(verbose=False)
-        shutil.rmtree(hub.work.cache, ignore_errors=True)
+        shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 
-def new_hub(work: str | Path, *, alone: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Hub:
-    """A hub on a work folder. Raises OutputError where it cannot be written."""
+def new_studio(work: str | Path, *, alone: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
+    """A studio on a work folder. Raises OutputError where it cannot be written."""
     if not 1 <= workers <= 64:
         raise InputError(f"--workers is a number from 1 to 64, not {workers}.")
-    return Hub(WorkFolder(work), Jobs(workers, device), alone, seed=seed)
+    return Studio(WorkFolder(work), JobQueue(workers), alone, seed=seed, device=device)
 
 
-def _door(password: str | None) -> Any:
+def _login(password: str | None) -> Any:
     """The check of name and password, or None."""
     if not password:
         return None
     return lambda name, word: hmac.compare_digest(word.encode(), password.encode())
 
 
-def _guard(hub: Hub, host: str) -> Any:
+def _host_check(studio: Studio, host: str) -> Any:
     from starlette.middleware import Middleware
 
-    return Middleware(Guard, names=names_of(host) if hub.alone else None)
+    return Middleware(HostCheck, names=names_of(host) if studio.alone else None)
 
 
 def _theme(gr: Any) -> Any:
@@ -134,3 +138,62 @@ def _theme(gr: Any) -> Any:
         block_label_text_color="#16202e", block_title_text_color="#16202e", button_cancel_background_fill="#b42318",
         button_cancel_text_color="#ffffff", slider_color="#1d4ed8",
     )  # fmt: skip
+
+
+class HostCheck:
+    """ASGI middleware that refuses requests sent by the pages of other sites.
+
+    A browser sends `Origin` with what a page asks of another place; it must be the place that is asked. Where the
+    studio serves this machine only, that place must have one of its names, too: a site that lets its own name point
+    to 127.0.0.1 (DNS rebinding) is of the same origin, but not of ours.
+    """
+
+    def __init__(self, app: Application, names: tuple[str, ...] | None = None):
+        """`names`: host names that may be asked for; None for all."""
+        self.app, self.names = app, names
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Pass a request on, or answer 403."""
+        if scope["type"] not in ("http", "websocket") or self.allows(dict(scope["headers"])):
+            await self.app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            headers = [(b"content-type", b"text/plain; charset=utf-8")]
+            await send({"type": "http.response.start", "status": 403, "headers": headers})
+            await send({"type": "http.response.body", "body": b"The studio answers its own pages only.\n"})
+
+    def allows(self, headers: dict[bytes, bytes]) -> bool:
+        """Whether a request with these headers (names in lower case) may pass."""
+        host = headers.get(b"host", b"").decode("latin-1").lower()
+        if self.names is not None and _name(f"//{host}") not in self.names:
+            return False
+        origin = headers.get(b"origin", b"").decode("latin-1").lower()
+        if not origin:
+            return True
+        # A proxy before the studio may ask it under another name, and tells the one that it was asked under.
+        asked = {host, headers.get(b"x-forwarded-host", b"").decode("latin-1").lower()} - {""}
+        scheme, place = origin.partition("://")[0], _place(origin)
+        return place is not None and any(place == _place(f"{scheme}://{one}") for one in asked)
+
+
+def names_of(host: str) -> tuple[str, ...]:
+    """Host names of a studio that serves this machine only, bound to `host`."""
+    return (*LOCAL, host.lower().strip("[]"))
+
+
+def _name(address: str) -> str | None:
+    try:
+        return urlsplit(address).hostname
+    except ValueError:
+        return None
+
+
+def _place(address: str) -> tuple[str, int | None] | None:
+    """(host, port) of an address, the usual port of its scheme where it names none; None where it has no host."""
+    try:
+        parts = urlsplit(address)
+        port = parts.port or {"http": 80, "https": 443}.get(parts.scheme)
+    except ValueError:
+        return None
+    return (parts.hostname, port) if parts.hostname else None

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import gradio as gr
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.options import Relight
 from materialist.studio import lights, uploads
-from materialist.studio.context import Context
-from materialist.studio.guard import guarded
 from materialist.studio.session import Session
+from materialist.studio.widgets import LIVE, SUN, PageContext, default, handler, number_text, slider
+from materialist.studio.workspace import store
 from materialist.types import Array
 
 OWN = "The photo's own"
@@ -21,7 +21,7 @@ _BEFORE = 0.75
 """Where a lamp hangs: this share of the way from the camera to what was clicked."""
 
 
-def layout(context: Context) -> None:
+def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Light", id="light"):
@@ -33,13 +33,15 @@ def layout(context: Context) -> None:
             label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150, elem_id="own_map",
             file_types=[".exr", ".hdr", ".png", ".jpg"],
         )  # fmt: skip
-        parts["rotate"] = gr.Slider(-180, 180, 0, step=1, label="Turn the light, degrees", elem_id="rotate", buttons=[])
-        parts["ambient"] = gr.Slider(0, 2, 1, step=0.02, label="Dim or brighten", elem_id="ambient", buttons=[])
+        parts["rotate"] = slider(Relight, "rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
+        parts["ambient"] = slider(Relight, "ambient", "Dim or brighten", 0.02, maximum=2)
         with gr.Accordion("Sun", open=False):
             parts["sun_on"] = gr.Checkbox(False, label="A sun in the sky")
-            parts["azimuth"] = gr.Slider(-180, 180, 45, step=1, label="Right of straight ahead, degrees", buttons=[])
-            parts["elevation"] = gr.Slider(0, 90, 40, step=1, label="Above the horizon, degrees", buttons=[])
-            parts["sun_power"] = gr.Slider(0, 5, 1, step=0.05, label="Strength", buttons=[])
+            parts["azimuth"] = gr.Slider(
+                -180, 180, SUN[0], step=1, label="Right of straight ahead, degrees", buttons=[]
+            )
+            parts["elevation"] = gr.Slider(0, 90, SUN[1], step=1, label="Above the horizon, degrees", buttons=[])
+            parts["sun_power"] = slider(Relight, "sun_power", "Strength", 0.05, maximum=5)
         with gr.Accordion("Lamps", open=False):
             gr.Markdown("Choose the tool **Place a lamp** and click in the photo. Lamps show in path-traced pictures.")
             parts["kelvin"] = gr.Slider(1700, 12000, 2700, step=100, label="Colour, kelvin: warm to cold", buttons=[])
@@ -50,75 +52,52 @@ def layout(context: Context) -> None:
             parts["no_lamps"] = gr.Button("Take all lamps away", size="sm")
 
 
-def wire(context: Context) -> None:
+def wire(context: PageContext) -> None:
     """The events."""
     parts = context.parts
-    live: dict[str, Any] = {
-        "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
-    }  # fmt: skip
 
-    @guarded
-    def choose(event: gr.SelectData, request: gr.Request) -> dict[Any, Any]:
+    @handler
+    def choose(event: gr.SelectData, request: gr.Request) -> dict:
         session = context.session(request)
-        number = int(event.index) - 1
-        if number < 0:
+        if event.index == 0:
             session.light(envmap=None, gain=None)
         else:
-            name = lights.names()[number]
-            session.light(envmap=_written(session, name), gain="auto")
+            session.light(envmap=_written(session, lights.names()[int(event.index) - 1]), gain="auto")
         return context.picture(session)
 
-    @guarded
-    def uploaded(file: str | None, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if file is None:
-            return {}
-        from materialist.edits.light.relight import read_envmap
-
-        suffix = uploads.checked_picture(Path(file), Path(file).name)
-        with uploads.called(Path(file), Path(file).name):
-            read_envmap(file)
-        session.light(envmap=session.keep(Path(file), "light", suffix), gain="auto")
-        return context.picture(session)
-
-    def setter(name: str, plain: float) -> Any:
-        @guarded
-        def moved(value: float, request: gr.Request) -> dict[Any, Any]:
-            session = context.session(request)
-            session.light(**{name: None if value == plain else f"{float(value):.4g}"})
-            return context.picture(session)
-
-        return moved
-
-    @guarded
-    def sun(on: bool, azimuth: float, elevation: float, power: float, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        where = [f"{float(azimuth):g}", f"{float(elevation):g}"] if on else None
-        session.light(sun=where, sun_power=f"{float(power):.4g}" if on else None)
-        return context.picture(session)
-
-    @guarded
+    @handler
     def lamp_settings(kelvin: float, power: float, before: float, request: gr.Request) -> None:
         context.session(request).lamp = (float(kelvin), float(power), float(before))
 
-    @guarded
-    def no_lamps(request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        session.light(lamps=None)
-        return context.everything(session)
-
-    parts["lights"].select(choose, None, context.picture_parts, **live)
-    sent = parts["own_map"].upload(uploaded, parts["own_map"], context.picture_parts, **live)
-    sent.failure(lambda: None, None, parts["own_map"], **live)  # what was refused is not there
-    parts["rotate"].input(setter("rotate", 0), parts["rotate"], context.picture_parts, **live)
-    parts["ambient"].input(setter("ambient", 1), parts["ambient"], context.picture_parts, **live)
+    parts["lights"].select(choose, None, context.picture_parts, **LIVE)
+    context.on_upload("own_map", _uploaded)
+    for name in ("rotate", "ambient"):
+        context.on(parts[name].input, partial(_moved, name), parts[name])
     sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]
     for part in sunny:
-        part.input(sun, sunny, context.picture_parts, **live)
+        context.on(part.input, _sun, sunny)
     lamp = [parts[name] for name in ("kelvin", "power", "before")]
     for part in lamp:
-        part.input(lamp_settings, lamp, None, **live)
-    parts["no_lamps"].click(no_lamps, None, context.all_parts, **live)
+        part.input(lamp_settings, lamp, None, **LIVE)
+    context.on(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
+
+
+def _moved(name: str, session: Session, value: float) -> None:
+    session.light(**{name: None if value == default(Relight, name) else number_text(value)})
+
+
+def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: float) -> None:
+    where = [f"{float(azimuth):g}", f"{float(elevation):g}"] if on else None
+    session.light(sun=where, sun_power=number_text(power) if on else None)
+
+
+def _uploaded(session: Session, file: Path) -> None:
+    from materialist.edits.light.relight import read_envmap
+
+    suffix = uploads.checked_picture(file, file.name)
+    with uploads.called(file, file.name):
+        read_envmap(file)
+    session.light(envmap=store(session.workspace, file, "light", suffix), gain="auto")
 
 
 def place_lamp(session: Session, x: float, y: float) -> None:
@@ -128,16 +107,16 @@ def place_lamp(session: Session, x: float, y: float) -> None:
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
     new = [f"{x:.0f}", f"{y:.0f}", f"{depth * before:.4g}", f"{kelvin:g}", f"{power:.3g}"]
-    place = session.stack.light
-    known = session.stack.steps[place].options.get("lamps", []) if place is not None else []
+    place = session.edits.light
+    known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
     session.light(lamps=[*known, new])
 
 
 def _written(session: Session, name: str) -> str:
-    """A computed light as a file on the desk, so that the recipe can be replayed anywhere."""
+    """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
     from materialist.io.exr import write_exr
 
-    file = session.desk / f"light-{name.lower()}.exr"
+    file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
         write_exr(file, lights.light(name))
     return file.name

@@ -8,18 +8,17 @@ import gradio as gr
 import numpy as np
 
 from materialist.color import srgb_levels
-from materialist.studio import views
-from materialist.studio.context import Context
-from materialist.studio.follow import follow
-from materialist.studio.guard import guarded
+from materialist.studio import tasks
+from materialist.studio.progress import follow
 from materialist.studio.session import Session
-from materialist.studio.showing import picture
+from materialist.studio.stage import maps, picture, report
+from materialist.studio.widgets import LONG, PageContext, handler
 from materialist.types import Array
 
 MESH = "mesh.glb"
 
 
-def layout(context: Context) -> None:
+def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Look", id="look") as tab:
@@ -40,59 +39,54 @@ def layout(context: Context) -> None:
         )  # fmt: skip
 
 
-def wire(context: Context) -> None:
+def wire(context: PageContext) -> None:
     """The events."""
-    parts, hub = context.parts, context.hub
-    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    parts, studio = context.parts, context.studio
 
-    @guarded
+    @handler
     def look(request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
         if session.live is None:
             return {}
         return {
             parts["compare"]: compared(session),
-            parts["report"]: views.report(session.scene),
-            parts["maps"]: views.maps(session.scene),
+            parts["report"]: report(session.scene),
+            parts["maps"]: maps(session.scene),
         }
 
-    @guarded
+    @handler
     def make_mesh(request: gr.Request) -> Any:
         session = context.session(request)
         _ = session.scene
         assert session.project is not None
-        file = session.desk / MESH
+        file = session.workspace / MESH
         if file.is_file():
             return
         scene = str(session.project.scene)
-        job = hub.jobs.submit("mesh", session.person, session.desk, scene=scene, output=str(file))
-        yield from follow(hub.jobs, job)
+        job = studio.submit(session, tasks.mesh, session.workspace, scene=scene, output=str(file))
+        yield from follow(studio.jobs, job)
 
-    @guarded
+    @handler
     def show_mesh(request: gr.Request) -> Any:
-        file = context.session(request).desk / MESH
-        return hub.handed(file) if file.is_file() else None
+        file = context.session(request).workspace / MESH
+        return studio.public_copy(file) if file.is_file() else None
 
-    parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **free)
+    parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **LONG)
     # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
-    made = parts["mesh_button"].click(make_mesh, None, parts["mesh_progress"], **free)
-    made.then(show_mesh, None, parts["mesh"], **free)
+    made = parts["mesh_button"].click(make_mesh, None, parts["mesh_progress"], **LONG)
+    made.then(show_mesh, None, parts["mesh"], **LONG)
 
 
 def compared(session: Session) -> tuple[Array, Array]:
     """(photo, edits), [h, w, 3] uint8: the path-traced picture where there is one of these edits."""
     import cv2
 
-    live, steps = session.live, session.stack.active
+    live, steps = session.live, session.edits.active
     assert live is not None
-    before = _bytes(live.scene.photo.linear)
+    before = srgb_levels(live.scene.photo.linear)
     if session.final is not None and session.final.of(steps):
         after: Array = np.asarray(cv2.imread(str(session.final.path.with_suffix(".jpg"))))[..., ::-1]
-        native = _bytes(live.scene.photo.original)
+        native = srgb_levels(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)
-    return before, _bytes(picture(session))
-
-
-def _bytes(linear: Array) -> Array:
-    return srgb_levels(linear)
+    return before, srgb_levels(picture(session))

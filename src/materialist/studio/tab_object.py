@@ -1,52 +1,55 @@
-"""The tab for things that are put into the photo, and for glass."""
+"""The tab for objects that are put into the photo, let fall, turned to glass, or taken away."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.studio import tab_glass, things, uploads
-from materialist.studio.context import Context
-from materialist.studio.follow import box, follow
-from materialist.studio.guard import guarded
-from materialist.studio.jobs import FAILED
+from materialist.jobs.worker import FAILED
+from materialist.options import Drop, Glass, Insertion
+from materialist.studio import objects, tasks, uploads
+from materialist.studio.progress import box
 from materialist.studio.session import Session
-from materialist.studio.tab_material import hex_colour
+from materialist.studio.widgets import LONG, PageContext, handler, hex_colour, number_text, slider, tint_text
+from materialist.studio.workspace import new_name, store
 
-LIBRARY = ("Ball", "Cube", "Cylinder", "Cone", "Ring", "Slab")
-MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
+_INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
+_GLASS: dict[str, Callable[[Any], str | None]] = {
+    "ior": number_text, "transmission": number_text, "roughness": lambda v: number_text(v) if v else None,
+    "tint": tint_text, "hollow": lambda kind: kind or None,
+}  # fmt: skip
+"""Option of glass -> the value of its control as the list of edits has it."""
 
 
-def layout(context: Context) -> None:
+def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Objects", id="object"):
         gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
-        parts["thing"] = gr.Dropdown([*LIBRARY], value=None, label="Object", elem_id="thing")
+        parts["thing"] = gr.Dropdown([*objects.LIBRARY], value=None, label="Object", elem_id="thing")
         parts["own_mesh"] = gr.File(
             elem_id="own_mesh", label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
             file_types=[".glb", ".ply", ".obj", ".stl"],
         )  # fmt: skip
-        parts["scale"] = gr.Slider(0.1, 5, 1, step=0.05, label="Size", buttons=[], elem_id="scale")
-        parts["turn"] = gr.Slider(-180, 180, 0, step=1, label="Turn, degrees", buttons=[])
+        parts["scale"] = slider(Insertion, "scale", "Size", 0.05, minimum=0.1, maximum=5)
+        parts["turn"] = slider(Insertion, "turn", "Turn, degrees", 1, minimum=-180, maximum=180)
         with gr.Row():
-            parts["made_of"] = gr.Dropdown(list(MATERIALS), value="as-is", label="Material", min_width=120)
+            parts["made_of"] = gr.Dropdown(list(objects.MATERIALS), value="as-is", label="Material", min_width=120)
             parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
         gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
         with gr.Accordion("Turn the selection to glass", open=False) as parts["glass_part"]:
-            tab_glass.layout(context)
+            _layout_glass(parts)
         with gr.Accordion("Take the selection away", open=False):
             parts["shadow"] = gr.Checkbox(True, label="Its shadow and reflection on the ground go along")
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
         with gr.Accordion("Let it fall", open=False):
             gr.Markdown("The object falls where it stands. Needs the physics extra.")
-            parts["height"] = gr.Slider(
-                0, 5, 1.5, step=0.1, label="How high above, in its own sizes", buttons=[], elem_id="height"
-            )
+            parts["height"] = slider(Drop, "height", "How high above, in its own sizes", 0.1, maximum=5)
             parts["rest"] = gr.Button("Let it fall, and lie there", elem_id="rest", size="sm")
             gr.Markdown("Once more, and it tumbles in another way.")
             parts["fall"] = gr.Button("Make a video of the fall", size="sm")
@@ -56,161 +59,145 @@ def layout(context: Context) -> None:
             parts["fall_video"] = gr.Video(label="The fall", interactive=False, visible=False, buttons=["download"])
 
 
-def wire(context: Context) -> None:
+def _layout_glass(parts: dict[str, Any]) -> None:
+    ior = slider(Glass, "ior", "Index of refraction", 0.01, maximum=2.5, elem_id="glass_ior")
+    through = slider(Glass, "transmission", "How much light goes through", 0.01, elem_id="glass_transmission")
+    rough = slider(Glass, "roughness", "Roughness: clear to frosted", 0.01, elem_id="glass_roughness")
+    parts |= {"glass_ior": ior, "glass_transmission": through, "glass_roughness": rough}
+    parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
+    parts["glass_hollow"] = gr.Radio(_INSIDE, value="", label="Inside", elem_id="glass_hollow")
+    parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
+    gr.Markdown("Its body is built once, in half a minute or so; from then on the picture follows the sliders.")
+
+
+def wire(context: PageContext) -> None:
     """The events."""
-    live: dict[str, Any] = {
-        "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
-    }  # fmt: skip
-    _wire_things(context, live)
-    tab_glass.wire(context, live)
-    _wire_regions(context, live)
+    parts = context.parts
+
+    def choose(session: Session, name: str | None) -> dict[Any, Any]:
+        if name in objects.LIBRARY:
+            objects.set_option(session, "mesh", objects.library_file(session, str(name)))
+        return {parts["tool"]: "place", parts["own_mesh"]: None}
+
+    def uploaded(session: Session, file: Path) -> dict[Any, Any]:
+        _take_mesh(session, file)
+        return {parts["tool"]: "place", parts["thing"]: None}
+
+    context.on(parts["thing"].input, choose, parts["thing"], more=(parts["tool"], parts["own_mesh"]))
+    context.on_upload("own_mesh", uploaded, more=(parts["tool"], parts["thing"]))
+    for name in ("scale", "turn"):
+        context.on(parts[name].input, partial(_moved, name), parts[name])
+    for part in (parts["made_of"], parts["thing_colour"]):
+        context.on(part.input, _made_of, [parts["made_of"], parts["thing_colour"]])
+    slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
+    context.on(parts["remove"].click, _remove, parts["shadow"], **slow)
+    # Sliders of glass change the glass in hand; without one they are for the next.
+    values = [parts[f"glass_{name}"] for name in _GLASS]
+    context.on(parts["glass"].click, _make_glass, values, everything=True)
+    for name, part in zip(_GLASS, values):
+        context.on(part.input, partial(_change_glass, name), part)
+    _wire_following(context)
     _wire_fall(context)
 
 
-def _wire_things(context: Context, live: dict[str, Any]) -> None:
-    parts = context.parts
+def _take_mesh(session: Session, file: Path) -> None:
+    from materialist.edits.insert.meshes import read_model
 
-    @guarded
-    def choose(name: str | None, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if name in LIBRARY:
-            session.thing_option("mesh", library_file(session, str(name)))
-        return {**context.picture(session), parts["tool"]: "place", parts["own_mesh"]: None}
-
-    @guarded
-    def uploaded(file: str | None, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if file is None:
-            return {}
-        from materialist.edits.insert.meshes import read_model
-
-        suffix = uploads.checked_mesh(Path(file), Path(file).name)
-        kept = session.keep(Path(file), "mesh", suffix)
-        try:
-            with uploads.called(session.desk / kept, Path(file).name):
-                read_model(session.desk / kept)
-        except Exception:
-            (session.desk / kept).unlink(missing_ok=True)
-            raise
-        session.thing_option("mesh", kept)
-        return {**context.picture(session), parts["tool"]: "place", parts["thing"]: None}
-
-    def setter(name: str, text: Callable[[Any], str | None]) -> Any:
-        @guarded
-        def moved(value: Any, request: gr.Request) -> dict[Any, Any]:
-            session = context.session(request)
-            session.thing_option(name, text(value))
-            return context.picture(session)
-
-        return moved
-
-    @guarded
-    def made(kind: str, colour: str, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        session.thing_option("material", hex_colour(colour) if kind == "colour" else kind)
-        return context.picture(session)
-
-    outputs = [*context.picture_parts, parts["tool"]]
-    parts["thing"].input(choose, parts["thing"], [*outputs, parts["own_mesh"]], **live)
-    sent = parts["own_mesh"].upload(uploaded, parts["own_mesh"], [*outputs, parts["thing"]], **live)
-    sent.failure(lambda: None, None, parts["own_mesh"], **live)  # what was refused is not there
-    parts["scale"].input(setter("scale", lambda v: f"{float(v):.4g}"), parts["scale"], context.picture_parts, **live)
-    parts["turn"].input(setter("turn", lambda v: f"{float(v):.4g}"), parts["turn"], context.picture_parts, **live)
-    for part in (parts["made_of"], parts["thing_colour"]):
-        part.input(made, [parts["made_of"], parts["thing_colour"]], context.picture_parts, **live)
+    suffix = uploads.checked_mesh(file, file.name)
+    kept = session.workspace / store(session.workspace, file, "mesh", suffix)
+    try:
+        with uploads.called(kept, file.name):
+            read_model(kept)
+    except Exception:
+        kept.unlink(missing_ok=True)
+        raise
+    objects.set_option(session, "mesh", kept.name)
 
 
-def _wire_regions(context: Context, live: dict[str, Any]) -> None:
-    """Things that go."""
-    parts = context.parts
-
-    @guarded
-    def remove(shadow: bool, request: gr.Request) -> Any:
-        session = context.session(request)
-        session.region_step("remove", shadow=None if shadow else "0")
-        return context.picture(session)
-
-    slow = {k: v for k, v in live.items() if k not in ("queue", "trigger_mode")} | {"show_progress": "minimal"}
-    parts["remove"].click(remove, parts["shadow"], context.picture_parts, **slow)
+def _moved(name: str, session: Session, value: float) -> None:
+    objects.set_option(session, name, number_text(value))
 
 
-def _wire_fall(context: Context) -> None:
+def _made_of(session: Session, kind: str, colour: str) -> None:
+    objects.set_option(session, "material", hex_colour(colour) if kind == "colour" else kind)
+
+
+def _remove(session: Session, shadow: bool) -> None:
+    session.region_step("remove", shadow=None if shadow else "0")
+
+
+def _make_glass(session: Session, *values: Any) -> None:
+    session.region_step("glass", **{name: text(v) for (name, text), v in zip(_GLASS.items(), values)})
+
+
+def _change_glass(name: str, session: Session, value: Any) -> bool:
+    if session.in_hand != "glass":
+        return False
+    session.material(kind="glass", **{name: _GLASS[name](value)})
+    return True
+
+
+def _wire_following(context: PageContext) -> None:
+    """The stage asks to be told when the glass that it waits for is there."""
+
+    @handler
+    def follow(request: gr.Request) -> Iterator[dict[Any, Any]]:
+        session, said = context.session(request), ""
+        client = session.glass
+        while client is not None and client is session.glass:
+            state = client.state
+            if not state.waiting:
+                end = box(state.words, bad=True) if state.bad else box("The glass follows its sliders.")
+                yield {**context.picture(session), context["progress"]: end}
+                return
+            if state.words != said:
+                said = state.words
+                yield {context["progress"]: box(said)}
+            with client.changed:
+                client.changed.wait(0.5)
+
+    outputs = [*context.picture_parts, context["progress"]]
+    context["stage"].follow(follow, None, outputs, trigger_mode="always_last", **LONG)
+
+
+def _wire_fall(context: PageContext) -> None:
     """An object that falls: to lie there, or as a video."""
-    parts, hub = context.parts, context.hub
-    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    parts, studio = context.parts, context.studio
 
-    @guarded
+    @handler
     def fall(height: float, request: gr.Request) -> Any:
         session = context.session(request)
-        scene = str(session.project.scene) if session.scene and session.project else ""
-        place = things.last(session)
-        if place is None:
+        _ = session.scene
+        place = objects.last(session)
+        if place is None or session.project is None:
             raise InputError("Place an object first; it falls where it stands.")
-        step, file = session.stack.steps[place], session.new_name("fall", ".mp4")
-        told = {k: step.options[k] for k in ("scale", "material", "height", "seed") if k in step.options}
-        told = {"height": f"{float(height):.3g}", **told}
+        step, file = session.edits.steps[place], new_name(session.workspace, "fall", ".mp4")
+        options = {k: step.options[k] for k in ("scale", "material", "height", "seed") if k in step.options}
+        options = {"height": f"{float(height):.3g}", **options}
         if step.kind == "insert":  # what has fallen falls in the video as it did
-            told["seed"] = str(things.tries(session, step))
-        job = hub.jobs.submit(
-            "fall", session.person, session.desk, scene=scene, mesh=str(session.desk / step.options["mesh"]),
-            at=[float(v) for v in step.options["at"]], output=str(file), **told,
+            options["seed"] = str(objects.failures(session, step))
+        job = studio.submit(
+            session, tasks.fall, session.workspace, scene=str(session.project.scene),
+            mesh=str(session.workspace / step.options["mesh"]), at=[float(v) for v in step.options["at"]],
+            output=str(file), options=options,
         )  # fmt: skip
-        session.asked("fall", job)
-        for html in follow(hub.jobs, job):
-            yield {parts["fall_progress"]: html, parts["fall_stop"]: gr.update(visible=not job.over)}
+        yield from context.following(job, "fall_progress", "fall_stop")
         if job.state == FAILED and step.kind == "insert":
-            things.fell_in_vain(session, step)
+            objects.note_failure(session, step)
         if job.state == "done":
-            yield {parts["fall_video"]: gr.update(value=hub.handed(file), visible=True)}
+            yield {parts["fall_video"]: gr.update(value=studio.public_copy(file), visible=True)}
 
-    @guarded
-    def stop(request: gr.Request) -> None:
-        context.session(request).stop(hub.jobs, "fall")
-
-    @guarded
+    @handler
     def rest(height: float, request: gr.Request) -> Any:
         session = context.session(request)
         yield {parts["fall_progress"]: box("It falls …")}
         try:
-            notes = things.let_fall(session, float(height))
+            notes = objects.let_fall(session, float(height))
         finally:
             yield {parts["fall_progress"]: ""}
         yield {**context.everything(session), parts["fall_progress"]: box(" ".join(notes)) if notes else ""}
 
-    parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **free)
-    parts["fall"].click(
-        fall, parts["height"], [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]], **free
-    )
-    parts["fall_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
-
-
-def file_of(name: str) -> str:
-    """What the file of a computed mesh is called."""
-    return f"thing-{name.lower()}.ply"
-
-
-def library_file(session: Session, name: str) -> str:
-    """A computed mesh as a file on the desk, +Y up."""
-    file = session.desk / file_of(name)
-    if not file.is_file():
-        shape(name).export(file)
-    return file.name
-
-
-def shape(name: str) -> Any:
-    """One of the library as a trimesh, +Y up, longest side 1."""
-    import numpy as np
-    from trimesh import creation, transformations
-
-    made: dict[str, Callable[[], Any]] = {
-        "Ball": lambda: creation.icosphere(subdivisions=4, radius=0.5),
-        "Cube": lambda: creation.box((1, 1, 1)),
-        "Cylinder": lambda: creation.cylinder(0.3, 1, sections=96),
-        "Cone": lambda: creation.cone(0.4, 1, sections=96),
-        "Ring": lambda: creation.torus(0.35, 0.15, major_sections=96, minor_sections=48),
-        "Slab": lambda: creation.box((1, 1, 0.12)),
-    }
-    mesh = made[name]()
-    # trimesh builds along +Z; a ring lies flat as it is.
-    mesh.apply_transform(transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
-    return mesh
+    parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **LONG)
+    made = [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]]
+    parts["fall"].click(fall, parts["height"], made, **LONG)
+    context.stops("fall_stop", "fall")

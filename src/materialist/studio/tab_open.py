@@ -13,26 +13,20 @@ import gradio as gr
 
 from materialist.errors import InputError
 from materialist.io.examples import EXAMPLES, example_path
-from materialist.studio import uploads
-from materialist.studio.context import Context
-from materialist.studio.follow import box, follow
-from materialist.studio.guard import guarded
-from materialist.studio.jobs import Job
+from materialist.jobs.queue import Job
+from materialist.studio import archives, tasks, uploads
+from materialist.studio.progress import box, follow
 from materialist.studio.session import Session
-from materialist.studio.views import file_url
-from materialist.studio.work import Project, write_card
+from materialist.studio.stage import file_url, stage
+from materialist.studio.widgets import LONG, PREDICTORS, PageContext, handler
+from materialist.studio.workspace import Project, write_card
 
-PREDICTORS = (
-    ("Automatic", "auto"),
-    ("MatNet", "matnet"),
-    ("Marigold", "marigold"),
-)
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
 _SOURCES = {"exif": "from its EXIF data", "default": "assumed; it has no EXIF data that says"}
 _READY = "Ready: click an object, then move a slider."
 
 
-def layout(context: Context) -> None:
+def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Open", id="open"):
@@ -65,27 +59,26 @@ def layout(context: Context) -> None:
         parts["example"] = gr.Dropdown(names, label="Or take an example photo", value=None, elem_id="example")
 
 
-def wire(context: Context, page: gr.Blocks) -> None:
+def wire(context: PageContext, page: gr.Blocks) -> None:
     """The events."""
-    parts, hub = context.parts, context.hub
-    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    parts, studio = context.parts, context.studio
 
-    @guarded
+    @handler
     def uploaded(file: str | None, request: gr.Request) -> Any:
         session = context.session(request)
         if file is None or Path(file).suffix.lower() == ".zip":
-            return "" if file is None else _zipped(file)
+            return "" if file is None else box(f"{Path(file).name} will be opened as a scene.")
         return _facts(context, session, Path(file), Path(file).name)
 
-    @guarded
-    def exemplified(name: str | None) -> Any:
+    @handler
+    def choose_example(name: str | None) -> Any:
         return None if name is None else gr.update(value=None)
 
-    @guarded
+    @handler
     def start(
         file: str | None, example: str | None, predictor: str, size: int, fov: str, token: str, request: gr.Request
     ):
-        session = hub.session(request.session_hash, hub.person(token))
+        session = studio.session(request.session_hash, studio.person(token))
         if file is not None and Path(file).suffix.lower() == ".zip":
             project = _unpacked(context, session, Path(file))
         else:
@@ -95,52 +88,47 @@ def wire(context: Context, page: gr.Blocks) -> None:
                 return
         yield from _opened(context, session, project)
 
-    @guarded
+    @handler
     def resume(name: str | None, token: str, request: gr.Request):
-        session = hub.session(request.session_hash, hub.person(token))
+        session = studio.session(request.session_hash, studio.person(token))
         if not name:
             raise InputError("Choose one of your photos in the list first.")
         yield from _resumed(context, session, name)
 
-    @guarded
+    @handler
     def arrive(token: str, last: str, request: gr.Request):
         token = token if len(token or "") >= 16 else secrets.token_hex(8)
-        session = hub.session(request.session_hash, hub.person(token))
+        session = studio.session(request.session_hash, studio.person(token))
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
-        first = hub.first(last)
+        first = studio.first(last)
         there = bool(first) and any(value == first for _, value in known)
-        if isinstance(hub.start, Path) and not (there and hub.here(last)):
-            yield {parts["file"]: hub.handed(hub.start)}
+        if isinstance(studio.start, Path) and not (there and studio.is_bookmark(last)):
+            yield {parts["file"]: studio.public_copy(studio.start)}
         elif there:
             yield from _resumed(context, session, first)
-
-    @guarded
-    def cancel(request: gr.Request) -> None:
-        context.session(request).stop(hub.jobs, "invert")
 
     opening = [
         *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
         parts["projects"], parts["progress"],
     ]  # fmt: skip
     wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov", "token")]
-    sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **free)
-    sent.failure(lambda: None, None, parts["file"], **free)  # what was refused is not there
-    parts["example"].input(exemplified, parts["example"], parts["file"], **free)
-    parts["start"].click(start, wanted, opening, **free)
-    parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **free)
-    parts["cancel"].click(cancel, None, None, queue=False, show_progress="hidden", api_visibility="private")
-    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **free)
+    sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **LONG)
+    sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
+    parts["example"].input(choose_example, parts["example"], parts["file"], **LONG)
+    parts["start"].click(start, wanted, opening, **LONG)
+    parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **LONG)
+    context.stops("cancel", "invert")
+    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **LONG)
 
 
-def _facts(context: Context, session: Session, path: Path, name: str) -> str:
+def _facts(context: PageContext, session: Session, path: Path, name: str) -> str:
     """What a photo is, read in a process of its own: a broken decoder must not take the studio along."""
     uploads.checked_picture(path, name)
-    thumbnail = context.hub.work.cache / f"{secrets.token_hex(8)}.jpg"
+    thumbnail = context.studio.work.cache / f"{secrets.token_hex(8)}.jpg"
     try:
-        job = context.hub.jobs.run_now(
-            "photo", session.person, thumbnail.parent, photo=str(path), thumbnail=str(thumbnail)
-        )
+        arguments = {"photo": str(path), "thumbnail": str(thumbnail)}
+        job = context.studio.jobs.run(context.studio.job(session, tasks.photo, thumbnail.parent, **arguments))
         if job.state != "done":
             raise InputError(uploads.without_paths(job.message, path, name))
         facts = job.result
@@ -152,15 +140,11 @@ def _facts(context: Context, session: Session, path: Path, name: str) -> str:
         thumbnail.unlink(missing_ok=True)
 
 
-def _zipped(file: str) -> str:
-    return box(f"{Path(file).name} will be opened as a scene.")
-
-
 def _begun(
-    context: Context, session: Session, file: str | None, example: str | None, predictor: str, size: int, fov: str
+    context: PageContext, session: Session, file: str | None, example: str | None, predictor: str, size: int, fov: str
 ) -> tuple[Project, Job]:
     """A project with its photo in it, and the inversion in the queue."""
-    hub = context.hub
+    studio = context.studio
     if file is None and not example:
         raise InputError("Drop a photo first, or choose an example.")
     if predictor not in {value for _, value in PREDICTORS}:
@@ -168,25 +152,24 @@ def _begun(
     source = Path(file) if file is not None else example_path(str(example))
     title = source.name if file is not None else f"Example: {example}"
     suffix = uploads.checked_picture(source, source.name)
-    project = hub.work.new(title, session.person)
+    project = studio.work.new(title, session.person)
     photo = project.folder / f"original{suffix}"
     shutil.copyfile(source, photo)
     project = Project(project.folder, project.title, project.owner, project.scene, photo)
     write_card(project)
-    job = hub.jobs.submit(
-        "invert", session.person, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
-        predictor=predictor, size=int(size), fov=fov.strip() or "auto",
-        seed=hub.seed,
+    job = studio.submit(
+        session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
+        predictor=predictor, size=int(size), fov=fov.strip() or "auto", seed=studio.seed,
     )  # fmt: skip
     return project, job
 
 
-def _unpacked(context: Context, session: Session, file: Path) -> Project:
+def _unpacked(context: PageContext, session: Session, file: Path) -> Project:
     from materialist.io.package import load_scene
 
-    project = context.hub.work.new(file.stem, session.person)
+    project = context.studio.work.new(file.stem, session.person)
     try:
-        uploads.unpack_scene(file, project.scene, file.name)
+        archives.unpack_scene(file, project.scene, file.name)
         with uploads.called(project.scene, file.name):
             load_scene(project.scene)
     except Exception:
@@ -195,39 +178,39 @@ def _unpacked(context: Context, session: Session, file: Path) -> Project:
     return project
 
 
-def _following(context: Context, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
+def _following(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
     """Progress and first pictures of an inversion until it is over."""
-    parts, hub = context.parts, context.hub
-    session.asked("invert", job)
+    parts, studio = context.parts, context.studio
+    session.note_job(job)
     yield {
-        parts["last"]: hub.kept(project),
+        parts["last"]: studio.bookmark(project),
         parts["cancel"]: gr.update(visible=True),
         parts["start"]: gr.update(interactive=False),
     }
     shown = 0
-    for html in follow(hub.jobs, job):
+    for html in follow(studio.jobs, job):
         update: dict[Any, Any] = {parts["fit"]: html}
         if len(job.found) > shown:
             shown = len(job.found)
-            latest = {f["found"].removeprefix("first "): f for f in job.found}
-            pictures = [(hub.handed(project.folder / f["file"]), f["found"]) for f in latest.values()]
+            latest = {f["name"].removeprefix("first "): f for f in job.found}
+            pictures = [(studio.public_copy(project.folder / f["file"]), f["name"]) for f in latest.values()]
             update[parts["found"]] = gr.update(value=pictures, visible=True)
         yield update
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    still_open = hub.kept(session.project) if session.project else ""
+    still_open = studio.bookmark(session.project) if session.project else ""
     yield {
         parts["cancel"]: gr.update(visible=False), parts["start"]: gr.update(interactive=True),
         **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: still_open} if failed else {}),
     }  # fmt: skip
 
 
-def _resumed(context: Context, session: Session, name: str) -> Iterator[dict[Any, Any]]:
+def _resumed(context: PageContext, session: Session, name: str) -> Iterator[dict[Any, Any]]:
     """Open a project, or follow its inversion if that still runs."""
-    hub = context.hub
-    project = hub.project(name, session.person)
-    running = [j for j in hub.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
+    studio = context.studio
+    project = studio.project(name, session.person)
+    running = [j for j in studio.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
     if running:
         yield from _following(context, session, project, running[0])
     if project.ready:
@@ -236,18 +219,18 @@ def _resumed(context: Context, session: Session, name: str) -> Iterator[dict[Any
         raise InputError("That photo was not taken apart to the end; start again.")
 
 
-def _opened(context: Context, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
+def _opened(context: PageContext, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
     """Show a project: its photo at once, the edits when the preview is ready."""
     parts = context.parts
     yield {parts["fit"]: box("Opening …")}
-    context.hub.open(session, project.name)
+    context.studio.open(session, project.name)
     live = session.live
     if live is None:
         return
     known = _projects(context, session)
     yield {
-        **context.controls(session), parts["stage"]: session.stage(edits=False), **context.listed(session),
-        parts["last"]: context.hub.kept(project),
+        **context.controls(session), parts["stage"]: stage(session, with_edits=False), **context.listed(session),
+        parts["last"]: context.studio.bookmark(project),
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
         parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
@@ -260,10 +243,10 @@ def _opened(context: Context, session: Session, project: Project) -> Iterator[di
         yield {**shown, parts["fit"]: box("Open."), parts["progress"]: box(words, bad=bad)}
 
 
-def _projects(context: Context, session: Session) -> list[tuple[str, str]]:
+def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:
     """Titles and names for the list of what can be continued."""
-    found = context.hub.projects(session.person)
-    running = {j.folder for j in context.hub.jobs.of(session.person, "invert") if not j.over}
+    found = context.studio.projects(session.person)
+    running = {j.folder for j in context.studio.jobs.of(session.person, "invert") if not j.over}
     return [
         (f"{p.title} · {p.name}" + ("" if p.ready else " (in work)"), p.name)
         for p in found

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import shutil
-from inspect import signature
+from functools import partial
 from pathlib import Path
-from shlex import join, quote
 from typing import Any
 
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.pipeline import invert
-from materialist.studio.context import Context
-from materialist.studio.follow import box, follow
-from materialist.studio.guard import guarded
-from materialist.studio.jobs import Job
-from materialist.studio.pack import pack
-from materialist.studio.session import EDITS, Session
-from materialist.studio.showing import Final
-from materialist.studio.tab_open import PREDICTORS
+from materialist.jobs.queue import Job
+from materialist.studio import tasks
+from materialist.studio.archives import pack
+from materialist.studio.progress import box
+from materialist.studio.session import EDITS, FinalPicture, Session
+from materialist.studio.stage import stage
+from materialist.studio.widgets import LONG, PageContext, handler
+from materialist.studio.workspace import new_name
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -37,7 +35,7 @@ KINDS = {
 SPP, FRAMES, FRAME_SPP = 256, 24, 32
 
 
-def layout(context: Context) -> None:
+def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Take away", id="take"):
@@ -57,116 +55,62 @@ def layout(context: Context) -> None:
         )
 
 
-def wire(context: Context) -> None:
+def wire(context: PageContext) -> None:
     """The events."""
-    parts, hub = context.parts, context.hub
-    free: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+    parts = context.parts
     outputs = [parts[name] for name in ("make_progress", "download", "make_stop", "stage")]
 
-    @guarded
+    @handler
     def make(what: str, request: gr.Request) -> Any:
         session = context.session(request)
         if what not in KINDS:
             raise InputError("Choose one of the listed things.")
         _ = session.scene
         yield {parts["download"]: gr.update(visible=False)}
-        file = session.new_name("take", KINDS[what][1])
+        file = new_name(session.workspace, "take", KINDS[what][1])
         if what == "edits":
             _pack_edits(session, file)
         else:
-            steps, final = session.stack.active, session.final
+            steps, final = session.edits.active, session.final
             job = _asked(context, session, what, file)
             if job is not None:
-                session.asked("take", job)
-                for html in follow(hub.jobs, job):
-                    yield {parts["make_progress"]: html, parts["make_stop"]: gr.update(visible=not job.over)}
+                session.running["take"] = job
+                yield from context.following(job, "make_progress", "make_stop")
                 if job.state != "done":
                     return
             if what in ("png", "exr"):
                 if job is not None:
-                    final = session.final = Final(steps, session.final_file, SPP)
+                    final = session.final = FinalPicture(steps, session.final_file, SPP)
                 assert final is not None
                 shutil.copyfile(final.path.with_suffix(file.suffix), file)
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
-            parts["download"]: gr.update(value=hub.handed(file), label=label, visible=True),
+            parts["download"]: gr.update(value=context.studio.public_copy(file), label=label, visible=True),
             parts["make_progress"]: box("Ready."),
-            parts["stage"]: session.stage(),
+            parts["stage"]: stage(session),
         }
 
-    @guarded
-    def stop(request: gr.Request) -> None:
-        context.session(request).stop(hub.jobs, "take")
-
-    @guarded
-    def load(file: str | None, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if file is not None:
-            session.read_edits(Path(file))
-        return context.everything(session)
-
-    parts["make"].click(make, parts["what"], outputs, **free)
-    parts["make_stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
-    sent = parts["recipe"].upload(load, parts["recipe"], context.all_parts, **free)
-    sent.failure(lambda: None, None, parts["recipe"], **free)  # what was refused is not there
+    parts["make"].click(make, parts["what"], outputs, **LONG)
+    context.stops("make_stop", "take")
+    context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})
 
 
-def _asked(context: Context, session: Session, what: str, file: Path) -> Job | None:
+def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job | None:
     """The job that makes the file; None where the final picture is there already."""
     assert session.project is not None
-    edits, jobs = session.edits_now(), context.hub.jobs
-    scene = str(session.project.scene)
+    submit = partial(context.studio.submit, session)
+    given = {"scene": str(session.project.scene), "edits": session.edits_now()}
     if what in ("png", "exr"):
         final = session.final
-        if final is not None and final.of(session.stack.active) and final.spp >= SPP:
+        if final is not None and final.of(session.edits.active) and final.spp >= SPP:
             return None
-        output = str(session.final_file)
-        return jobs.submit("final", session.person, session.desk, scene=scene, edits=edits, output=output, spp=SPP)
+        return submit(tasks.final, session.workspace, output=str(session.final_file), spp=SPP, **given)
     more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
-    return jobs.submit(
-        "take", session.person, session.desk, scene=scene, edits=edits, output=str(file), what=what, **more
-    )
+    return submit(tasks.take, session.workspace, output=str(file), what=what, **given, **more)
 
 
 def _pack_edits(session: Session, file: Path) -> None:
     """edits.yaml and every file it names."""
     if not session.write_edits():
         raise InputError("There is no edit to take away yet: change something first.")
-    pack(session.stack.steps, session.desk / EDITS, file)
-
-
-def commands(session: Session) -> str:
-    """What to type for the same result; nothing where no photo is open.
-
-    The photo is taken apart again only where its scene is not there any more.
-    """
-    project = session.project
-    if project is None:
-        return ""
-    lines, scene = [f"cd {quote(str(project.folder))}"], quote(str(project.scene))
-    if project.photo is not None:
-        scene = project.scene.name
-        words = ["materialist", "invert", project.photo.name, "-o", scene, *_options(session.scene.provenance)]
-        lines.append(f"test -e {scene} || {join(words)}")
-    if session.stack.active:
-        lines.append(f"materialist apply {scene} {session.desk.name}/{EDITS} -o out.png --save edited.scene")
-        scene = "edited.scene"
-    else:
-        lines.append(f"materialist render {scene} -o out.png")
-    lines.append(f"materialist export {scene} --to glb -o out.glb")
-    return "\n".join(lines)
-
-
-def _options(made: dict[str, Any]) -> list[str]:
-    """The options of an inversion that were not the usual ones, as `invert` takes them."""
-    usual = signature(invert).parameters
-    found: list[str] = []
-    predictor = str(made.get("predictor", "")).split(" ")[0]  # behind it are the weights
-    if predictor in {name for _, name in PREDICTORS}:
-        found += ["--predictor", predictor]
-    if made.get("fov_source") == "option":
-        found += ["--fov", f"{made['fov']:.12g}"]
-    for name in ("engine", "preset", "size", "tau", "strategy", "seed"):
-        if name in made and made[name] != usual[name].default:
-            found += [f"--{name}", str(made[name])]
-    return found
+    pack(session.edits.steps, session.workspace / EDITS, file)

@@ -1,4 +1,4 @@
-"""The long tasks of the studio, each a call of the public API on files; run by `worker` in a process of its own."""
+"""The long tasks of the studio, each a call of the public API on files, run in a process of its own."""
 
 from __future__ import annotations
 
@@ -9,24 +9,26 @@ from typing import Any
 
 import numpy as np
 
+from materialist.color import srgb_levels
 from materialist.errors import SetupError
 from materialist.io.beside import partial
+from materialist.jobs.worker import Report
 from materialist.types import Array, Materials, Prediction, Scene
 
-Progress = Any
-"""A `worker.Reporter`: progress(stage, done, total), and progress.found(name, file)."""
+Task = Callable[..., dict[str, Any]]
+"""task(report, **arguments) -> what the studio is told."""
 
 
-def do(progress: Progress, kind: str, device: str = "auto", **spec: Any) -> dict[str, Any]:
-    """The task of a kind, on a device of `invert`."""
+def on_device(device: str, task: Task, report: Report, **arguments: Any) -> dict[str, Any]:
+    """Do a task on a device of `invert`, which is set for the whole process."""
     if device != "auto":
         from materialist.render.variant import setup
 
-        setup(device)  # for the whole process
-    return globals()[f"do_{kind}"](progress, **spec)
+        setup(device)
+    return task(report, **arguments)
 
 
-def do_photo(progress: Progress, photo: str, thumbnail: str) -> dict[str, Any]:
+def photo(report: Report, photo: str, thumbnail: str) -> dict[str, Any]:
     """Read a photo: its size and field of view, and a small picture of it in the file `thumbnail`."""
     from materialist.io.photo import read_photo
 
@@ -39,27 +41,27 @@ def do_photo(progress: Progress, photo: str, thumbnail: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def do_invert(
-    progress: Progress, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
+def invert(
+    report: Report, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
     fov: float | str = "auto", seed: int = 0,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
     from dataclasses import replace
 
+    from materialist import pipeline
     from materialist.io.package import save_scene
     from materialist.io.photo import read_photo
-    from materialist.pipeline import invert
 
     picture = replace(read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
-    show = lambda name, value: _show(progress, folder, name, value)  # noqa: E731
-    done = invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=progress, found=show)
-    progress("save", 0, 1)
+    show = lambda name, value: _show(report, folder, name, value)  # noqa: E731
+    done = pipeline.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, found=show)
+    report("save", 0, 1)
     save_scene(done, scene, force=True)
     return {"scene": scene, "psnr": done.report.metrics.get("rerender_psnr_path")}
 
 
-def _show(progress: Progress, folder: Path, name: str, value: Any) -> None:
+def _show(report: Report, folder: Path, name: str, value: Any) -> None:
     """Pictures of what `invert` has found so far."""
     from materialist.exporters import pictures
 
@@ -69,31 +71,31 @@ def _show(progress: Progress, folder: Path, name: str, value: Any) -> None:
     elif isinstance(value, Materials):
         shown = _materials("", value)
     else:
-        shown = {name: pictures.light(value) if name == "light" else display(value)}
+        shown = {name: pictures.light(value) if name == "light" else srgb_levels(value)}
     for title, pixels in shown.items():
         file = folder / f"found-{title.replace(' ', '-')}.jpg"
         write_pixels(file, pixels)
-        progress.found(title, file)
+        report.found(name=title, file=file.name)
 
 
 def _materials(before: str, maps: Materials) -> dict[str, Array]:
     from materialist.exporters import pictures
 
     return {
-        f"{before}albedo": display(maps.albedo),
+        f"{before}albedo": srgb_levels(maps.albedo),
         f"{before}roughness": pictures.grey(maps.roughness),
         f"{before}metallic": pictures.grey(maps.metallic),
     }
 
 
-def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
+def final(report: Report, scene: str, edits: str, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import warnings_since
 
-    loaded, edited = _edited(progress, scene, edits)
-    picture = composite(loaded, edited, spp=spp, seed=seed, progress=progress)
+    loaded, edited = _edited(report, scene, edits)
+    picture = composite(loaded, edited, spp=spp, seed=seed, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
@@ -102,81 +104,80 @@ def do_final(progress: Progress, scene: str, edits: str, output: str, spp: int =
     return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 
 
-def do_mesh(progress: Progress, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
+def mesh(report: Report, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
     from materialist.exporters.glb import write_glb
     from materialist.exporters.parts import scene_parts
     from materialist.exporters.target import whole_files
     from materialist.io.package import load_scene
 
-    progress("export", 0, 1)
+    report("export", 0, 1)
     loaded = load_scene(scene)
     with whole_files([Path(output)], True) as (file,):
         write_glb(file, loaded, scene_parts(loaded, triangles)[:1])
     return {"file": output}
 
 
-def do_take(
-    progress: Progress, scene: str, edits: str, output: str, what: str, spp: int = 256, frames: int = 36
+def take(
+    report: Report, scene: str, edits: str, output: str, what: str, spp: int = 256, frames: int = 36
 ) -> dict[str, Any]:
     """One thing to take away, as a single file at `output` (its suffix included)."""
     maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
-    loaded, edited = _edited(progress, scene, edits)
-    maker.get(what, _exported)(progress, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
+    loaded, edited = _edited(report, scene, edits)
+    maker.get(what, _exported)(report, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
     return {"file": output}
 
 
-def do_fall(
-    progress: Progress, scene: str, mesh: str, at: list[float], output: str, scale: str = "1", material: str = "as-is",
-    height: str = "1.5", seed: str = "0", frames: int = 36, spp: int = 32,
+def fall(
+    report: Report, scene: str, mesh: str, at: list[float], output: str, options: dict[str, Any], frames: int = 36,
+    spp: int = 32,
 ) -> dict[str, Any]:  # fmt: skip
-    """`materialist drop`: a mesh falls onto the photo, as a video."""
+    """`materialist drop` with these options: a mesh falls onto the photo, as a video."""
     from materialist.edits.composite.composite import pictures
     from materialist.edits.drop.drop import drop
     from materialist.io.package import load_scene
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
-    progress("load", 0, 1)
+    report("load", 0, 1)
     loaded = load_scene(scene)
-    film = drop(
-        loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, scale=float(scale), material=material,
-        height=float(height), seed=int(seed),
-    )  # fmt: skip
-    write_frames(output, pictures(loaded, film, spp=spp, progress=progress), fps=24, force=True)
+    kinds = {"scale": float, "height": float, "seed": int}
+    options = {name: kinds.get(name, str)(value) for name, value in options.items()}
+    film = drop(loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, **options)
+    write_frames(output, pictures(loaded, film, spp=spp, progress=report), fps=24, force=True)
     return {"file": output}
 
 
-def _edited(progress: Progress, scene: str, edits: str) -> tuple[Scene, Scene]:
+def _edited(report: Report, scene: str, edits: str) -> tuple[Scene, Scene]:
     """The fitted scene, and the same after the list of edits (if there is one)."""
     from materialist.edits.recipe import apply, read_recipe
     from materialist.io.package import load_scene
 
-    progress("load", 0, 1)
+    report("load", 0, 1)
     loaded = load_scene(scene)
     return loaded, apply(loaded, read_recipe(edits)) if edits else loaded
 
 
-def _package(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
+def _package(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
     """The edited scene as a zipped package, its photo the composite."""
     from materialist.edits.composite.composite import composite, developed
     from materialist.io.package import save_scene
 
     result = loaded
     if edited is not loaded:
-        result = developed(loaded, edited, composite(loaded, edited, spp=spp, progress=progress))
+        result = developed(loaded, edited, composite(loaded, edited, spp=spp, progress=report))
     folder = partial(output, "") / output.with_suffix("").name
     folder.parent.mkdir()
-    progress("save", 0, 1)
+    report("save", 0, 1)
     save_scene(result, folder)
     _zip(folder, output)
 
 
-def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
+def _exported(report: Report, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
     """Another program's format; several files come as a zip."""
     from materialist.exporters.run import FOLDERS, export
 
-    progress("export", 0, 1)
+    report("export", 0, 1)
     if output.suffix != ".zip":
         export(edited, output, to=what, force=True)
         return
@@ -186,7 +187,7 @@ def _exported(progress: Progress, loaded: Scene, edited: Scene, output: Path, *,
     _zip(folder, output)
 
 
-def _turntable(progress: Progress, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
+def _turntable(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
     """`materialist relight --rotate 360`: the light once round, over the edits."""
     from materialist.edits.composite.composite import pictures
     from materialist.edits.light.frames import moving_light
@@ -194,7 +195,7 @@ def _turntable(progress: Progress, loaded: Scene, edited: Scene, output: Path, *
 
     ensure_video_writable(output, force=True)
     scenes = list(moving_light(edited, frames, rotate=360.0))
-    write_frames(output, pictures(loaded, scenes, spp=spp, progress=progress), fps=12, force=True)
+    write_frames(output, pictures(loaded, scenes, spp=spp, progress=report), fps=12, force=True)
 
 
 def _zip(folder: Path, output: Path) -> None:
@@ -206,13 +207,6 @@ def _zip(folder: Path, output: Path) -> None:
     shutil.rmtree(folder.parent, ignore_errors=True)
 
 
-def display(linear: Array) -> Array:
-    """[H, W, 3] linear to uint8 sRGB."""
-    from materialist.color import srgb_levels
-
-    return srgb_levels(linear)
-
-
 def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
     """A linear picture [H, W, 3] as a JPEG of at most `longest` pixels a side."""
     import cv2
@@ -220,7 +214,7 @@ def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
     scale = min(1.0, longest / max(linear.shape[:2]))
     size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
     small = np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
-    write_pixels(path, display(small))
+    write_pixels(path, srgb_levels(small))
 
 
 def write_pixels(path: Path, pixels: Array) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import lzma
 import re
-import shutil
-import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,17 +14,9 @@ MAX_MEGABYTES = 60
 """Largest upload."""
 MAX_PIXELS = 60_000_000
 """Largest picture, from its header."""
-MAX_UNPACKED = 1_500_000_000
-"""Largest scene package once unpacked, bytes."""
 PHOTOS = frozenset(
     (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr")
 )
-_MEMBER = re.compile(
-    r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
-    r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr|"
-    r"bodies/\d{1,4}\.(ply|(albedo|roughness|metallic)\.exr)"
-)
-"""The files of a scene package; nothing else is unpacked."""
 
 
 def checked_picture(path: Path, name: str) -> str:
@@ -107,53 +95,6 @@ def _exr_size(path: Path, shown: str) -> tuple[int, int]:
         raise InputError(f"{shown} is not a readable EXR file (truncated or damaged).") from error
 
 
-def unpack_scene(archive: Path, target: Path, name: str) -> None:
-    """Unpack a zipped scene package into `target`: known members only, under their own fixed names.
-
-    Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
-    """
-    shown = shown_name(name)
-    check_bytes(archive, shown)
-    try:
-        with readable_zip(shown, "zip the scene folder again"), zipfile.ZipFile(archive) as pack:
-            members = _members(pack, shown)
-            target.mkdir()
-            for entry, inside in members:
-                unpack_member(pack, entry, target / inside, shown)
-    except InputError:
-        shutil.rmtree(target, ignore_errors=True)
-        raise
-
-
-def _members(pack: zipfile.ZipFile, shown: str) -> list[tuple[zipfile.ZipInfo, str]]:
-    """Members that belong to a package, with their place in it; the package may lie in a folder of the zip."""
-    names = [info.filename for info in pack.infolist()[:10_000]]
-    root = next((n.removesuffix("scene.json") for n in names if re.fullmatch(r"([^/]+/)?scene\.json", n)), None)
-    if root is None:
-        raise InputError(f"{shown} holds no scene package (no scene.json); zip the folder that invert wrote.")
-    found = [
-        (info, info.filename.removeprefix(root))
-        for info in pack.infolist()
-        if info.filename.startswith(root) and _MEMBER.fullmatch(info.filename.removeprefix(root))
-    ]
-    total = sum(info.file_size for info, _ in found)
-    if total > MAX_UNPACKED:
-        raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {MAX_UNPACKED / 1e9:g} GB.")
-    return found
-
-
-def unpack_member(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, shown: str) -> None:
-    """One member, never more than its header promises."""
-    target.parent.mkdir(exist_ok=True)
-    left = entry.file_size
-    with pack.open(entry) as source, target.open("wb") as out:
-        while block := source.read(1 << 20):
-            left -= len(block)
-            if left < 0:
-                raise InputError(f"{shown} is not what its index says; zip it again.")
-            out.write(block)
-
-
 def checked_mesh(path: Path, name: str) -> str:
     """The suffix to store an uploaded mesh under. Raises InputError for a kind that could name other files.
 
@@ -190,19 +131,6 @@ def called(path: Path, name: str) -> Iterator[None]:
         yield
     except MaterialistError as error:
         raise type(error)(without_paths(str(error), path, shown_name(name))) from error
-
-
-_DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
-"""What the packers of a zip raise."""
-
-
-@contextmanager
-def readable_zip(shown: str, advice: str) -> Iterator[None]:
-    """Whatever is wrong with a zip file as an InputError that ends with the advice."""
-    try:
-        yield
-    except (*_DAMAGED, NotImplementedError, RuntimeError, EOFError, OSError) as error:
-        raise InputError(f"{shown} is not a readable zip file ({error}); {advice}.") from error
 
 
 def check_bytes(path: Path, shown: str) -> None:

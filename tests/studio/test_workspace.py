@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from materialist.errors import InputError, OutputError
-from materialist.studio.hub import Hub
-from materialist.studio.jobs import Jobs
-from materialist.studio.work import CARD, WorkFolder, default_root
+from materialist.jobs.queue import JobQueue
+from materialist.studio.studio import Studio
+from materialist.studio.workspace import CARD, WorkFolder, default_root
 
 
 def test_a_project_survives_a_restart(tmp_path):
@@ -42,17 +42,17 @@ def test_people_see_their_own(tmp_path):
 
 @pytest.mark.parametrize("name", ["../x", "photo-001/../..", "", "photo-1", ".cache"])
 def test_a_name_from_the_page_must_be_in_the_list(tmp_path, name):
-    hub = Hub(WorkFolder(tmp_path), Jobs(1))
-    hub.work.new("a", "me")
+    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
+    studio.work.new("a", "me")
     with pytest.raises(InputError):
-        hub.project(name, "me")
-    hub.jobs.close()
+        studio.project(name, "me")
+    studio.jobs.close()
 
 
 @pytest.mark.parametrize("person", ["", "a", "../up", "A B", "x" * 40])
 def test_a_desk_needs_a_plain_name(tmp_path, person):
     with pytest.raises(InputError):
-        WorkFolder(tmp_path).new("a", "me").desk(person)
+        WorkFolder(tmp_path).new("a", "me").workspace(person)
 
 
 def test_the_last_used_comes_first(tmp_path):

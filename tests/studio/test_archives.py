@@ -10,12 +10,12 @@ from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
-from materialist.studio import uploads
-from materialist.studio.desk import keep, write_mask
-from materialist.studio.pack import pack, unpack
+from materialist.studio import archives, objects, uploads
+from materialist.studio.archives import pack, unpack
+from materialist.studio.edit_list import EditList, summary
+from materialist.studio.objects import library_file
 from materialist.studio.session import Session
-from materialist.studio.stack import Stack, summary
-from materialist.studio.tab_object import library_file
+from materialist.studio.workspace import store, write_mask
 
 
 @pytest.fixture
@@ -24,61 +24,61 @@ def packed(session, tmp_path):
     write_png_bytes(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
-    session.materials({"texture": session.keep(tmp_path / "wood.png", "texture", ".png"), "roughness": "0.3"})
-    session.light(envmap=session.keep(tmp_path / "sky.exr", "light", ".exr"), gain="auto")
-    session.thing_option("mesh", library_file(session, "Cube"))
-    session.place(50, 40)
-    session.stack = session.stack.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))
+    session.material(texture=store(session.workspace, tmp_path / "wood.png", "texture", ".png"), roughness="0.3")
+    session.light(envmap=store(session.workspace, tmp_path / "sky.exr", "light", ".exr"), gain="auto")
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
+    objects.place(session, 50, 40)
+    session.edits = session.edits.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))
     session.save()
-    pack(session.stack.steps, session.desk / "edits.yaml", tmp_path / "edits.zip")
+    pack(session.edits.steps, session.workspace / "edits.yaml", tmp_path / "edits.zip")
     return session, tmp_path / "edits.zip"
 
 
-def other_photo(hub, session) -> Session:
+def other_photo(studio, session) -> Session:
     """Another photo of the same shape, without edits."""
     other = Session("me")
-    other.open(hub.work.new("Another", "me", scene=session.project.scene))
+    other.open(studio.work.new("Another", "me", scene=session.project.scene))
     return other
 
 
-def test_what_was_taken_away_comes_back_on_another_photo(hub, packed):
+def test_what_was_taken_away_comes_back_on_another_photo(studio, packed):
     session, file = packed
     with zipfile.ZipFile(file) as made:
         assert len(made.namelist()) == 5  # the list, a mask, a texture, a light, a mesh: also one in a list of meshes
-    other = other_photo(hub, session)
+    other = other_photo(studio, session)
     other.read_edits(file)
-    assert [step.kind for step in other.stack.steps] == ["edit", "relight", "insert", "drop"]
-    ours, theirs = (apply(page.scene, list(page.stack.steps)) for page in (session, other))
+    assert [step.kind for step in other.edits.steps] == ["edit", "relight", "insert", "drop"]
+    ours, theirs = (apply(page.scene, list(page.edits.steps)) for page in (session, other))
     assert np.array_equal(ours.materials.albedo, theirs.materials.albedo) and len(theirs.bodies) == 1
-    assert not list(other.desk.glob("thing-*")) and not list(other.desk.glob(".load-*"))
-    assert len(list(other.desk.iterdir())) == 5
+    assert not list(other.workspace.glob("thing-*")) and not list(other.workspace.glob(".load-*"))
+    assert len(list(other.workspace.iterdir())) == 5
     other.read_edits(file)  # again: the same files
-    assert len(list(other.desk.iterdir())) == 5
+    assert len(list(other.workspace.iterdir())) == 5
     other.close()
-    options = [step.options for step in session.stack.steps]
+    options = [step.options for step in session.edits.steps]
     session.read_edits(file)  # where the files are still there
-    assert [step.options for step in session.stack.steps] == options
+    assert [step.options for step in session.edits.steps] == options
 
 
-def test_a_list_of_another_photo_does_not_take_this_one_s_files(hub, session, tmp_path):
-    other = other_photo(hub, session)
+def test_a_list_of_another_photo_does_not_take_this_one_s_files(studio, session, tmp_path):
+    other = other_photo(studio, session)
     for page, at in ((session, (25, 24)), (other, (50, 40))):
         click(page, *at)
-        page.material("hue", "40")
-    masks = [page.stack.steps[0].options["mask"] for page in (session, other)]
+        page.material(hue="40")
+    masks = [page.edits.steps[0].options["mask"] for page in (session, other)]
     assert masks[0] != masks[1]
-    before = other.stack
+    before = other.edits
     with pytest.raises(InputError, match="is not here; load the zip"):
-        other.read_edits(session.desk / "edits.yaml")
-    assert other.stack == before
+        other.read_edits(session.workspace / "edits.yaml")
+    assert other.edits == before
     other.close()
 
 
 def test_old_names_still_count(session, tmp_path):
-    write_png_bytes(session.desk / "mask-1.png", block().astype(np.uint8) * 255)
+    write_png_bytes(session.workspace / "mask-1.png", block().astype(np.uint8) * 255)
     (tmp_path / "edits.yaml").write_text("- edit: {mask: mask-1.png, hue: 40}")
     session.read_edits(tmp_path / "edits.yaml")
-    assert session.stack.steps[0].options["mask"] == "mask-1.png"
+    assert session.edits.steps[0].options["mask"] == "mask-1.png"
 
 
 def test_files_are_called_by_their_content(tmp_path):
@@ -86,7 +86,7 @@ def test_files_are_called_by_their_content(tmp_path):
     assert write_mask(tmp_path, block()) == first != write_mask(tmp_path, ~block())
     (tmp_path / "a").write_text("a")
     (tmp_path / "b").write_text("b")
-    names = [keep(tmp_path, tmp_path / name, "mesh", ".ply") for name in "aab"]
+    names = [store(tmp_path, tmp_path / name, "mesh", ".ply") for name in "aab"]
     assert names[0] == names[1] != names[2] and (tmp_path / names[2]).read_text() == "b"
     assert summary(Step("insert", {"mesh": names[0], "scale": "2"})) == "Object: mesh own, scale 2"
 
@@ -126,7 +126,7 @@ def test_zips_that_are_refused(tmp_path, monkeypatch, members, words):
 def test_a_zip_that_would_fill_the_disk_or_is_none(tmp_path, monkeypatch):
     desk = tmp_path / "desk"
     desk.mkdir()
-    monkeypatch.setattr(uploads, "MAX_UNPACKED", 1_000_000)
+    monkeypatch.setattr(archives, "MAX_UNPACKED", 1_000_000)
     with pytest.raises(InputError, match="unpacks to"):
         unpack(desk, zipped(tmp_path, {"edits.yaml": LIST, "m.png": "x" * 2_000_000}))
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
@@ -142,7 +142,7 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     desk.mkdir()
     (step,) = unpack(desk, zipped(tmp_path, members))
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
-    assert not (tmp_path / "e").exists() and Stack((step,)).active
+    assert not (tmp_path / "e").exists() and EditList((step,)).active
 
 
 @pytest.mark.parametrize("names", ["__MACOSX/edits.yaml room/edits.yaml room/m.png", "room\\edits.yaml room\\m.png"])

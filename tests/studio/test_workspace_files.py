@@ -5,7 +5,7 @@ import pytest
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError, OutputError
-from materialist.studio.desk import confined, write_mask
+from materialist.studio.workspace import confined, write_mask
 
 
 def test_every_file_of_a_list_is_looked_at(tmp_path):

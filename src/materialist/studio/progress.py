@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from materialist.studio.jobs import FAILED, QUEUED, STOPPED, Job, Jobs
+from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.jobs.worker import FAILED
 from materialist.studio.uploads import without_paths
 
 _EVERY = 0.3
@@ -27,7 +28,7 @@ _SHARE = {
 """Stage of an inversion -> where its part of the bar begins and ends, by the seconds that it usually takes."""
 
 
-def follow(jobs: Jobs, job: Job) -> Iterator[str]:
+def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
     """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
     last = ""
     while not job.over:
@@ -39,7 +40,7 @@ def follow(jobs: Jobs, job: Job) -> Iterator[str]:
     yield shown(jobs, job)
 
 
-def shown(jobs: Jobs, job: Job) -> str:
+def shown(jobs: JobQueue, job: Job) -> str:
     """One state as HTML."""
     if job.state == QUEUED:
         ahead = jobs.ahead(job)
@@ -58,9 +59,11 @@ def failure(job: Job) -> str:
     """Why a job failed, its files by their names alone; the photo as its owner calls it."""
     text = job.message
     for key in ("photo", "scene", "edits", "output", "mesh"):
-        if key in job.spec:
-            file = Path(job.spec[key])
-            text = without_paths(text, file, str(job.spec.get("title", file.name)) if key == "photo" else file.name)
+        if key in job.arguments:
+            file = Path(job.arguments[key])
+            text = without_paths(
+                text, file, str(job.arguments.get("title", file.name)) if key == "photo" else file.name
+            )
     return text
 
 

@@ -1,4 +1,4 @@
-"""The list of edits in the making. It is the same thing as edits.yaml: steps of `edit.recipe`."""
+"""The list of edits in the making. It is the same thing as edits.yaml: steps of `edits.recipe`."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ _WORDS = {
     "edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fallen", "remove": "Removed",
 }  # fmt: skip
 _PLAIN = {"remove": "the object", "glass": "clear"}
-"""What to say of a step without options."""
+"""Summary of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness")
 """Options that a summary leaves out: the picture shows them."""
 _OWN = re.compile(r"[a-z]+-[0-9a-f]{12}")
-"""What `desk.keep` calls a file that was uploaded."""
+"""The name that `workspace.store` gives an uploaded file."""
 
 
 @dataclass(frozen=True)
-class Stack:
+class EditList:
     """Steps in the order of their application, and which of them the sliders move."""
 
     steps: tuple[Step, ...] = ()
     current: int | None = None
 
-    def add(self, step: Step) -> Stack:
-        return Stack((*self.steps, step), len(self.steps))
+    def add(self, step: Step) -> EditList:
+        return EditList((*self.steps, step), len(self.steps))
 
-    def put(self, index: int, step: Step) -> Stack:
+    def put(self, index: int, step: Step) -> EditList:
         """With another step in the place of one."""
-        return Stack((*self.steps[:index], step, *self.steps[index + 1 :]), index)
+        return EditList((*self.steps[:index], step, *self.steps[index + 1 :]), index)
 
-    def toggled(self, index: int) -> Stack:
+    def toggled(self, index: int) -> EditList:
         """With a step switched off, which takes it out of hand, or on again; any other in hand stays there."""
         step = self.steps[index]
-        after = self.put(index, told(step, skip=None if step.skipped else "true"))
+        after = self.put(index, with_options(step, skip=None if step.skipped else "true"))
         return after.chosen(None if after.steps[index].skipped and self.current == index else self.current)
 
-    def moved(self, index: int, by: int) -> Stack:
+    def moved(self, index: int, by: int) -> EditList:
         """With a step further up (by = -1) or down (+1); the one in hand stays in hand, wherever it is then."""
         other = index + by
         if not 0 <= other < len(self.steps):
@@ -48,18 +48,18 @@ class Stack:
         steps = list(self.steps)
         steps[index], steps[other] = steps[other], steps[index]
         current = other if self.current == index else index if self.current == other else self.current
-        return Stack(tuple(steps), current)
+        return EditList(tuple(steps), current)
 
-    def without(self, index: int) -> Stack:
-        return Stack((*self.steps[:index], *self.steps[index + 1 :]), None)
+    def without(self, index: int) -> EditList:
+        return EditList((*self.steps[:index], *self.steps[index + 1 :]), None)
 
-    def chosen(self, index: int | None) -> Stack:
+    def chosen(self, index: int | None) -> EditList:
         return replace(self, current=index)
 
-    def last(self, kind: str) -> int | None:
-        """The place of the last step of a kind."""
-        places = [k for k, step in enumerate(self.steps) if step.kind == kind]
-        return places[-1] if places else None
+    @property
+    def in_hand(self) -> Step | None:
+        """The step that the sliders move."""
+        return self.steps[self.current] if self.current is not None else None
 
     @property
     def light(self) -> int | None:
@@ -74,7 +74,7 @@ class Stack:
         return tuple(step for step in self.steps if not step.skipped)
 
 
-def told(step: Step, **options: Any) -> Step:
+def with_options(step: Step, **options: Any) -> Step:
     """The step with some options set, or cleared (None)."""
     return replace(step, options={k: v for k, v in {**step.options, **options}.items() if v is not None})
 

@@ -1,25 +1,41 @@
-"""The work folder: one folder a photo, which survives reloads, restarts and closed browsers."""
+"""The work folder: one folder a photo, and in it a workspace a person: edits.yaml and its files, under names of ours.
+
+It survives reloads, restarts and closed browsers.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
 import shutil
 import tempfile
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import psutil
 
+from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError, OutputError
+from materialist.io.beside import partial
+from materialist.types import Array
 
 CARD = "project.json"
 """The file that makes a folder a project: title, owner, where the scene is."""
 SCENE = "photo.scene"
 _NAME = re.compile(r"photo-\d{3,6}")
 _PERSON = re.compile(r"[a-z0-9]{2,32}")
+FILES = ("mask", "texture", "envmap", "mesh", "background")
+"""Options that name a file."""
+WORDS = ("thickness", "inpaint")
+"""Options that name a method, or a file."""
+_TEMPORARY = re.compile(r"(?:final|job)-(?:(\d+)-)?[0-9a-f]+\.(?:png|exr|jpg|yaml)")
+"""What `session.Session` writes for a while: which process, and a mark of the page or the content."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +60,10 @@ class Project:
         """Whether the inversion has finished."""
         return (self.scene / "scene.json").is_file()
 
-    def desk(self, person: str) -> Path:
+    def workspace(self, person: str) -> Path:
         """The folder for the edits and results of one person; made on first use. Raises OutputError."""
         if not _PERSON.fullmatch(person):
-            raise InputError(f"{person!r} is not a valid name for a desk.")
+            raise InputError(f"{person!r} is not a valid name for a workspace.")
         folder = self.folder / f"edits-{person}"
         _make(folder)
         return folder
@@ -146,3 +162,88 @@ def _make(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"The folder {folder} cannot be made: {error.strerror or error}.") from error
+
+
+def new_name(workspace: Path, stem: str, suffix: str) -> Path:
+    """A free place in the workspace: STEM-1SUFFIX, STEM-2SUFFIX, ..."""
+    pattern = re.compile(rf"{re.escape(stem)}-(\d+)\.")
+    taken = [int(m[1]) for p in workspace.iterdir() if (m := pattern.match(p.name))]
+    return workspace / f"{stem}-{max(taken, default=0) + 1}{suffix}"
+
+
+def store(workspace: Path, file: Path, stem: str, suffix: str) -> str:
+    """Copy an uploaded file (checked before) to the workspace; returns its name there, which tells its content."""
+    return _written(workspace / _name(stem, file.read_bytes(), suffix), lambda place: shutil.copyfile(file, place))
+
+
+def write_mask(workspace: Path, mask: Array) -> str:
+    """Write a mask [H, W] bool; returns its name, which tells its content: no other photo has one of that name."""
+    from materialist.io.image import write_png_bytes
+
+    file = workspace / _name("mask", f"{mask.shape}".encode() + np.packbits(mask).tobytes(), ".png")
+    return _written(file, lambda place: write_png_bytes(place, mask.astype(np.uint8) * 255))
+
+
+def _written(file: Path, write: Callable[[Path], Any]) -> str:
+    """The name of a file that is there whole, or is written so."""
+    if not file.is_file():
+        temporary = partial(file)
+        try:
+            write(temporary)
+            os.replace(temporary, file)
+        finally:
+            temporary.unlink(missing_ok=True)
+    return file.name
+
+
+def _name(stem: str, content: bytes, suffix: str) -> str:
+    return f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
+
+
+def tidy(workspace: Path) -> None:
+    """Remove path-traced pictures and lists of jobs that pages have left; those of another studio that runs stay."""
+    for file in workspace.iterdir():
+        left = _TEMPORARY.fullmatch(file.name)
+        if left and (left[1] is None or int(left[1]) == os.getpid() or not psutil.pid_exists(int(left[1]))):
+            file.unlink(missing_ok=True)
+
+
+def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
+    """The steps of a list of edits, which may name files of this workspace only. Raises InputError."""
+    return tuple(confined(step, workspace) for step in read_list(file))
+
+
+def read_list(file: Path) -> list[Step]:
+    """`read_recipe`, with messages that do not say where the file lies."""
+    try:
+        return read_recipe(file)
+    except InputError as error:
+        raise InputError(str(error).replace(str(file), "the file")) from error
+
+
+def confined(step: Step, workspace: Path) -> Step:
+    """The step with its files in the workspace. Raises InputError where a file lies elsewhere or is missing."""
+
+    def here(option: str, name: str) -> str:
+        if not (workspace / name).is_file():
+            raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
+        return name
+
+    return replace(with_files(step, here), folder=workspace)
+
+
+def with_files(step: Step, use: Callable[[str, str], str]) -> Step:
+    """The step with `use(option, name)` in the place of each file that it names. Raises InputError for odd names."""
+
+    def used(option: str, value: Any) -> Any:
+        if option in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value):
+            return value
+        if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
+            raise InputError(f"The {option} {value!r} must be a plain file name, as in mask-1.png.")
+        return use(option, value)
+
+    options = dict(step.options)
+    for option in {*FILES, *WORDS} & {*options}:
+        given = options[option]
+        options[option] = [used(option, value) for value in given] if isinstance(given, list) else used(option, given)
+    return replace(step, options=options)

@@ -7,25 +7,26 @@ import pytest
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError
-from materialist.studio.hub import ALONE, Hub
-from materialist.studio.jobs import Jobs
-from materialist.studio.server import check_host, check_port, first_target, new_hub
-from materialist.studio.work import WorkFolder
+from materialist.jobs.queue import JobQueue
+from materialist.studio.server import check_host, check_port, first_target, new_studio
+from materialist.studio.studio import ALONE, Studio
+from materialist.studio.workspace import WorkFolder
 
 
 @pytest.fixture
 def shared(tmp_path):
-    hub = Hub(WorkFolder(tmp_path), Jobs(1), alone=False)
-    yield hub
-    hub.jobs.close()
+    studio = Studio(WorkFolder(tmp_path), JobQueue(1), alone=False)
+    yield studio
+    studio.jobs.close()
 
 
 def test_a_page_shows_what_it_showed_before_or_what_the_studio_was_started_on(shared):
     mine, given = shared.work.new("Mine", "a" * 16), shared.work.new("Given", ALONE)
-    assert shared.here(shared.kept(mine)) and not shared.here("other/" + mine.name) and not shared.here("")
-    assert shared.first("") == "" and shared.first(None) == "" and shared.first(shared.kept(mine)) == mine.name
+    assert shared.is_bookmark(shared.bookmark(mine)) and not shared.is_bookmark("other/" + mine.name)
+    assert not shared.is_bookmark("")
+    assert shared.first("") == "" and shared.first(None) == "" and shared.first(shared.bookmark(mine)) == mine.name
     shared.start = given
-    assert shared.first("") == given.name and shared.first(shared.kept(mine)) == mine.name
+    assert shared.first("") == given.name and shared.first(shared.bookmark(mine)) == mine.name
     assert shared.first(f"another/{mine.name}") == given.name  # of a studio that has ended
 
 
@@ -46,7 +47,8 @@ def test_people_are_kept_apart(shared):
     assert shared.session("page") is session
     shared.leave("page")
     shared.leave("page")
-    assert shared.open_pages == 0
+    with pytest.raises(InputError, match="reload"):
+        shared.session("page")
 
 
 @pytest.mark.parametrize("token", [None, "", "../../x", "A" * 20, "a" * 40, 5])
@@ -56,9 +58,9 @@ def test_tokens_are_checked(shared, token):
 
 
 def test_alone_everyone_is_me(tmp_path):
-    hub = Hub(WorkFolder(tmp_path), Jobs(1))
-    assert hub.person("whatever") == ALONE
-    hub.jobs.close()
+    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
+    assert studio.person("whatever") == ALONE
+    studio.jobs.close()
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.8.8.8"])
@@ -101,21 +103,21 @@ def test_a_scene_elsewhere_is_known_again(tmp_path):
     scene = tmp_path / "kitchen.scene"
     scene.mkdir()
     (scene / "scene.json").write_text("{}")
-    hub = new_hub(tmp_path / "work", alone=True)
-    first = first_target(hub.work, str(scene))
-    assert first.scene == scene and first == first_target(hub.work, str(scene))
-    assert first_target(hub.work, None) is None
-    assert first_target(hub.work, "example:coffee").name == "coffee.png"
+    studio = new_studio(tmp_path / "work", alone=True)
+    first = first_target(studio.work, str(scene))
+    assert first.scene == scene and first == first_target(studio.work, str(scene))
+    assert first_target(studio.work, None) is None
+    assert first_target(studio.work, "example:coffee").name == "coffee.png"
     (tmp_path / "a.txt").write_text("x")
     with pytest.raises(InputError, match="not a photo"):
-        first_target(hub.work, str(tmp_path / "a.txt"))
-    hub.jobs.close()
+        first_target(studio.work, str(tmp_path / "a.txt"))
+    studio.jobs.close()
 
 
 def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
-    hub = new_hub(tmp_path / "work", alone=True)
-    file = hub.work.root / "result.png"
+    studio = new_studio(tmp_path / "work", alone=True)
+    file = studio.work.root / "result.png"
     file.write_bytes(b"x")
-    first, second = hub.handed(file), hub.handed(file)
-    assert first != second and first.startswith(str(hub.work.cache)) and len(first.split("/")[-2]) == 32
-    hub.jobs.close()
+    first, second = studio.public_copy(file), studio.public_copy(file)
+    assert first != second and first.startswith(str(studio.work.cache)) and len(first.split("/")[-2]) == 32
+    studio.jobs.close()

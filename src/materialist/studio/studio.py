@@ -1,4 +1,4 @@
-"""The running studio: its work folder, its queue, and the pages that are open."""
+"""The running studio: its work folder, its queue of jobs, and the pages that are open."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ import secrets
 import shutil
 import threading
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
-from materialist.studio.desk import tidy
-from materialist.studio.jobs import Jobs
+from materialist.jobs.queue import Job, JobQueue
+from materialist.studio import tasks
 from materialist.studio.session import Session
-from materialist.studio.work import Project, WorkFolder
+from materialist.studio.workspace import Project, WorkFolder, tidy
 
 ALONE = "me"
 """The person, where the studio serves this machine only."""
@@ -26,18 +27,19 @@ _LEAST_FREE = 1.2e9
 
 
 @dataclass
-class Hub:
+class Studio:
     """What all pages share."""
 
     work: WorkFolder
-    jobs: Jobs
+    jobs: JobQueue
     alone: bool = True
     """Served on this machine only: everyone on it is the same person."""
     start: Project | Path | None = None
     """What to open first: a scene, or a photo to show on the opening tab."""
-    examples: bool = True
     seed: int = 0
     """Of inversions."""
+    device: str = "auto"
+    """Of jobs, as `invert` takes it."""
     run: str = field(default_factory=lambda: secrets.token_hex(4))
     """Tells this studio from the ones before it in what a browser keeps."""
     _sessions: dict[str, Session] = field(default_factory=dict)
@@ -76,12 +78,12 @@ class Hub:
                 return project
         raise InputError("This photo is no longer in the work folder; open it again.")
 
-    def kept(self, project: Project) -> str:
-        """What a browser keeps of the photo it shows."""
+    def bookmark(self, project: Project) -> str:
+        """The text by which a browser remembers the photo it shows."""
         return f"{self.run}/{project.name}"
 
-    def here(self, kept: Any) -> bool:
-        """Whether what a browser kept is of this studio, and not of one before it."""
+    def is_bookmark(self, kept: Any) -> bool:
+        """Whether a browser kept this text from this studio, and not from one before it."""
         return str(kept or "").rpartition("/")[0] == self.run
 
     def first(self, kept: Any) -> str:
@@ -106,12 +108,22 @@ class Hub:
         self.work.touch(project)
 
     def _tidy(self, project: Project, person: str) -> None:
-        """Clear a desk that no page has open, and no job writes to, of what earlier ones left."""
-        desk = project.desk(person)
+        """Remove what earlier pages left in a workspace that no page has open and no job writes to."""
+        workspace = project.workspace(person)
         with self._lock:
             pages = [one for one in self._sessions.values() if one.person == person and one.project == project]
-        if not pages and not any(job.folder == desk and not job.over for job in self.jobs.of(person)):
-            tidy(desk)
+        if not pages and not any(job.folder == workspace and not job.over for job in self.jobs.of(person)):
+            tidy(workspace)
+
+    def job(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
+        """A job for a page: a function of `tasks`, which writes into `folder`."""
+        return Job(task.__name__, session.person, folder, partial(tasks.on_device, self.device, task), arguments)
+
+    def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
+        """Put a job for a page in the queue."""
+        job = self.jobs.submit(self.job(session, task, folder, **arguments))
+        session.note_job(job)
+        return job
 
     def leave(self, page: str | None) -> None:
         """Forget a page that was closed, its memory, and its renderings; its work and its inversions go on."""
@@ -123,8 +135,8 @@ class Hub:
             del session
             free()
 
-    def handed(self, file: Path) -> str:
-        """A copy of a result in the cache, from where alone files are served, in a folder whose name nobody guesses."""
+    def public_copy(self, file: Path) -> str:
+        """A copy of a result in the cache, the only place of served files, in a folder with a random name."""
         folder = self.work.cache / secrets.token_hex(16)
         try:
             folder.mkdir()
@@ -136,10 +148,6 @@ class Hub:
         except OSError as error:
             raise OutputError(f"The file {file.name} cannot be handed over: {error.strerror or error}.") from error
         return str(copy)
-
-    @property
-    def open_pages(self) -> int:
-        return len(self._sessions)
 
 
 def free() -> None:

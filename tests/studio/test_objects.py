@@ -9,45 +9,46 @@ from studio_scenes import click, named
 
 from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError, SetupError
-from materialist.studio import things
-from materialist.studio.context import glass_values, thing_values
-from materialist.studio.glass import State
-from materialist.studio.live import Live
+from materialist.studio import objects
+from materialist.studio.edit_list import EditList
+from materialist.studio.glass import GlassState
+from materialist.studio.objects import library_file
+from materialist.studio.preview import LivePreview
 from materialist.studio.selection import read_pick
-from materialist.studio.stack import Stack
-from materialist.studio.tab_object import library_file
+from materialist.studio.stage import stage
+from materialist.studio.widgets import glass_values, object_values
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):
     pytest.importorskip("mujoco", reason="needs the physics extra")
-    floor = Live(floor_scene(64, 48))
+    floor = LivePreview(floor_scene(64, 48))
     monkeypatch.setattr(session, "live", floor)
     with pytest.raises(InputError, match="Place an object first"):
-        things.let_fall(session, 1.0)
-    session.thing_option("mesh", library_file(session, "Cube"))
-    session.thing_option("scale", "0.5")
-    session.place(32, 34)
-    stands = session.live.edited(session.stack.active).bodies[0]
-    assert things.let_fall(session, 0.5) == []
-    step = session.stack.steps[0]
-    assert [s.kind for s in session.stack.steps] == ["drop"] and session.in_hand == "drop"
+        objects.let_fall(session, 1.0)
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
+    objects.set_option(session, "scale", "0.5")
+    objects.place(session, 32, 34)
+    stands = session.live.edited(session.edits.active).bodies[0]
+    assert objects.let_fall(session, 0.5) == []
+    step = session.edits.steps[0]
+    assert [s.kind for s in session.edits.steps] == ["drop"] and session.in_hand == "drop"
     assert step.options["at"] == ["32", "34"] and step.options["scale"] == "0.5" and step.options["seed"] == "0"
-    lies = session.live.edited(session.stack.active).bodies[0]
+    lies = session.live.edited(session.edits.active).bodies[0]
     assert lies.vertices.shape == stands.vertices.shape and np.abs(lies.vertices - stands.vertices).max() > 0.01
-    replayed = apply(floor.scene, read_recipe(session.desk / "edits.yaml")).bodies[0]
+    replayed = apply(floor.scene, read_recipe(session.workspace / "edits.yaml")).bodies[0]
     np.testing.assert_allclose(replayed.vertices, lies.vertices, atol=1e-6)
-    things.let_fall(session, 0.5)
-    assert session.stack.steps[0].options["seed"] == "1" and len(session.stack.steps) == 1
-    again = session.live.edited(session.stack.active).bodies[0]
+    objects.let_fall(session, 0.5)
+    assert session.edits.steps[0].options["seed"] == "1" and len(session.edits.steps) == 1
+    again = session.live.edited(session.edits.active).bodies[0]
     assert np.abs(again.vertices - lies.vertices).max() > 1e-3
     assert session.undo() and session.undo()
-    assert [s.kind for s in session.stack.steps] == ["insert"]
+    assert [s.kind for s in session.edits.steps] == ["insert"]
     floor.close()
 
 
 def test_what_fell_in_vain_tumbles_in_another_way(session, monkeypatch):
-    session.thing_option("mesh", library_file(session, "Ball"))
-    session.place(50, 40)
+    objects.set_option(session, "mesh", library_file(session, "Ball"))
+    objects.place(session, 50, 40)
     real, seeds = session.live.edited, []
 
     def falls(steps):
@@ -61,52 +62,52 @@ def test_what_fell_in_vain_tumbles_in_another_way(session, monkeypatch):
     monkeypatch.setattr(session.live, "edited", falls)
     for _ in range(2):
         with pytest.raises(InputError, match="seed"):
-            things.let_fall(session, 1.0)
-    assert things.tries(session, session.stack.steps[0]) == 2
+            objects.let_fall(session, 1.0)
+    assert objects.failures(session, session.edits.steps[0]) == 2
     for _ in range(2):
-        things.let_fall(session, 1.0)
-    assert seeds[:3] == ["0", "1", "2"] and session.stack.steps[0].options["seed"] == "3"
-    assert things.tries(session, session.stack.steps[0]) == 0  # one that has landed counts anew
+        objects.let_fall(session, 1.0)
+    assert seeds[:3] == ["0", "1", "2"] and session.edits.steps[0].options["seed"] == "3"
+    assert objects.failures(session, session.edits.steps[0]) == 0  # one that has landed counts anew
 
 
 def test_choosing_an_object_brings_its_values(session):
-    session.thing_option("mesh", library_file(session, "Ring"))
+    objects.set_option(session, "mesh", library_file(session, "Ring"))
     for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):
-        session.thing_option(name, value)
-    session.place(50, 40)
-    session.thing_option("mesh", library_file(session, "Cube"))
+        objects.set_option(session, name, value)
+    objects.place(session, 50, 40)
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
     for name, value in (("scale", "2"), ("turn", None), ("material", "mirror")):
-        session.thing_option(name, value)
-    assert thing_values(session) == {}  # nothing in hand: the controls are for the next
-    session.place(15, 40)
+        objects.set_option(session, name, value)
+    assert object_values(session) == {}  # nothing in hand: the controls are for the next
+    objects.place(session, 15, 40)
     session.act("choose", 0)
     ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
-    assert thing_values(session) == ring
+    assert object_values(session) == ring
     shown = named().everything(session)
     assert {name: shown[name] for name in ring} == ring
     session.deselect()
-    session.place(30, 40)  # the next is as the controls show it
-    assert session.stack.steps[2].options == {**session.stack.steps[0].options, "at": ["30", "40"]}
+    objects.place(session, 30, 40)  # the next is as the controls show it
+    assert session.edits.steps[2].options == {**session.edits.steps[0].options, "at": ["30", "40"]}
     session.act("choose", 1)
-    values = thing_values(session)
+    values = object_values(session)
     assert (values["thing"], values["scale"], values["turn"], values["made_of"]) == ("Cube", 2, 0, "mirror")
-    fallen = things.fallen(session.stack.steps[1], 2.5)
-    session.stack = Stack((replace(fallen, options={**fallen.options, "mesh": "mesh-1.glb"}),), 0)
-    values = thing_values(session)
+    fallen = objects.fallen(session.edits.steps[1], 2.5)
+    session.edits = EditList((replace(fallen, options={**fallen.options, "mesh": "mesh-1.glb"}),), 0)
+    values = object_values(session)
     assert (values["thing"], values["scale"], values["height"]) == (None, 2, 2.5)
 
 
 def test_what_rolls_out_of_the_picture_is_told(session):
     pytest.importorskip("mujoco", reason="needs the physics extra")
-    session.thing_option("mesh", library_file(session, "Cube"))
-    session.place(50, 40)  # at a wall, with no floor below
-    assert "where the camera does not look" in things.let_fall(session, 0.5)[-1]
+    objects.set_option(session, "mesh", library_file(session, "Cube"))
+    objects.place(session, 50, 40)  # at a wall, with no floor below
+    assert "where the camera does not look" in objects.let_fall(session, 0.5)[-1]
 
 
 def test_what_falls_beside_everything_changes_nothing(session, monkeypatch):
-    session.thing_option("mesh", library_file(session, "Ball"))
-    session.place(50, 40)
-    before = session.stack
+    objects.set_option(session, "mesh", library_file(session, "Ball"))
+    objects.place(session, 50, 40)
+    before = session.edits
     for error in (InputError("it falls beside everything"), SetupError("pip install it")):
 
         def refuse(steps, error=error):
@@ -114,17 +115,17 @@ def test_what_falls_beside_everything_changes_nothing(session, monkeypatch):
 
         monkeypatch.setattr(session.live, "edited", refuse)
         with pytest.raises(type(error)):
-            things.let_fall(session, 1.0)
-        assert session.stack == before
+            objects.let_fall(session, 1.0)
+        assert session.edits == before
     scene = session.scene
 
     def meanwhile(steps):
-        session.stack = Stack()
+        session.edits = EditList()
         return scene
 
     monkeypatch.setattr(session.live, "edited", meanwhile)
     with pytest.raises(InputError, match="changed while"):
-        things.let_fall(session, 1.0)
+        objects.let_fall(session, 1.0)
 
 
 class _Tracer:
@@ -132,11 +133,11 @@ class _Tracer:
 
     def __init__(self):
         self.asked, self.kept = [], None
-        self.state = State(0, False, "")
+        self.state = GlassState(0, False, "")
 
     def ask(self, others, step):
         self.asked.append((others, step.options["ior"]))
-        self.state = State(len(self.asked), True, "Tracing")
+        self.state = GlassState(len(self.asked), True, "Tracing")
 
     def pane(self, step):
         return None
@@ -144,7 +145,7 @@ class _Tracer:
     def keep(self, steps):
         self.kept = steps
 
-    def rest(self):
+    def stop(self):
         self.kept = ()
 
 
@@ -152,19 +153,19 @@ def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
     tracer = _Tracer()
     monkeypatch.setattr(session, "glass", tracer)
     click(session)
-    session.material("hue", "90")
+    session.material(hue="90")
     with pytest.raises(InputError, match="index of refraction"):
         session.region_step("glass", ior="9")
     session.region_step("glass", ior="1.3", transmission="1")
-    shown = session.stage()
+    shown = stage(session)
     assert session.in_hand == "glass" and shown["waiting"] and shown["asked"] == 1 and "sketch" in shown["badge"]
     assert [(len(others), ior) for others, ior in tracer.asked] == [(1, "1.3")]
-    session.material("ior", "1.4", "glass")
-    session.stage()
+    session.material(kind="glass", ior="1.4")
+    stage(session)
     assert tracer.asked[-1][1] == "1.4" and glass_values(session)["glass_ior"] == 1.4
     session.act("choose", 0)
-    session.material("hue", "100")
-    session.stage()
+    session.material(hue="100")
+    stage(session)
     assert len(tracer.asked) == 2 and glass_values(session) == {}  # another edit is in hand
     session.act("remove", 1)
     assert [step.kind for step in tracer.kept] == ["edit"]

@@ -10,8 +10,9 @@ from studio_scenes import block, package, room
 from materialist.edits.light.relight import checked_envmap
 from materialist.errors import InputError
 from materialist.io.examples import example_path
-from materialist.studio import lights, tasks, views
-from materialist.studio.tab_material import hex_colour
+from materialist.studio import lights, stage, tasks
+from materialist.studio.selection import Selection
+from materialist.studio.widgets import hex_colour
 
 
 def decoded(url: str) -> np.ndarray:
@@ -20,20 +21,20 @@ def decoded(url: str) -> np.ndarray:
 
 
 def test_the_stage_shows_the_photo_and_the_mask():
-    picture = decoded(views.jpeg_url(room().photo.linear))[..., ::-1]
+    picture = decoded(stage.jpeg_url(room().photo.linear))[..., ::-1]
     assert picture.shape == (48, 64, 3) and picture[24, 25, 0] > 180 > picture[24, 25, 1]
-    urls = views.mask_urls(block())
+    urls = Selection((block(),)).pictures
     assert np.array_equal(decoded(urls["fill"])[..., 3] > 0, block())
     outline = decoded(urls["outline"])[..., 3] > 0
     assert outline.any() and not outline[24, 25]
-    assert views.mask_urls(None) == {"fill": "", "outline": ""}
+    assert Selection().pictures == {"fill": "", "outline": ""}
 
 
 def test_the_report_is_plain_and_harmless():
-    text = views.report(room())
+    text = stage.report(room())
     assert "close to the photo" in text and "31.5 dB" in text and "too dark" in text and "40.0°" in text
-    assert views._safe("<img src=x> [a](b)") == "&lt;img src=x> &#91;a](b)"
-    assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in views.maps(room())) and len(views.maps(room())) == 8
+    assert stage._safe("<img src=x> [a](b)") == "&lt;img src=x> &#91;a](b)"
+    assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in stage.maps(room())) and len(stage.maps(room())) == 8
 
 
 @pytest.mark.parametrize("name", lights.names())
@@ -70,12 +71,12 @@ class Told:
 
 
 def test_the_photo_task(tmp_path):
-    facts = tasks.do_photo(Told(), str(example_path("coffee")), str(tmp_path / "small.jpg"))
+    facts = tasks.photo(Told(), str(example_path("coffee")), str(tmp_path / "small.jpg"))
     assert (facts["width"], facts["height"], facts["fov"], facts["fov_source"]) == (600, 400, 35.0, "default")
     assert cv2.imread(str(tmp_path / "small.jpg")).shape == (341, 512, 3)
     (tmp_path / "broken.png").write_bytes(example_path("coffee").read_bytes()[:5000])
     with pytest.raises(InputError, match="damaged"):
-        tasks.do_photo(Told(), str(tmp_path / "broken.png"), str(tmp_path / "small.jpg"))
+        tasks.photo(Told(), str(tmp_path / "broken.png"), str(tmp_path / "small.jpg"))
 
 
 def test_what_was_found_is_shown(tmp_path):
@@ -84,15 +85,15 @@ def test_what_was_found_is_shown(tmp_path):
         tasks._show(told, tmp_path, name, value)
     names = [name for name, _ in told.pictures]
     assert names[:2] == ["first depth", "first normals"] and "light" in names and names[-1] == "metallic"
-    assert all(file.is_file() for _, file in told.pictures)
+    assert all((tmp_path / file).is_file() for _, file in told.pictures)
 
 
 def test_taking_away(tmp_path):
     scene = package(tmp_path)
     (tmp_path / "edits.yaml").write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n")
-    tasks.do_take(Told(), str(scene), str(tmp_path / "edits.yaml"), str(tmp_path / "a.zip"), "glb")
-    tasks.do_take(Told(), str(scene), "", str(tmp_path / "a.html"), "html")
-    tasks.do_mesh(Told(), str(scene), str(tmp_path / "a.glb"))
+    tasks.take(Told(), str(scene), str(tmp_path / "edits.yaml"), str(tmp_path / "a.zip"), "glb")
+    tasks.take(Told(), str(scene), "", str(tmp_path / "a.html"), "html")
+    tasks.mesh(Told(), str(scene), str(tmp_path / "a.glb"))
     import zipfile
 
     names = zipfile.ZipFile(tmp_path / "a.zip").namelist()

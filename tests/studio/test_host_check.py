@@ -2,7 +2,7 @@
 
 import pytest
 
-from materialist.studio.visitors import Guard, names_of
+from materialist.studio.server import HostCheck, names_of
 
 ALONE = names_of("127.0.0.1")
 
@@ -29,13 +29,13 @@ def headers(**values):
     ],
 )
 def test_welcome(sent, alone, everyone):
-    assert Guard(None, ALONE).welcome(headers(**sent)) is alone
-    assert Guard(None, None).welcome(headers(**sent)) is everyone
+    assert HostCheck(None, ALONE).allows(headers(**sent)) is alone
+    assert HostCheck(None, None).allows(headers(**sent)) is everyone
 
 
 def test_the_address_it_was_started_on_is_one_of_its_names():
-    assert Guard(None, names_of("127.0.0.2")).welcome(headers(host="127.0.0.2:80"))
-    assert not Guard(None, ALONE).welcome(headers(host="127.0.0.2:80"))
+    assert HostCheck(None, names_of("127.0.0.2")).allows(headers(host="127.0.0.2:80"))
+    assert not HostCheck(None, ALONE).allows(headers(host="127.0.0.2:80"))
 
 
 @pytest.mark.parametrize("kind", ["http", "websocket", "lifespan"])
@@ -50,7 +50,7 @@ def test_what_is_refused_goes_no_further(kind):
 
     scope = {"type": kind, "headers": [(b"host", b"evil.example")]}
     with pytest.raises(StopIteration):  # nothing in it waits
-        Guard(app, ALONE)(scope, None, send).send(None)
+        HostCheck(app, ALONE)(scope, None, send).send(None)
     assert reached == (["lifespan"] if kind == "lifespan" else [])
     if kind == "http":
         assert sent[0]["status"] == 403

@@ -1,0 +1,214 @@
+"""Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks."""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from materialist.camera import project
+from materialist.color import luminance
+from materialist.edits.recipe import Step, apply
+from materialist.errors import InputError
+from materialist.studio import glass
+from materialist.studio.edit_list import summary
+from materialist.types import Array, Body, Scene
+
+
+def _use_one_thread() -> None:
+    """Arrays of one picture are small: more threads of torch would mostly wait, and wait busily."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+_THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_thread)
+"""The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
+LIVE = ("edit", "relight")
+"""Kinds of steps that the preview shades; the others are sketched."""
+_KEPT = 24
+"""Edited scenes that are kept: moving the last of several steps must not replay those before."""
+
+_TRIANGLES = 12_000
+"""Triangles that are drawn; of a finer mesh every n-th, and the gaps are closed."""
+_LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
+
+
+class LivePreview:
+    """A fitted scene, its preview (which takes seconds to build), and the last edited scenes."""
+
+    def __init__(self, scene: Scene):
+        self.scene = scene
+        self._edited: OrderedDict[str, Scene] = OrderedDict()
+        self._panes: OrderedDict[str, tuple[Array, glass.Tint]] = OrderedDict()
+        self._preview: Future[Any] = _THREAD.submit(_build, scene)
+
+    @property
+    def ready(self) -> bool:
+        return self._preview.done()
+
+    def wait(self) -> None:
+        """Until the preview is there. Raises what went wrong with it."""
+        self._preview.result()
+
+    def edited(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene after the steps, glass left out: its body takes long, and another process makes it.
+
+        Raises InputError, for values of glass that cannot be as well.
+        """
+        for step in steps:
+            if glass.is_traced(step):
+                self._glass(step)
+        steps = tuple(step for step in steps if not glass.is_traced(step))
+        known, start = self.scene, 0
+        for count in range(len(steps), 0, -1):
+            hit = self._edited.get(_key(steps[:count]))
+            if hit is not None:
+                known, start = hit, count
+                break
+        for count in range(start + 1, len(steps) + 1):
+            known = _after(self.scene, known, steps[count - 1])
+            self._edited[_key(steps[:count])] = known
+        while len(self._edited) > _KEPT:
+            self._edited.popitem(last=False)
+        return known
+
+    def picture(self, steps: tuple[Step, ...], client: glass.GlassClient | None = None) -> Array:
+        """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
+
+        Glass is what the client has of it, else a sketch.
+        """
+        if not steps:
+            return self.scene.photo.linear
+        preview, edited = self._preview.result(), self.edited(steps)
+        known = [(step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)]
+        shaded = edited
+        if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
+            shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
+        picture = _THREAD.submit(preview.picture, shaded, quick=True).result()
+        if edited.photo is not self.scene.photo:
+            filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
+            picture = np.where(filled, edited.photo.linear, picture)
+        for step, pane in known:
+            if pane is None:
+                picture = sketch_glass(picture, *self._glass(step))
+            else:
+                picture = lay_over(picture, pane.box, pane.picture, pane.filled)
+        if edited.bodies:
+            picture = draw_bodies(picture, edited)
+        for _, pane in known:
+            if pane is not None:
+                picture = lay_over(picture, pane.box, pane.picture, pane.share)
+        return picture
+
+    def close(self) -> None:
+        """Give the memory back."""
+        self._preview.cancel()
+        self._preview = Future()
+        self._edited.clear()
+        self._panes.clear()
+
+    def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
+        """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
+        key = _key((step,))
+        if key not in self._panes:
+            self._panes[key] = glass.checked(self.scene, step)
+            while len(self._panes) > _KEPT:
+                self._panes.popitem(last=False)
+        return self._panes[key]
+
+
+def _after(scene: Scene, edited: Scene, step: Step) -> Scene:
+    """The scene `edited` of `scene` after one more step; an error names it as the list does."""
+    try:
+        return apply(scene, [step], onto=edited)
+    except InputError as error:
+        reason = str(error).removeprefix(f"Step 1 ({step.kind}): ").replace(f"{step.folder}/", "")
+        raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+
+
+def _build(scene: Scene) -> Any:
+    from materialist.edits.preview import Preview
+
+    return Preview(scene)
+
+
+def _key(steps: tuple[Step, ...]) -> str:
+    return json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
+
+
+def draw_bodies(picture: Array, scene: Scene) -> Array:
+    """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
+    exposure = 2 * float(luminance(scene.photo.linear).mean())
+    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):  # the farthest first
+        colour, depth = _drawn(body, scene, exposure)
+        behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
+        share = 1 - 0.7 * body.surface.transmission
+        picture = np.where(((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture)
+    return picture.astype(np.float32)
+
+
+def sketch_glass(picture: Array, region: Array, tint: tuple[float, float, float]) -> Array:
+    """[H, W, 3] with the object under a region [H, W] bool as a see-through shape, until its glass is traced.
+
+    Its surroundings carried on into it, smooth, with a rim and a little of the object's own form.
+    """
+    import cv2
+
+    if not region.any():
+        return picture
+    height, width = region.shape
+    spread = max(2.0, 0.25 * float(np.sqrt(region.sum())))  # pixels
+    step = max(1, int(spread / 4))  # blurred at a size at which it is blurred by a few pixels
+    size = (-(-width // step), -(-height // step))
+    small = lambda v: cv2.resize(np.ascontiguousarray(v), size, interpolation=cv2.INTER_AREA)  # noqa: E731
+    blur = lambda v: cv2.GaussianBlur(v, (0, 0), spread / step, borderType=cv2.BORDER_REPLICATE)  # noqa: E731
+    outside = (~region).astype(np.float32)
+    share = np.maximum(blur(small(outside)), 1e-3)[..., None]
+    around = cv2.resize(blur(small(picture * outside[..., None])) / share, (width, height))[region]  # [N, 3]
+    depth = cv2.distanceTransform(region.astype(np.uint8), cv2.DIST_L2, 3)  # [H, W] pixels to the border
+    rim = np.exp(-depth[region] / max(1.5, 0.12 * float(depth.max())))[:, None]
+    form = luminance(picture[region])[:, None]
+    inside = (0.8 * around + 0.2 * form) * np.asarray(tint, np.float32) * (1 - 0.4 * rim) + 0.12 * rim * around.max()
+    out = picture.copy()
+    out[region] = inside
+    return out
+
+
+def lay_over(picture: Array, box: tuple[int, int, int, int], piece: Array, share: Array) -> Array:
+    """[H, W, 3] with a piece [h, w, 3] laid over the rows and columns of a box, by its share [h, w]."""
+    top, bottom, left, right = box
+    out = picture.copy()
+    under = out[top:bottom, left:right]
+    out[top:bottom, left:right] = under + share[..., None] * (piece - under)
+    return out
+
+
+def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
+    """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
+    import cv2
+
+    colour = np.zeros((*scene.depth.shape, 3), np.float32)
+    depth = np.zeros(scene.depth.shape, np.float32)
+    stride = -(-len(body.faces) // _TRIANGLES)
+    corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
+    pixels, away = project(corners, scene.camera)
+    middle = away.mean(1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
+    shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
+    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(body.surface.tint)
+    points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
+    for face in np.argsort(-middle):
+        if seen[face]:
+            tone = [float(v) for v in np.minimum(albedo * shade[face] * exposure, 1)]
+            cv2.fillConvexPoly(colour, points[face], tone, shift=4)
+            cv2.fillConvexPoly(depth, points[face], float(middle[face]), shift=4)
+    if stride > 1:
+        kernel = np.ones((3, 3), np.uint8)
+        return np.asarray(cv2.dilate(colour, kernel)), np.asarray(cv2.dilate(depth, kernel))
+    return colour, depth

@@ -1,0 +1,163 @@
+"""The picture on the stage with its label, and what the page shows of a scene: maps, and a report in words."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from time import time
+from typing import Any
+
+import numpy as np
+
+from materialist.color import srgb_levels
+from materialist.edits.recipe import Step
+from materialist.errors import MaterialistError
+from materialist.studio import glass
+from materialist.studio.edit_list import EditList
+from materialist.studio.preview import LIVE
+from materialist.studio.selection import data_url
+from materialist.studio.session import Session
+from materialist.types import Array, Scene
+
+
+def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
+    """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
+
+    Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
+    page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
+    reason on it: what is wrong can be taken out of the list. Glass in hand is asked for; `asked` counts these wishes,
+    and `waiting` says whether the last is not fulfilled yet. The page ignores a picture with an older `serial` than
+    the one it shows.
+    """
+    serial = time()
+    with session.lock:
+        live, edits, final = session.live, session.edits, session.final
+        masks, client = session.selection.pictures, session.glass
+    if live is None:
+        none = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
+        return {**none, "serial": serial, **masks}
+    camera, steps = live.scene.camera, edits.active if with_edits else ()
+    size = {"width": camera.width, "height": camera.height}
+    shown = {**size, "lamps": _lamps(edits), "serial": serial, "bad": False, **masks}
+    off = "; the edit in hand is switched off" if _in_hand_off(edits) else ""
+    if final is not None and final.of(steps):
+        badge = f"Path traced, {final.spp} paths a pixel{off}"
+        return {**shown, "picture": file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
+    state = _asked(client, edits) if with_edits and client is not None else None
+    waiting = state is not None and state.waiting
+    if steps and not live.ready:
+        return {**shown, "badge": "Getting the live preview ready …", "waiting": False}
+    try:
+        linear = live.picture(steps, client)
+    except MaterialistError as error:
+        photo, badge = jpeg_url(live.scene.photo.linear), f"The photo without its edits: {error}"
+        return {**shown, "picture": photo, "badge": badge, "waiting": False, "bad": True}
+    shown |= {"asked": state.asked if state else 0, "waiting": waiting}
+    return {**shown, "picture": jpeg_url(linear), "badge": _badge(steps, client, waiting) + off}
+
+
+def picture(session: Session) -> Array:
+    """[H, W, 3] float32 linear: what the stage shows where nothing is path traced."""
+    assert session.live is not None
+    return session.live.picture(session.edits.active, session.glass)
+
+
+def _asked(client: glass.GlassClient, edits: EditList) -> glass.GlassState:
+    """Ask for the glass in hand, if there is any."""
+    step = edits.in_hand
+    if step is not None and glass.is_traced(step) and not step.skipped:
+        client.ask(_others(edits.active, step), step)
+    return client.state
+
+
+def _in_hand_off(edits: EditList) -> bool:
+    """Whether sliders move what is not in the picture."""
+    return edits.in_hand is not None and edits.in_hand.skipped
+
+
+def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
+    return tuple(one for one in steps if one is not step)
+
+
+def _lamps(edits: EditList) -> list[list[float]]:
+    """(x, y) of the lamps, for their marks; none where they are not readable, which the picture tells."""
+    place = edits.light
+    lamps = edits.steps[place].options.get("lamps", []) if place is not None else []
+    try:
+        return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
+    except (TypeError, ValueError):
+        return []
+
+
+def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None = None, waiting: bool = False) -> str:
+    """What a picture that is not path traced shows, and what it leaves out."""
+    if not steps:
+        return "Photo"
+    panes = [step for step in steps if glass.is_traced(step)]
+    sketched = "; objects are sketched" if any(s.kind not in LIVE and s not in panes for s in steps) else ""
+    if waiting:
+        known = all(client and client.pane(step) for step in panes)
+        return ("Glass: tracing …" if known else "Glass: sketch, tracing …") + sketched
+    if panes and client and all(client.fresh(_others(steps, step), step) for step in panes):
+        return f"Glass traced; shadow and caustics in the final picture{sketched}"
+    if panes and client and all(client.pane(step) for step in panes):
+        return f"Live preview; click the glass in the list to trace it anew{sketched}"
+    if any(step.kind not in LIVE for step in steps):
+        return "Sketch: path tracing shows the rest"
+    if any("lamps" in step.options for step in steps):
+        return "Live preview: lamps show in path tracing"
+    return "Live preview"
+
+
+def jpeg_url(linear: Array) -> str:
+    """A linear picture [H, W, 3] as a data URL."""
+    return data_url(srgb_levels(linear), ".jpg", "image/jpeg")
+
+
+def file_url(path: Path) -> str:
+    """A picture file as a data URL."""
+    kind = "image/png" if path.suffix == ".png" else "image/jpeg"
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def maps(scene: Scene) -> list[tuple[Array, str]]:
+    """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
+    from materialist.exporters import pictures
+
+    materials = scene.materials
+    return [
+        (srgb_levels(materials.albedo), "Albedo: colour without light"),
+        (pictures.grey(materials.roughness), "Roughness: black is a mirror, white is chalk"),
+        (pictures.grey(materials.metallic), "Metallic: white is metal"),
+        (pictures.normals(scene.normal), "Normals: which way surfaces face"),
+        (pictures.nearness(scene.depth), "Depth: near is bright"),
+        (pictures.light(scene.envmap), "Light, all around; ahead is the middle"),
+        (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
+        (pictures.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
+    ]
+
+
+def report(scene: Scene) -> str:
+    """How good the scene is, in Markdown and plain words."""
+    metrics = scene.report.metrics
+    value = metrics.get("rerender_psnr_path", float("nan"))
+    verdict = (
+        "very close to the photo" if value > 33 else "close to the photo" if value > 28 else "only roughly the photo"
+    )
+    lines = [f"The re-rendering is **{verdict}** ({value:.1f} dB)."] if np.isfinite(value) else []
+    camera = scene.camera
+    source = {"exif": "from the photo's EXIF data", "default": "assumed", "option": "as chosen"}.get(
+        scene.photo.fov_source, f"from the {scene.photo.fov_source}"
+    )
+    lines.append(
+        f"Worked at {camera.width} × {camera.height} pixels; field of view {camera.fov:.1f}° ({source}); first guess "
+        f"by `{scene.prior.predictor}`."
+    )
+    notes = list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
+    lines += ["", "**What to beware of**", *(f"- {_safe(note)}" for note in notes)] if notes else []
+    return "\n".join(lines)
+
+
+def _safe(text: str) -> str:
+    """A text that may hold a file name, without meaning in Markdown or HTML."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace("[", "&#91;")

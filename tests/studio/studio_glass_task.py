@@ -1,0 +1,27 @@
+"""A stand-in for `studio.glass.trace`, as worker processes load it by name."""
+
+import os
+import time
+
+import numpy as np
+
+from materialist.errors import InputError
+from materialist.studio.glass import Pane
+
+
+def trace(report, request):
+    """A pane whose colour is the index of refraction; 1.9 takes for ever, 1.8 kills the process, 1.7 fails."""
+    ior = float(request["glass"]["ior"])
+    with open(os.environ["GLASS_LOG"], "a") as log:
+        log.write(f"{os.getpid()} {ior}\n")
+    report("build", 0, 1)
+    if ior == 1.9:
+        time.sleep(60)
+    if ior == 1.8:
+        os._exit(1)
+    if ior == 1.7:
+        raise InputError("The camera sees nothing of the object; mark another one.")
+    time.sleep(0.2)
+    report("trace", 0, 1)
+    share = np.array([[1, 0.2]], np.float32)
+    return Pane((4, 5, 8, 10), np.full((1, 2, 3), ior, np.float32), share, np.array([[False, True]]))

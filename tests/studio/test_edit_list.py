@@ -1,0 +1,54 @@
+"""The list of edits."""
+
+from materialist.edits.recipe import Step, read_recipe, write_recipe
+from materialist.studio.edit_list import EditList, summary
+
+A, B, C = (
+    Step("edit", {"mask": "mask-1.png", "hue": "20"}),
+    Step("relight", {"rotate": "90"}),
+    Step("edit", {"hue": "1"}),
+)
+
+
+def test_add_move_toggle_remove():
+    edits = EditList().add(A).add(B).add(C)
+    assert edits.current == 2 and edits.steps == (A, B, C)
+    assert edits.moved(2, -1).steps == (A, C, B) and edits.moved(2, -1).current == 1
+    assert edits.moved(0, -1) is edits and edits.moved(2, 1) is edits
+    off = edits.toggled(1)
+    assert off.active == (A, C) and off.steps[1].skipped and off.toggled(1).steps == edits.steps
+    assert edits.without(0).steps == (B, C) and edits.without(0).current is None
+    assert edits.in_hand == C and edits.without(0).in_hand is None
+
+
+def test_ticking_and_moving_leave_the_one_in_hand():
+    edits = EditList((A, B, C), 2)
+    assert edits.toggled(0).current == 2 and edits.toggled(0).toggled(0).current == 2
+    assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
+    assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
+    assert EditList((A, B, C)).moved(0, 1).current is None and EditList((A, B, C)).toggled(1).current is None
+
+
+def test_the_list_is_edits_yaml(tmp_path):
+    edits = (
+        EditList()
+        .add(A)
+        .add(B)
+        .toggled(0)
+        .add(Step("edit", {"mask": "m.png", "roughness": "+0.3", "albedo": "#c02010"}))
+    )
+    lamps = Step("relight", {"lamps": [["5", "6", "1.5", "2700", "1"]], "sun": ["45", "-3.5"]})
+    edits = edits.add(lamps)
+    write_recipe(tmp_path / "edits.yaml", list(edits.steps))
+    back = read_recipe(tmp_path / "edits.yaml")
+    assert [s.kind for s in back] == [s.kind for s in edits.steps]
+    assert [s.options for s in back] == [s.options for s in edits.steps]
+    assert back[0].skipped and not back[1].skipped
+
+
+def test_summaries_are_short():
+    assert summary(A) == "Material: hue 20"
+    assert summary(Step("relight", {"envmap": "light-sunset.exr", "lamps": [["1"], ["2"]]})) == (
+        "Light: envmap light-sunset, lamps (2)"
+    )
+    assert summary(Step("edit", {"mask": "a.png"})) == "Material: as it is"
