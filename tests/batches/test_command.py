@@ -10,10 +10,9 @@ import pytest
 from made_batch import photos
 
 import materialist.batches.run as batch_run
-from materialist.batches.outcome import Outcome, Row, Status
+from materialist.batches.outcome import Outcome, Row
 from materialist.batches.page import PER_PAGE, write_pages
 from materialist.cli import app
-from materialist.cli.batch import BatchProgress, _note, _span
 from materialist.cli.outcome import run_to_exit_code
 
 
@@ -102,17 +101,3 @@ def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
     write_summary(Outcome(tmp_path, (Row({"id": "=1+1.png", "name": "@x", "status": "open"}),), 0, 1.0))
     row = next(csv.DictReader((tmp_path / "summary.csv").open()))
     assert row["id"] == "'=1+1.png" and row["name"] == "'@x"
-
-
-def test_what_went_wrong_is_said_above_the_bars(monkeypatch, capsys):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    with BatchProgress() as progress:
-        progress(Status(2, 0, 0, 0.0, None, news="b lacks a mask", urgent=True))
-        progress(Status(2, 1, 0, 0.0, None, news="failed.png: done"))
-    said = capsys.readouterr().err
-    assert "b lacks a mask" in said and "failed.png" not in said
-
-
-def test_progress_says_the_rate_and_the_time_left():
-    assert _note(Status(10, 3, 1, 0.05, 6000.0)) == "1 failed, 3.0 a minute, 100 min left"
-    assert (_span(40), _span(600), _span(36000)) == ("40 s", "10 min", "10.0 h")

@@ -1,8 +1,5 @@
 """A batch's list of edits for one photo of it: names put in, and a key that knows the files behind them."""
 
-import json
-
-import numpy as np
 import pytest
 from made_batch import photos
 
@@ -10,7 +7,6 @@ from materialist.batches.edits import edits_for, edits_key, missing_files
 from materialist.batches.run import batch
 from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
-from materialist.io.package import load_scene
 
 TEXT = "- drop: {mesh: ['{name}.ply', ball.ply], at: [3, 4]}\n- edit: {mask: 'm/{name}.png', hue: 20}\n"
 
@@ -53,15 +49,6 @@ def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
     assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
 
 
-def test_the_key_knows_what_a_gltf_refers_to(tmp_path):
-    uris = ["data:image/png;base64,AA==", "wood%20grain.png", "../outside.png"]
-    (tmp_path / "ball.gltf").write_text(json.dumps({"images": [{"uri": uri} for uri in uris], "buffers": [{}]}))
-    (tmp_path / "edits.yaml").write_text("- insert: {mesh: ball.gltf, at: [3, 4]}\n")
-    key = edits_key(tmp_path / "edits.yaml", "a", 8)
-    (tmp_path / "wood grain.png").write_text("grain")
-    assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
-
-
 def test_files_that_are_missing_are_found_step_by_step(recipe):
     steps, folder = read_recipe(recipe), recipe.parent
     assert missing_files(steps, "a") == [f"{folder}/m/a.png"]
@@ -71,17 +58,6 @@ def test_files_that_are_missing_are_found_step_by_step(recipe):
         "- edit: {mask: none.png, hue: 3, skip: true}\n- relight: {envmap: sky.exr}\n"
     )
     assert missing_files(read_recipe(recipe), "a") == [f"{folder}/d.exr", f"{folder}/sky.exr"]
-
-
-@pytest.mark.parametrize(
-    "text", ["- edit: {mask: none.png, hue: 20}\n", "- drop: {mesh: [ball.ply, no.ply], at: [1, 2]}\n"]
-)
-def test_a_file_that_every_photo_lacks_is_found_before_anything_is_written(recipe, text):
-    recipe.write_text(text)
-    source = photos(recipe.parent / "photos", "one", "two")
-    with pytest.raises(InputError, match=r"no file .*/(none.png|no.ply), which .*edits.yaml names"):
-        batch(source, recipe.parent / "runs", apply=recipe, function="made_batch:made_up", workers=1, device="cpu")
-    assert not (recipe.parent / "runs").exists()
 
 
 def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
@@ -96,26 +72,3 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     outcome = batch(source, runs, resume=True, progress=said.append, **options)
     assert said[0].urgent and said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
     assert "m/two.png for two.png" in said[0].news and outcome.count("failed") == 2 and (runs / "two.scene").is_dir()
-
-
-def test_a_drop_is_applied_to_every_photo(tmp_path):
-    pytest.importorskip("mujoco")
-    pytest.importorskip("mitsuba")
-    from made_meshes import box_file
-
-    box_file(tmp_path / "box.ply")
-    (tmp_path / "edits.yaml").write_text(
-        "- drop: {mesh: box.ply, at: [12, 8], scale: 3, height: 0.2, gravity: [0, 0, -1]}\n"
-    )
-    photos(tmp_path / "photos", "one")
-    runs = tmp_path / "runs"
-    outcome = batch(
-        tmp_path / "photos", runs, apply=tmp_path / "edits.yaml", spp=4, function="made_batch:even",
-        workers=1, device="cpu", size=24, seed=1,
-    )  # fmt: skip
-    (row,) = outcome.rows
-    assert row["status"] == "done", row["reason"]
-    from PIL import Image
-
-    before, after = (np.asarray(Image.open(f)).astype(int) for f in (tmp_path / "photos/one.png", runs / "one.png"))
-    assert (np.abs(after - before).max(-1) > 8).any() and load_scene(runs / "one.scene").bodies == ()

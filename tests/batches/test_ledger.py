@@ -70,11 +70,3 @@ def test_a_ledger_of_another_version_is_not_read(tmp_path):
     (tmp_path / LEDGER).write_text(json.dumps({"event": "start", "format": 99}) + "\n")
     with pytest.raises(InputError, match="another version"):
         open_ledger(tmp_path, OPTIONS, resume=True)
-
-
-def test_tuples_are_the_lists_that_they_come_back_as(tmp_path):
-    options = {"envmap_size": (16, 8)}
-    open_ledger(tmp_path / "runs", options).close()
-    again = open_ledger(tmp_path / "runs", options, resume=True)
-    again.close()
-    assert again.key

@@ -7,7 +7,7 @@ from made_batch import photos
 
 from materialist.batches.photos import LONGEST_NAME as LONGEST
 from materialist.batches.photos import list_photos, unique_names
-from materialist.batches.remote import is_url, local_copy, shown, version
+from materialist.batches.remote import local_copy, version
 from materialist.errors import InputError
 
 
@@ -42,16 +42,6 @@ def test_a_comment_may_stand_behind_a_name(tmp_path):
         "a.png # the kitchen\nb.png\t#none\nc#1.png  ## twice\nd #2.png\n # alone\n#\nhttps://h/x.jpg#y\n"
     )
     assert ids(listing) == ["a.png", "b.png", "c#1.png", "d #2.png", "https://h/x.jpg#y"]
-
-
-@pytest.mark.parametrize("runs", ["in", "in/", "link"])
-def test_results_have_a_folder_of_their_own(tmp_path, monkeypatch, runs):
-    photos(tmp_path / "in", "a")
-    (tmp_path / "link").symlink_to(tmp_path / "in")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=r"RUNS cannot be (in|link), the folder of the photos; .* (in|link)/runs"):
-        list_photos("in", runs=runs)
-    assert ids("in", "in/runs") == ["a.png"]
 
 
 @pytest.mark.parametrize(
@@ -91,21 +81,12 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
         list_photos("nosuchstore://bucket", runs="r")
 
 
-def test_secrets_of_a_url_are_not_shown():
-    assert shown("https://u:p@h/a.jpg?X-Signature=s") == "https://h/a.jpg"
-    assert is_url("s3://b/a") and not is_url("C:\\a") and not is_url("a/b.png") and not is_url("example:cat")
-
-
 def test_names_are_stems_as_long_as_those_are_unique():
     names = unique_names(["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"])
     assert names == {
         "a/k.png": "a_k", "b/k.jpg": "b_k", "c.png": "c", "d.png": "d.png", "d.jpg": "d.jpg", "x y/é.png": "é",
         "http://h/p/z.jpg": "z",
     }  # fmt: skip
-
-
-def test_a_name_once_given_stays_and_is_nobody_elses():
-    assert unique_names(["a/k.png", "b/k.png"], {"a/k.png": "k"}) == {"a/k.png": "k", "b/k.png": "b_k"}
 
 
 @settings(deadline=None)

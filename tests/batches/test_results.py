@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_scene import make_scene
 
-from materialist.batches.results import NEEDED, package_hash, together, whole_size
+from materialist.batches.results import NEEDED, package_hash, whole_size
 from materialist.errors import SceneError
 from materialist.io.package import save_scene
 from materialist.types import FitReport
@@ -48,9 +48,3 @@ def test_a_package_is_whole_or_it_is_not(tmp_path):
     (tmp_path / "a/scene.json").unlink()
     with pytest.raises(SceneError, match="no whole scene package"):
         package_hash(tmp_path / "a")
-
-
-def test_a_batch_hash_does_not_depend_on_the_order():
-    assert (
-        together([("a", "1"), ("b", "2")]) == together([("b", "2"), ("a", "1")]) != together([("a", "2"), ("b", "1")])
-    )

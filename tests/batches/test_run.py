@@ -12,9 +12,7 @@ from PIL import Image
 from materialist.batches.ledger import LEDGER, read_events
 from materialist.batches.results import package_hash
 from materialist.batches.run import batch
-from materialist.batches.task import PhotoTask
 from materialist.errors import InputError, SetupError
-from materialist.io.package import load_scene
 
 RECIPE = "- edit:\n    mask: masks/{name}.png\n    hue: 90\n"
 
@@ -75,32 +73,6 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     assert again.hash != first.hash and again.hash == run(source, tmp_path / "fresh").hash
 
 
-def test_other_options_redo_everything_even_in_two_goes(tmp_path):
-    source = photos(tmp_path / "in", "a", "b")
-    run(source, tmp_path / "runs")
-    with pytest.raises(InputError, match="seed 0, not 1"):
-        run(source, tmp_path / "runs", resume=True, seed=1)
-    (source / "b.png").rename(tmp_path / "b.png")
-    assert run(source, tmp_path / "runs", resume=True, force=True, seed=1).kept == 0
-    (tmp_path / "b.png").rename(source / "b.png")
-    assert run(source, tmp_path / "runs", resume=True, seed=1).kept == 1
-
-
-def test_a_scene_of_somebody_else_is_not_replaced(tmp_path):
-    source = photos(tmp_path / "in", "a")
-    run(source, tmp_path / "runs")
-    photos(source, "x", "b")
-    (tmp_path / "runs/b.scene").mkdir()
-    (tmp_path / "runs/b.scene/mine.txt").write_text("keep")
-    outcome = run(source, tmp_path / "runs", resume=True)
-    assert "is not of this batch" in reasons(outcome)["b"] and (tmp_path / "runs/b.scene/mine.txt").exists()
-    assert outcome.exit_code == 2
-    for force in (False, True):
-        again = run(source, tmp_path / "runs", resume=True, force=force)
-        assert "is not of this batch" in reasons(again)["b"], "it has not become the batch's by being refused"
-        assert (tmp_path / "runs/b.scene/mine.txt").exists()
-
-
 def test_a_picture_of_somebody_else_is_not_replaced(tmp_path):
     pytest.importorskip("mitsuba")
     source = photos(tmp_path / "in", "a", "b")
@@ -128,16 +100,10 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
     assert summary["open"] == 30 and summary["failed"] == 0
 
 
-def test_workers_that_cannot_start_are_told_as_such(tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.executable", "/bin/false")
-    with pytest.raises(SetupError, match="does not start"):
-        run(photos(tmp_path / "in", "a"), tmp_path / "runs")
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "Seed is -1"),
+        ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "seed is -1"),
         ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "at least 1"),
         ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
     ],
@@ -176,31 +142,6 @@ def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(t
     other = run(source, runs, resume=True, **options)
     assert other.kept == 0 and other.exit_code == 0 and other.rows[0]["edits"] != again.rows[0]["edits"]
     assert (runs / "b.scene/scene.json").stat().st_mtime_ns == written
-
-
-def test_predictors_by_name_reach_the_inversion(tmp_path):
-    task = PhotoTask("a.png", "kitchen", "/a.png", tmp_path, {"predictor": "maps:priors/{name}", "size": 64})
-    assert task.named_options() == {"predictor": "maps:priors/kitchen", "size": 64}
-
-
-def test_the_scene_says_where_the_photo_lay(tmp_path):
-    source = photos(tmp_path / "in", "a")
-    run(source, tmp_path / "runs")
-    assert load_scene(tmp_path / "runs/a.scene").photo.path == str(source / "a.png")
-
-
-def test_photos_behind_urls_are_fetched_kept_and_redone_when_they_change(tmp_path):
-    pytest.importorskip("fsspec")
-    source, runs = photos(tmp_path / "in", "a", "sub/b"), tmp_path / "runs"
-    url = f"file://{source}"
-    first = run(url, runs)
-    assert first.exit_code == 0 and [row["name"] for row in first.rows] == ["a", "b"]
-    assert load_scene(runs / "a.scene").photo.path == f"file://{source}/a.png"
-    assert first.hash == run(source, tmp_path / "paths").hash
-    photos(source, "x", "a")
-    (source / "x.png").unlink()
-    again = run(url, runs, resume=True)
-    assert again.kept == 1 and again.exit_code == 0 and again.hash != first.hash
 
 
 def test_a_file_name_that_is_no_utf8_is_a_photo_like_any_other(tmp_path):

@@ -12,10 +12,10 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.studio import archives, objects, uploads
 from materialist.studio.archives import pack, unpack
-from materialist.studio.edit_list import EditList, summary
+from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
 from materialist.studio.session import Session
-from materialist.studio.workspace import store, write_mask
+from materialist.studio.workspace import store
 
 
 @pytest.fixture
@@ -74,23 +74,6 @@ def test_a_list_of_another_photo_does_not_take_this_one_s_files(studio, session,
     other.close()
 
 
-def test_old_names_still_count(session, tmp_path):
-    write_png_bytes(session.workspace / "mask-1.png", block().astype(np.uint8) * 255)
-    (tmp_path / "edits.yaml").write_text("- edit: {mask: mask-1.png, hue: 40}")
-    session.read_edits(tmp_path / "edits.yaml")
-    assert session.edits.steps[0].options["mask"] == "mask-1.png"
-
-
-def test_files_are_called_by_their_content(tmp_path):
-    first = write_mask(tmp_path, block())
-    assert write_mask(tmp_path, block()) == first != write_mask(tmp_path, ~block())
-    (tmp_path / "a").write_text("a")
-    (tmp_path / "b").write_text("b")
-    names = [store(tmp_path, tmp_path / name, "mesh", ".ply") for name in "aab"]
-    assert names[0] == names[1] != names[2] and (tmp_path / names[2]).read_text() == "b"
-    assert summary(Step("insert", {"mesh": names[0], "scale": "2"})) == "Object: mesh own, scale 2"
-
-
 def zipped(folder, members):
     with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as made:
         for name, content in members.items():
@@ -143,17 +126,6 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     (step,) = unpack(desk, zipped(tmp_path, members))
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
     assert not (tmp_path / "e").exists() and EditList((step,)).active
-
-
-@pytest.mark.parametrize("names", ["__MACOSX/edits.yaml room/edits.yaml room/m.png", "room\\edits.yaml room\\m.png"])
-def test_zips_of_other_systems(tmp_path, names):
-    write_png_bytes(tmp_path / "m.png", block().astype(np.uint8) * 255)
-    content = {"png": (tmp_path / "m.png").read_bytes(), "yaml": LIST}
-    members = {name: b"\0\5" if "MACOSX" in name else content[name.rpartition(".")[2]] for name in names.split()}
-    desk = tmp_path / "desk"
-    desk.mkdir()
-    (step,) = unpack(desk, zipped(tmp_path, members))
-    assert step.options["hue"] == "3" and (desk / step.options["mask"]).is_file()
 
 
 def test_a_zip_whose_packing_is_damaged(tmp_path):

@@ -1,7 +1,7 @@
 """The list of edits."""
 
 from materialist.edits.recipe import Step, read_recipe, write_recipe
-from materialist.studio.edit_list import EditList, summary
+from materialist.studio.edit_list import EditList
 
 A, B, C = (
     Step("edit", {"mask": "mask-1.png", "hue": "20"}),
@@ -44,11 +44,3 @@ def test_the_list_is_edits_yaml(tmp_path):
     assert [s.kind for s in back] == [s.kind for s in edits.steps]
     assert [s.options for s in back] == [s.options for s in edits.steps]
     assert back[0].skipped and not back[1].skipped
-
-
-def test_summaries_are_short():
-    assert summary(A) == "Material: hue 20"
-    assert summary(Step("relight", {"envmap": "light-sunset.exr", "lamps": [["1"], ["2"]]})) == (
-        "Light: envmap light-sunset, lamps (2)"
-    )
-    assert summary(Step("edit", {"mask": "a.png"})) == "Material: as it is"

@@ -13,7 +13,7 @@ from studio_scenes import block, package, room
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import glass as studio_glass
-from materialist.studio.glass import GlassBodies, GlassClient, Pane, body_key, checked, is_traced
+from materialist.studio.glass import GlassBodies, GlassClient, Pane, checked, is_traced
 from materialist.studio.preview import LivePreview
 from materialist.studio.widgets import tint_colour, tint_text
 from materialist.studio.workspace import write_mask
@@ -78,14 +78,6 @@ def test_another_object_does_not_wait_for_a_body_in_the_making(tracer, log):
     assert tracer.pane(glass(1.4, "mask-2.png")) is not None and tracer.pane(glass(1.9)) is None
 
 
-def test_a_slider_while_the_body_is_in_the_making_does_not_begin_again(tracer, log):
-    tracer.ask((), glass(1.1))
-    until(lambda: "1.1" in log.read_text())
-    tracer.ask((), glass(1.2))
-    until(lambda: not tracer.state.waiting)
-    assert len({line.split()[0] for line in log.read_text().splitlines()}) == 1
-
-
 def test_failures_are_told_and_the_next_value_is_tried(tracer):
     tracer.ask((), glass(1.7))
     until(lambda: not tracer.state.waiting)
@@ -111,13 +103,6 @@ def test_nothing_stays_when_the_glass_is_gone(tracer):
     until(lambda: not worker.running)
     tracer.ask((), glass(1.4))  # undone: it is made again
     until(lambda: tracer.pane(glass(1.4)) is not None)
-
-
-def test_too_little_memory_is_a_sentence(tracer, monkeypatch):
-    monkeypatch.setattr(studio_glass, "LEAST_FREE", 1e18)
-    tracer.ask((), glass(1.4))
-    assert not tracer.state.waiting and tracer.state.bad and "too little memory" in tracer.state.words
-    assert tracer._worker is None
 
 
 def test_bad_glass_is_refused_at_once(tmp_path):
@@ -200,14 +185,6 @@ def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path, monkeyp
     assert late.stages == ["load"]  # the body is kept, and nothing is traced
     with pytest.raises(InputError, match="must be 4 numbers"):
         studio_glass.trace(_Report(), {**request, "glass": {"ior": "1.4", "box": "0,0,9"}})
-
-
-def test_bodies_are_told_apart_by_what_they_depend_on():
-    def key(others=(), **glass):
-        return body_key({"scene": "s", "others": list(others), "glass": {"mask": "a.png", **glass}})
-
-    assert key(ior="1.2", tint="1,1,0") == key(roughness="0.4", transmission="0.2")
-    assert key(hollow="true") != key() != key([["relight", {}]])
 
 
 @pytest.mark.parametrize("colour", ["#ffffff", "#80ff10", "#010203"])

@@ -33,11 +33,6 @@ def test_welcome(sent, alone, everyone):
     assert HostCheck(None, None).allows(headers(**sent)) is everyone
 
 
-def test_the_address_it_was_started_on_is_one_of_its_names():
-    assert HostCheck(None, names_of("127.0.0.2")).allows(headers(host="127.0.0.2:80"))
-    assert not HostCheck(None, ALONE).allows(headers(host="127.0.0.2:80"))
-
-
 @pytest.mark.parametrize("kind", ["http", "websocket", "lifespan"])
 def test_what_is_refused_goes_no_further(kind):
     reached, sent = [], []

@@ -97,13 +97,6 @@ def test_choosing_an_object_brings_its_values(session):
     assert (values["thing"], values["scale"], values["height"]) == (None, 2, 2.5)
 
 
-def test_what_rolls_out_of_the_picture_is_told(session):
-    pytest.importorskip("mujoco", reason="needs the physics extra")
-    objects.set_option(session, "mesh", library_file(session, "Cube"))
-    objects.place(session, 50, 40)  # at a wall, with no floor below
-    assert "where the camera does not look" in objects.let_fall(session, 0.5)[-1]
-
-
 def test_what_falls_beside_everything_changes_nothing(session, monkeypatch):
     objects.set_option(session, "mesh", library_file(session, "Ball"))
     objects.place(session, 50, 40)

@@ -6,10 +6,9 @@ import pytest
 from studio_scenes import click, named
 
 from materialist.jobs.queue import STOPPED, Job
-from materialist.jobs.worker import DONE, FAILED
+from materialist.jobs.worker import FAILED
 from materialist.studio import tasks
 from materialist.studio.progress import failure
-from materialist.studio.session import Session
 from materialist.studio.tab_open import _following, _opened
 
 
@@ -51,14 +50,6 @@ def test_the_list_and_what_is_wrong_with_it_are_shown(studio, session):
     session.act("remove", 0)
 
 
-def test_the_commands_are_those_of_the_list(studio, session):
-    context = named(studio)
-    assert "materialist apply" not in context.picture(session)["commands"]
-    session.light(rotate="20")
-    assert "materialist apply" in context.picture(session)["commands"]
-    assert context.picture(Session("me"))["commands"] == ""
-
-
 def test_what_failed_is_called_by_its_name(tmp_path):
     spec = {"photo": str(tmp_path / "original.jpg"), "scene": str(tmp_path / "photo.scene"), "title": "Kitchen.JPG"}
     job = Job(
@@ -70,10 +61,3 @@ def test_what_failed_is_called_by_its_name(tmp_path):
         message=f"{tmp_path}/original.jpg is cut off; {tmp_path}/x.exr as well.",
     )
     assert failure(job) == "Kitchen.JPG is cut off; x.exr as well."
-
-
-def test_a_photo_that_is_done_stays_known(studio, session):
-    project = studio.work.new("Fine", "me")
-    job = Job("invert", "me", project.folder, tasks.invert, state=DONE)
-    updates = list(_following(named(studio), session, project, job))
-    assert [update["last"] for update in updates if "last" in update] == [studio.bookmark(project)]

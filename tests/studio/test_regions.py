@@ -45,13 +45,6 @@ def test_a_region_that_cannot_be_changed_changes_nothing(session, tmp_path):
     assert (session.edits, session.selection, session._past) == (stack, selection, past)
 
 
-def test_choosing_what_has_no_region_changes_nothing(session, tmp_path):
-    loaded(session, tmp_path, "- edit: {click: [25, 24], hue: 50}\n- edit: {click: [3, 1], hue: 50, skip: true}")
-    with pytest.raises(InputError, match="sky"):
-        session.act("choose", 1)
-    assert session.edits.current is None
-
-
 @pytest.mark.parametrize(
     ("bad", "words"),
     [("edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 5}", "exactly one"), ("relight: {rotate: abc}", "rotate"),
@@ -85,16 +78,3 @@ def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
     assert "took away" in stage(session)["badge"]
     session.edits = session.edits.without(0)
     assert "took away" not in stage(session)["badge"]
-
-
-def test_no_folders_in_what_is_said_of_a_region(session):
-    click(session)
-    session.live.wait()
-    session.material(hue="20")
-    (session.workspace / session.edits.steps[0].options["mask"]).write_bytes(b"no mask")
-    session.live._edited.clear()
-    session.edits = session.edits.chosen(None)
-    with pytest.raises(InputError, match="mask-") as error:
-        session.act("choose", 0)
-    assert str(session.workspace) not in str(error.value) and str(session.workspace) not in stage(session)["badge"]
-    assert "mask-" in stage(session)["badge"]

@@ -3,7 +3,6 @@
 import importlib.util
 
 import numpy as np
-import pytest
 from studio_scenes import room
 
 from materialist.errors import WeightsError
@@ -37,20 +36,3 @@ def test_it_is_asked_for_clicks_and_boxes_and_not_for_the_brush(monkeypatch):
     Selection().box(room(), [1, 1, 9, 9], "new", "sam2")
     Selection().brush(room(), [[1, 1]], 3, "new")
     assert asked == ["sam2", "sam2", "network"]
-
-
-@pytest.mark.parametrize("missing", [None, "Its weights are not here."])
-def test_the_page_offers_it_or_says_why_not(monkeypatch, tmp_path, missing):
-    pytest.importorskip("gradio", reason="needs gradio")
-    from materialist.jobs.queue import JobQueue
-    from materialist.studio import page
-    from materialist.studio.studio import Studio
-    from materialist.studio.workspace import WorkFolder
-
-    monkeypatch.setattr(page, "sam_missing", lambda: missing)
-    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
-    try:
-        (box,) = (b for b in page.build(studio).blocks.values() if getattr(b, "elem_id", None) == "sam")
-    finally:
-        studio.jobs.close()
-    assert box.interactive == (missing is None) and (missing is None or box.info == missing) and not box.value

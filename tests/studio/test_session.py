@@ -11,7 +11,7 @@ from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio import objects
 from materialist.studio.edit_list import EditList
-from materialist.studio.objects import LIBRARY, library_file, shape
+from materialist.studio.objects import library_file
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -34,21 +34,6 @@ def test_an_edit_from_click_to_recipe(session):
     session.material(hue=None)
     session.material(roughness=None)
     assert apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min() == 0.5
-
-
-def test_the_picture_follows(session):
-    before = stage(session)
-    assert before["badge"] == "Photo" and before["picture"].startswith("data:image/jpeg")
-    click(session)
-    session.material(hue="120")
-    after = stage(session)
-    assert after["badge"] == "Live preview" and after["picture"] != before["picture"] and after["fill"]
-    session.act("toggle", 0)
-    assert stage(session)["picture"] == before["picture"]
-    session.act("toggle", 0)
-    assert stage(session)["picture"] == after["picture"]
-    assert session.undo() and session.undo() and session.undo()
-    assert stage(session)["picture"] == before["picture"]
 
 
 def test_quick_pictures_agree_with_slow_ones(session):
@@ -105,15 +90,6 @@ def test_another_edit_is_ticked_or_moved_and_keeps_its_region(session, what):
     assert after["90"] == masks["90"] and session.edits.steps[session.edits.current].options["hue"] == "20"
 
 
-def test_an_edit_that_is_switched_off_is_out_of_hand(session):
-    click(session)
-    session.material(hue="90")
-    session.act("toggle", 0)
-    assert session.in_hand is None
-    session.material(hue="20")  # of the selection, which is still there
-    assert [step.options["hue"] for step in session.edits.steps] == ["90", "20"]
-
-
 def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
     place_lamp(session, 40, 40)
     session.act("toggle", 0)
@@ -161,16 +137,6 @@ def test_light_and_lamps(session):
         place_lamp(session, 5, 1)
     session.light(lamps=None)
     assert session.edits.steps == ()
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_things_are_closed_and_stand_up(name):
-    mesh = shape(name)
-    assert mesh.is_watertight and mesh.volume > 0 and 0.8 < mesh.extents.max() <= 1.001
-    if name in ("Cylinder", "Cone"):
-        assert mesh.extents.argmax() == 1
-    if name in ("Ring", "Slab"):
-        assert mesh.extents.argmin() == 1
 
 
 def test_an_object_is_placed_moved_and_seen(session):
@@ -290,7 +256,8 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
     with pytest.raises(InputError, match=r"left as they are.*wood.*edits\.yaml"):
         other.open(project)
     assert other.project is None and other.live is None
-    assert other.write_edits() == "" and file.read_text() == text
+    other.save()
+    assert not other.edits.active and file.read_text() == text
     file.unlink()
 
 
@@ -304,27 +271,4 @@ def test_another_page_s_edits_are_not_overwritten(session):
     with pytest.raises(InputError, match="changed in another place"):
         session.material(roughness="0.9")
     assert (session.workspace / "edits.yaml").read_bytes() == written
-    assert other.final_file != session.final_file
     other.close()
-
-
-def test_a_job_has_the_edits_of_its_click(session):
-    assert session.edits_now() == ""
-    click(session)
-    session.material(roughness="0.1")
-    job = session.edits_now()
-    session.material(roughness="0.9")
-    (step,) = read_recipe(job)
-    assert step.options["roughness"] == "0.1" and (step.folder / step.options["mask"]).is_file()
-    assert session.edits_now() != job
-
-
-def test_each_button_stops_its_own_job(session):
-    from types import SimpleNamespace
-
-    stopped = []
-    session.running.update(invert="a", final="b")
-    jobs = SimpleNamespace(stop=stopped.append)
-    session.stop(jobs, "invert")
-    session.stop(jobs, "take")
-    assert stopped == ["a"]

@@ -8,11 +8,11 @@ import pytest
 from studio_scenes import block, package, room
 
 from materialist.edits.light.relight import checked_envmap
+from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
 from materialist.io.examples import example_path
 from materialist.studio import lights, stage, tasks
 from materialist.studio.selection import Selection
-from materialist.studio.widgets import hex_colour
 
 
 def decoded(url: str) -> np.ndarray:
@@ -47,18 +47,6 @@ def test_lights_are_environment_maps(name):
         assert light[:32].sum() > 2 * light[32:].sum()
 
 
-def test_the_overcast_sky_is_the_cie_standard():
-    light = lights.light("Overcast", 256)
-    assert light[0, 0, 1] / light[127, 0, 1] == pytest.approx(3, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("text", "colour"), [("#C02010", "#c02010"), ("rgba(192, 32, 16, 1)", "#c02010"), ("?", "#808080")]
-)
-def test_colours_of_the_picker(text, colour):
-    assert hex_colour(text) == colour
-
-
 class Told:
     def __init__(self):
         self.stages, self.pictures = [], []
@@ -91,8 +79,8 @@ def test_what_was_found_is_shown(tmp_path):
 def test_taking_away(tmp_path):
     scene = package(tmp_path)
     (tmp_path / "edits.yaml").write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n")
-    tasks.take(Told(), str(scene), str(tmp_path / "edits.yaml"), str(tmp_path / "a.zip"), "glb")
-    tasks.take(Told(), str(scene), "", str(tmp_path / "a.html"), "html")
+    tasks.take(Told(), str(scene), tuple(read_recipe(tmp_path / "edits.yaml")), str(tmp_path / "a.zip"), "glb")
+    tasks.take(Told(), str(scene), (), str(tmp_path / "a.html"), "html")
     tasks.mesh(Told(), str(scene), str(tmp_path / "a.glb"))
     import zipfile
 

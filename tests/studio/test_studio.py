@@ -57,17 +57,6 @@ def test_tokens_are_checked(shared, token):
         shared.person(token)
 
 
-def test_alone_everyone_is_me(tmp_path):
-    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
-    assert studio.person("whatever") == ALONE
-    studio.jobs.close()
-
-
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.8.8.8"])
-def test_this_machine_needs_no_password(host):
-    assert check_host(host, None, False)
-
-
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "example.org", "::"])
 def test_others_need_leave(host):
     with pytest.raises(InputError, match="--password"):

@@ -1,14 +1,11 @@
 """The work folder: names of ours, people apart, nothing lost."""
 
 import json
-from pathlib import Path
 
 import pytest
 
-from materialist.errors import InputError, OutputError
-from materialist.jobs.queue import JobQueue
-from materialist.studio.studio import Studio
-from materialist.studio.workspace import CARD, WorkFolder, default_root
+from materialist.errors import OutputError
+from materialist.studio.workspace import CARD, WorkFolder
 
 
 def test_a_project_survives_a_restart(tmp_path):
@@ -40,31 +37,6 @@ def test_people_see_their_own(tmp_path):
     assert [p.name for p in work.projects("bert")] == [other.name] and work.projects("carl") == []
 
 
-@pytest.mark.parametrize("name", ["../x", "photo-001/../..", "", "photo-1", ".cache"])
-def test_a_name_from_the_page_must_be_in_the_list(tmp_path, name):
-    studio = Studio(WorkFolder(tmp_path), JobQueue(1))
-    studio.work.new("a", "me")
-    with pytest.raises(InputError):
-        studio.project(name, "me")
-    studio.jobs.close()
-
-
-@pytest.mark.parametrize("person", ["", "a", "../up", "A B", "x" * 40])
-def test_a_desk_needs_a_plain_name(tmp_path, person):
-    with pytest.raises(InputError):
-        WorkFolder(tmp_path).new("a", "me").workspace(person)
-
-
-def test_the_last_used_comes_first(tmp_path):
-    work = WorkFolder(tmp_path)
-    first, second = work.new("a", "me"), work.new("b", "me")
-    import os
-
-    os.utime(second.folder / CARD, (1, 1))
-    work.touch(first)
-    assert [p.name for p in work.projects()] == [first.name, second.name]
-
-
 def test_a_damaged_card_hides_its_project_alone(tmp_path):
     work = WorkFolder(tmp_path)
     broken, good = work.new("a", "me"), work.new("b", "me")
@@ -84,13 +56,6 @@ def test_a_file_in_the_way_is_one_sentence(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(OutputError, match="cannot be made"):
         WorkFolder(tmp_path / "file" / "work")
-
-
-def test_the_default_is_below_the_current_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert default_root() == tmp_path / "materialist-studio"
-    monkeypatch.setattr("os.access", lambda *_: False)
-    assert default_root().parent == Path(__import__("tempfile").gettempdir())
 
 
 def test_caches_of_dead_studios_go(tmp_path):

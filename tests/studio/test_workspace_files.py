@@ -17,12 +17,6 @@ def test_every_file_of_a_list_is_looked_at(tmp_path):
             confined(Step("drop", {"mesh": ["mesh-1.ply", other], "at": ["3", "4"]}), tmp_path)
 
 
-def test_a_method_is_no_file(tmp_path):
-    assert confined(Step("glass", {"thickness": "sweep"}), tmp_path).options == {"thickness": "sweep"}
-    with pytest.raises(InputError, match="plain file name"):
-        confined(Step("glass", {"thickness": "/etc/passwd"}), tmp_path)
-
-
 def test_a_file_that_was_not_written_whole_is_written_again(tmp_path, monkeypatch):
     from materialist.io import image
 

@@ -15,30 +15,13 @@ from materialist.batches.remote import is_url, version
 from materialist.batches.results import file_hash, whole_size
 from materialist.batches.task import PhotoTask
 from materialist.errors import InputError, MaterialistError
-from materialist.io.decoded import MIN_SIDE
-from materialist.pipeline import check_overrides
+from materialist.options import InvertOptions
 from materialist.predict import CHOICES
-
-LARGEST = 8192
-"""Longer side of the working image, as `invert` takes it."""
 
 
 def check_options(options: dict[str, Any]) -> None:
     """Refuse, before any photo is touched, what would fail every photo in the same way. Raises InputError."""
-    check_overrides(options)
-    size, fov, seed = options["size"], options["fov"], options["seed"]
-    if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= LARGEST:
-        raise InputError(
-            f"The working size must be a whole number of pixels from {MIN_SIDE} to {LARGEST}, not {size!r}."
-        )
-    try:
-        angle_fits = fov in ("auto", None) or 1 < float(fov) < 170
-    except (TypeError, ValueError):
-        angle_fits = False
-    if not angle_fits:
-        raise InputError(f"The field of view must be between 1 and 170 degrees (or auto), not {fov}.")
-    if not isinstance(seed, int) or seed < 0:
-        raise InputError(f"Seed is {seed}; give 0 or more.")
+    InvertOptions.given(**options)
     known = {choice.partition("[")[0].partition(":")[0] for choice in CHOICES.split(", ")}
     for part in ("predictor", "albedo", "roughness", "metallic", "normal", "depth"):
         spec = options.get(part)

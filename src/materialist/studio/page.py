@@ -149,12 +149,12 @@ def _wire_final(context: PageContext) -> None:
         def run(request: gr.Request) -> Any:
             session = context.session(request)
             _ = session.scene
-            steps_now, edits = session.edits.active, session.edits_now()
-            if not edits or session.project is None:
+            steps_now = session.edits.active
+            if not steps_now or session.project is None:
                 raise InputError("There is no edit to render yet: change something first.")
-            target = session.final_file
+            target = context.studio.final_file(session)
             job = context.studio.submit(
-                session, tasks.final, session.workspace, scene=str(session.project.scene), edits=edits,
+                session, tasks.final, target.parent, scene=str(session.project.scene), steps=steps_now,
                 output=str(target), spp=spp,
             )  # fmt: skip
             yield from context.following(job, "progress", "stop")

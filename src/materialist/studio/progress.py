@@ -58,7 +58,9 @@ def shown(jobs: JobQueue, job: Job) -> str:
 def failure(job: Job) -> str:
     """Why a job failed, its files by their names alone; the photo as its owner calls it."""
     text = job.message
-    for key in ("photo", "scene", "edits", "output", "mesh"):
+    for step in job.arguments.get("steps", ()):
+        text = text.replace(f"{step.folder}/", "")
+    for key in ("photo", "scene", "output", "mesh"):
         if key in job.arguments:
             file = Path(job.arguments[key])
             text = without_paths(

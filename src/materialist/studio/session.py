@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
 import secrets
 import threading
 from dataclasses import dataclass
@@ -71,7 +69,8 @@ class Session:
         self.running: dict[str, Job] = {}
         """The last job of each kind (invert, final, take, fall) that this page asked for."""
         self._ending: list[Job] = []
-        self._mark = f"{os.getpid()}-{secrets.token_hex(4)}"
+        self.mark = secrets.token_hex(4)
+        """Tells this page's path-traced pictures from those of other pages."""
         self._kept: bytes | None = None
         """The list of edits as this page last read or wrote it."""
         self.final: FinalPicture | None = None
@@ -89,11 +88,6 @@ class Session:
         if self.project is None:
             raise InputError("Open a photo first.")
         return self.project.workspace(self.person)
-
-    @property
-    def final_file(self) -> Path:
-        """Where this page's path-traced pictures lie, without the ending: two pages may show one photo."""
-        return self.workspace / f"final-{self._mark}"
 
     def note_job(self, job: Job) -> None:
         """Note a job that this page asked for, to stop it by a button, or when the page is closed."""
@@ -141,9 +135,9 @@ class Session:
                 self.live.close()
             if self.glass is not None:
                 self.glass.stop()
-            if self.project is not None:
+            if self.final is not None:
                 for suffix in (".png", ".exr", ".jpg"):
-                    self.final_file.with_suffix(suffix).unlink(missing_ok=True)
+                    self.final.path.with_suffix(suffix).unlink(missing_ok=True)
             self.project = self.live = self.glass = self.final = None
             self.edits, self._past = EditList(), []
             self.selection = Selection()
@@ -278,24 +272,6 @@ class Session:
             _ = self.scene
             read = unpack if file.suffix.lower() == ".zip" else read_steps
             self.change("load", EditList(read(self.workspace, file)))
-
-    # Files
-
-    def write_edits(self) -> str:
-        """The recipe as a file for other commands; an empty text where no step is on."""
-        with self.lock:
-            self.save()
-            return str(self.workspace / EDITS) if self.edits.active else ""
-
-    def edits_now(self) -> str:
-        """A copy of the recipe for a job, which runs later: what is changed meanwhile is not in it. "" as above."""
-        with self.lock:
-            if not self.write_edits():
-                return ""
-            content = (self.workspace / EDITS).read_bytes()
-            copy = self.workspace / f"job-{os.getpid()}-{hashlib.sha256(content).hexdigest()[:12]}.yaml"
-            copy.write_bytes(content)
-            return str(copy)
 
     # Within
 

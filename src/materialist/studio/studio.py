@@ -18,7 +18,7 @@ from materialist.errors import InputError, OutputError
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import tasks
 from materialist.studio.session import Session
-from materialist.studio.workspace import Project, WorkFolder, tidy
+from materialist.studio.workspace import Project, WorkFolder
 
 ALONE = "me"
 """The person, where the studio serves this machine only."""
@@ -103,17 +103,8 @@ class Studio:
         free()
         if psutil.virtual_memory().available < _LEAST_FREE:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
-        self._tidy(project, session.person)
         session.open(project)
         self.work.touch(project)
-
-    def _tidy(self, project: Project, person: str) -> None:
-        """Remove what earlier pages left in a workspace that no page has open and no job writes to."""
-        workspace = project.workspace(person)
-        with self._lock:
-            pages = [one for one in self._sessions.values() if one.person == person and one.project == project]
-        if not pages and not any(job.folder == workspace and not job.over for job in self.jobs.of(person)):
-            tidy(workspace)
 
     def job(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
         """A job for a page: a function of `tasks`, which writes into `folder`."""
@@ -134,6 +125,10 @@ class Studio:
             session.close()
             del session
             free()
+
+    def final_file(self, session: Session) -> Path:
+        """Where a page's path-traced pictures lie, without the ending; they go when the studio ends."""
+        return self.work.cache / f"final-{session.mark}"
 
     def public_copy(self, file: Path) -> str:
         """A copy of a result in the cache, the only place of served files, in a folder with a random name."""

@@ -80,7 +80,7 @@ def wire(context: PageContext) -> None:
                     return
             if what in ("png", "exr"):
                 if job is not None:
-                    final = session.final = FinalPicture(steps, session.final_file, SPP)
+                    final = session.final = FinalPicture(steps, context.studio.final_file(session), SPP)
                 assert final is not None
                 shutil.copyfile(final.path.with_suffix(file.suffix), file)
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
@@ -99,18 +99,20 @@ def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job
     """The job that makes the file; None where the final picture is there already."""
     assert session.project is not None
     submit = partial(context.studio.submit, session)
-    given = {"scene": str(session.project.scene), "edits": session.edits_now()}
+    given = {"scene": str(session.project.scene), "steps": session.edits.active}
     if what in ("png", "exr"):
         final = session.final
         if final is not None and final.of(session.edits.active) and final.spp >= SPP:
             return None
-        return submit(tasks.final, session.workspace, output=str(session.final_file), spp=SPP, **given)
+        target = context.studio.final_file(session)
+        return submit(tasks.final, target.parent, output=str(target), spp=SPP, **given)
     more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
     return submit(tasks.take, session.workspace, output=str(file), what=what, **given, **more)
 
 
 def _pack_edits(session: Session, file: Path) -> None:
     """edits.yaml and every file it names."""
-    if not session.write_edits():
+    session.save()
+    if not session.edits.active:
         raise InputError("There is no edit to take away yet: change something first.")
     pack(session.edits.steps, session.workspace / EDITS, file)

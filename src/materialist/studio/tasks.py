@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from materialist.color import srgb_levels
+from materialist.edits.recipe import Step
 from materialist.errors import SetupError
 from materialist.io.beside import partial
 from materialist.jobs.worker import Report
 from materialist.types import Array, Materials, Prediction, Scene
 
+Steps = tuple[Step, ...]
 Task = Callable[..., dict[str, Any]]
 """task(report, **arguments) -> what the studio is told."""
 
@@ -88,13 +90,13 @@ def _materials(before: str, maps: Materials) -> dict[str, Array]:
     }
 
 
-def final(report: Report, scene: str, edits: str, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
+def final(report: Report, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import warnings_since
 
-    loaded, edited = _edited(report, scene, edits)
+    loaded, edited = _edited(report, scene, steps)
     picture = composite(loaded, edited, spp=spp, seed=seed, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
@@ -119,11 +121,11 @@ def mesh(report: Report, scene: str, output: str, triangles: int = 60_000) -> di
 
 
 def take(
-    report: Report, scene: str, edits: str, output: str, what: str, spp: int = 256, frames: int = 36
+    report: Report, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36
 ) -> dict[str, Any]:
     """One thing to take away, as a single file at `output` (its suffix included)."""
     maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
-    loaded, edited = _edited(report, scene, edits)
+    loaded, edited = _edited(report, scene, steps)
     maker.get(what, _exported)(report, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
     return {"file": output}
 
@@ -148,14 +150,14 @@ def fall(
     return {"file": output}
 
 
-def _edited(report: Report, scene: str, edits: str) -> tuple[Scene, Scene]:
+def _edited(report: Report, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     """The fitted scene, and the same after the list of edits (if there is one)."""
-    from materialist.edits.recipe import apply, read_recipe
+    from materialist.edits.recipe import apply
     from materialist.io.package import load_scene
 
     report("load", 0, 1)
     loaded = load_scene(scene)
-    return loaded, apply(loaded, read_recipe(edits)) if edits else loaded
+    return loaded, apply(loaded, list(steps)) if steps else loaded
 
 
 def _package(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:

@@ -34,8 +34,6 @@ FILES = ("mask", "texture", "envmap", "mesh", "background")
 """Options that name a file."""
 WORDS = ("thickness", "inpaint")
 """Options that name a method, or a file."""
-_TEMPORARY = re.compile(r"(?:final|job)-(?:(\d+)-)?[0-9a-f]+\.(?:png|exr|jpg|yaml)")
-"""What `session.Session` writes for a while: which process, and a mark of the page or the content."""
 
 
 @dataclass(frozen=True)
@@ -198,14 +196,6 @@ def _written(file: Path, write: Callable[[Path], Any]) -> str:
 
 def _name(stem: str, content: bytes, suffix: str) -> str:
     return f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
-
-
-def tidy(workspace: Path) -> None:
-    """Remove path-traced pictures and lists of jobs that pages have left; those of another studio that runs stay."""
-    for file in workspace.iterdir():
-        left = _TEMPORARY.fullmatch(file.name)
-        if left and (left[1] is None or int(left[1]) == os.getpid() or not psutil.pid_exists(int(left[1]))):
-            file.unlink(missing_ok=True)
 
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
