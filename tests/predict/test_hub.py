@@ -9,7 +9,7 @@ from made_matnet import made_photo
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.marigold import Marigold, appearance, unit_normals
+from materialist.predict.marigold import appearance, unit_normals
 from materialist.predict.protocol import MAPS
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -90,19 +90,19 @@ def test_marigold_gives_all_maps_with_their_sources(marigold):
 
 
 def test_marigold_sees_srgb_and_only_the_wanted_models_run(marigold, monkeypatch):
-    from materialist.predict import marigold as module
+    from materialist.predict import hub
 
-    seen, kinds, build = [], [], module._pipeline
+    seen, kinds, build = [], [], hub.pipeline
 
-    def spy(folder, kind, gpu):
+    def spy(kind, folder, gpu):
         kinds.append(kind)
-        pipeline = build(folder, kind, gpu)
+        pipeline = build(kind, folder, gpu)
         return type("Spy", (), {
             "__call__": lambda self, image, **k: seen.append(image) or pipeline(image, **k),
             "__getattr__": lambda self, name: getattr(pipeline, name),
         })()  # fmt: skip
 
-    monkeypatch.setattr(module, "_pipeline", spy)
+    monkeypatch.setattr(hub, "pipeline", spy)
     photo = made_photo()
     prediction = get_predictor("constant", albedo="marigold", device="cpu").predict(photo)
     assert kinds == ["MarigoldIntrinsicsPipeline"]
@@ -243,7 +243,3 @@ def test_appearance_reads_the_order_and_the_colour_space_of_the_targets():
 def test_normals_keep_their_direction_and_get_their_length():
     output = np.array([[[0.3, 0, 0.4], [0, 0, 0]]], np.float32)
     assert np.allclose(unit_normals(output), [[[0.6, 0, 0.8], [0, 0, 1]]])
-
-
-def test_every_map_has_a_marigold_model():
-    assert {name for part in Marigold()._parts for name in part.gives} == set(MAPS)

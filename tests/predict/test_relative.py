@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.predict.normals import normals_from_depth
-from materialist.predict.relative import DEFAULT_RATIO, from_affine, from_inverse
+from materialist.predict.relative import SETTINGS, from_affine, from_inverse
 from materialist.types import Camera
 
 CAMERA = Camera(96, 72, 50.0)
@@ -44,9 +44,9 @@ def test_without_normals_the_ratio_is_the_documented_one():
     for convert, relative in ((from_inverse, 3 / true + 0.7), (from_affine, 0.1 * true - 4)):
         for normal in (None, np.zeros((72, 96, 3), np.float32)):
             depth, ratio = convert(relative.astype(np.float32), CAMERA, normal)
-            assert ratio == DEFAULT_RATIO and depth.dtype == np.float32
+            assert ratio == SETTINGS.ratio and depth.dtype == np.float32
             near, far = np.percentile(depth, (0.5, 99.5))
-            assert (near, far) == (pytest.approx(1, rel=1e-3), pytest.approx(DEFAULT_RATIO, rel=1e-3))
+            assert (near, far) == (pytest.approx(1, rel=1e-3), pytest.approx(SETTINGS.ratio, rel=1e-3))
             assert (np.diff(depth[40:, 5]) <= 0).all()  # the floor comes nearer downwards
 
 

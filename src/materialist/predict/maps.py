@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +12,26 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.predict import resample
 from materialist.predict.normals import normals_from_depth
-from materialist.predict.protocol import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part
-from materialist.types import Array, Materials, Photo, Prediction
+from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
+from materialist.types import Array, Photo, Prediction
 
-SLIGHT = 0.1
-"""How far outside its range a value may be and still be clipped with a warning."""
-BEYOND = 1e5
-"""How many times the nearest surfaces' depth is no surface: renderers write large numbers for what they do not hit."""
-WILD_FRACTION = 0.01
-"""Above this fraction of pixels further outside, the map is in another unit and refused."""
+@dataclass(frozen=True)
+class MapSettings:
+    """Limits within which the values of a foreign map are mended; beyond them the map is refused. Tuned by eye."""
+
+    excess: float = 0.1  # farthest outside of its range that a value is clipped with a warning
+    wild: float = 0.01  # share of values farther outside from which the map is in another unit
+    beyond: float = 1e5  # multiple of the nearest surfaces' depth that is sky: renderers write it for missed rays
+    known_normal: float = 0.2  # length of a normal from which it is known
+
+
+SETTINGS = MapSettings()
 
 
 class MapsPredictor:
     """Reads albedo, roughness, metallic, normal and depth as .exr or .png from a folder."""
+
+    gives = MAPS
 
     def __init__(self, folder: str | Path):
         if not str(folder):
@@ -46,32 +54,23 @@ class MapsPredictor:
         """The maps at the working size of the photo; `seed` changes nothing.
 
         A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal comes from depth;
-        both, and every resampling and clipping, are told in `warnings`. Raises InputError when albedo or depth is
-        missing, a map has another aspect ratio than the photo, or its values cannot be meant.
+        warnings tell both, and every resampling and clipping. Raises InputError when albedo or depth is missing, a map
+        has another aspect ratio than the photo, or its values cannot be meant.
         """
-        size = photo.linear.shape[:2]
-        warnings: list[str] = []
-        depth = self._needed("depth", size, warnings)
-        albedo = self._needed("albedo", size, warnings)
-        materials = Materials(
-            albedo=albedo,
-            roughness=self._scalar("roughness", NEUTRAL_ROUGHNESS, size, warnings),
-            metallic=self._scalar("metallic", NEUTRAL_METALLIC, size, warnings),
-        )
-        normal = self._normal(photo, depth, warnings)
-        return Prediction(materials, normal, depth, predictor=self.name, warnings=tuple(warnings))
+        return whole(self, photo)
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
         """Only the wanted maps, as `predict`; the folder need not hold any other. Raises InputError as `predict`."""
-        size, maps = photo.linear.shape[:2], {}
+        size, maps = photo.linear.shape[:2], dict[str, Array]()
         warnings: list[str] = []
-        for name in sorted(wanted, key=lambda name: name == "normal"):  # which may need the depth
-            if name in ("roughness", "metallic"):
-                neutral = NEUTRAL_ROUGHNESS if name == "roughness" else NEUTRAL_METALLIC
-                maps[name] = self._scalar(name, neutral, size, warnings)
+        for name in sorted(wanted, key=lambda name: name == "normal"):  # normals may need the depth
+            if name == "roughness":
+                maps[name] = self._scalar(name, NEUTRAL_ROUGHNESS, size, warnings)
+            elif name == "metallic":
+                maps[name] = self._scalar(name, NEUTRAL_METALLIC, size, warnings)
             elif name == "normal":
                 own = None if "depth" in maps else self._fitted(name, size, warnings)
-                # Beside another depth, what is unknown is for that to tell.
+                # Beside the depth of another source, unknown normals are derived from that depth.
                 maps[name] = self._normal(photo, maps.get("depth"), warnings) if own is None else own
             else:
                 maps[name] = self._needed(name, size, warnings)
@@ -188,8 +187,8 @@ def _check_finite(values: Array, path: Path) -> None:
 def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
     """Albedo, roughness, metallic: in [0, 1], slight excess clipped, anything else refused."""
     _check_finite(values, path)
-    wild = (values < -SLIGHT) | (values > 1 + SLIGHT)
-    if wild.mean() > WILD_FRACTION:
+    wild = (values < -SETTINGS.excess) | (values > 1 + SETTINGS.excess)
+    if wild.mean() > SETTINGS.wild:
         raise InputError(
             f"{path} has values from {values.min():.4g} to {values.max():.4g}; this map must be in [0, 1] "
             "(divide by 255 or 65535 if it was written as integers)."
@@ -206,7 +205,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
         values = np.where(np.isposinf(values), 0, values)
     _check_finite(values, path)
     negative = values < 0
-    if negative.mean() > WILD_FRACTION:
+    if negative.mean() > SETTINGS.wild:
         raise InputError(
             f"{path} has negative depths (down to {values.min():.4g}); depth is a positive distance along -Z."
         )
@@ -214,7 +213,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
         warnings.append(f"{path.name} has {int(negative.sum())} negative depths: taken as no surface.")
     values = np.maximum(values, 0)
     if (values > 0).any():
-        far = values > BEYOND * np.percentile(values[values > 0], 5)
+        far = values > SETTINGS.beyond * np.percentile(values[values > 0], 5)
         if far.any():
             warnings.append(f"{path.name} has depths of up to {values.max():.3g}: taken as sky (no surface).")
             values = np.where(far, 0, values).astype(np.float32)
@@ -229,9 +228,9 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     """Normals: unit vectors facing the viewer; a zero vector means unknown."""
     _check_finite(values, path)
     length = np.linalg.norm(values, axis=-1)
-    known = length > 0.2
-    wrong = (np.abs(length[known] - 1) > SLIGHT).mean() > 0.05 if known.any() else True
-    if wrong and path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SLIGHT:
+    known = length > SETTINGS.known_normal
+    wrong = (np.abs(length[known] - 1) > SETTINGS.excess).mean() > 0.05 if known.any() else True
+    if wrong and path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SETTINGS.excess:
         raise InputError(f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR.")
     if wrong:
         raise InputError(f"{path} does not hold unit vectors (median length {np.median(length):.3g}).")
@@ -242,10 +241,4 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     return np.where(known[..., None], values / np.maximum(length, 1e-6)[..., None], 0).astype(np.float32)
 
 
-_CHECKS = {
-    "albedo": _unit_range,
-    "roughness": _unit_range,
-    "metallic": _unit_range,
-    "depth": _depth_range,
-    "normal": _unit_normals,
-}
+_CHECKS = dict.fromkeys(MAPS[:3], _unit_range) | {"depth": _depth_range, "normal": _unit_normals}

@@ -1,6 +1,9 @@
-"""Depths without scale and shift made into planar depth (docs/predictors.md, "Relative depth")."""
+"""Planar depth from depths without scale and shift (docs/predictors.md, "Relative depth")."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -8,21 +11,25 @@ import numpy as np
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Camera
 
-DEFAULT_RATIO = 4.0
-"""Far over near where no normal map says more: a room seen from inside it."""
-RATIOS = np.geomspace(1.1, 60, 44)
-"""Far over near that are tried against a normal map."""
-ENDS = (0.5, 99.5)
-"""Percentiles that count as the nearest and the farthest surface; beyond them lie outliers."""
-TRIAL_SIZE = 96
-"""Longer side, pixels, at which ratios are tried."""
+@dataclass(frozen=True)
+class RelativeSettings:
+    """Search for the ratio of the farthest surface to the nearest. Tuned by eye."""
+
+    ratio: float = 4.0  # the ratio where no normal map tells more: a room seen from inside it
+    range: tuple[float, float] = (1.1, 60.0)  # ratios tried against a normal map
+    trials: int = 44  # ratios tried, evenly spaced in their logarithm
+    percentiles: tuple[float, float] = (0.5, 99.5)  # the nearest and the farthest surface; outliers lie beyond
+    side: int = 96  # longer side of the copy on which ratios are tried, pixels
+
+
+SETTINGS = RelativeSettings()
 
 
 def from_inverse(inverse: Array, camera: Camera, normal: Array | None = None) -> tuple[Array, float]:
     """Planar depth of an affine-invariant inverse depth: 1 / depth = s * inverse + t with s > 0 and t unknown.
 
-    Scale is a convention (the nearest surface is at 1); the shift is the ratio of the farthest surface to the nearest.
-    It is the one whose surface has the normals that are given, else `DEFAULT_RATIO`.
+    Scale is a convention: the nearest surface is at 1. The shift follows from the ratio of the farthest surface to the
+    nearest: the ratio whose surface has the given normals, else `RelativeSettings.ratio`.
 
     Args:
         inverse: [H, W] float32, any unit, larger is nearer.
@@ -51,37 +58,33 @@ def from_affine(relative: Array, camera: Camera, normal: Array | None = None) ->
 
 
 def _unit(values: Array) -> Array:
-    """[H, W] with the percentiles `ENDS` at 0 and 1; a constant map becomes 1."""
-    low, high = np.percentile(values, ENDS)
+    """[H, W] with the settings' percentiles at 0 and 1; a constant map becomes 1."""
+    low, high = np.percentile(values, SETTINGS.percentiles)
     if high - low <= 1e-6 * max(abs(low), abs(high), 1e-6):
         return np.ones(values.shape, np.float32)
     return ((values - low) / (high - low)).astype(np.float32)
 
 
-def _scaled(t: Array, depth, camera: Camera, normal: Array | None) -> tuple[Array, float]:
-    """The depth of the best ratio."""
-    ratio = DEFAULT_RATIO if normal is None else _best_ratio(t, depth, camera, normal)
-    return depth(ratio, t).astype(np.float32), ratio
+def _scaled(t: Array, depth: Callable, camera: Camera, normal: Array | None) -> tuple[Array, float]:
+    """`depth(ratio, t)` at the ratio whose surface has the least mean angle to the normals, tried on a small copy.
 
-
-def _best_ratio(t: Array, depth, camera: Camera, normal: Array) -> float:
-    """The ratio whose surface agrees best with the normals: least mean angle, on a small copy.
-
-    Not the median: a wall that faces the camera has its normals at every ratio, and may be most of the picture.
+    The mean and not the median, because a wall that faces the camera has its normals at every ratio and may be most of
+    the picture.
     """
-    scale = min(1.0, TRIAL_SIZE / max(t.shape))
-    size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
-    small_t = cv2.resize(t, size, interpolation=cv2.INTER_AREA)
-    small_n = cv2.resize(np.ascontiguousarray(normal, np.float32), size, interpolation=cv2.INTER_AREA)
-    length = np.linalg.norm(small_n, axis=-1)
-    known = length > 0.9  # shorter: unknown, or an edge between two surfaces
-    if known.sum() < 16:
-        return DEFAULT_RATIO
-    target = small_n[known] / length[known, None]
-    view = Camera(*size, camera.fov)
+    ratio = SETTINGS.ratio
+    if normal is not None:
+        scale = min(1.0, SETTINGS.side / max(t.shape))
+        size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
+        small_t = cv2.resize(t, size, interpolation=cv2.INTER_AREA)
+        small_normal = cv2.resize(np.ascontiguousarray(normal, np.float32), size, interpolation=cv2.INTER_AREA)
+        length = np.linalg.norm(small_normal, axis=-1)
+        known = length > 0.9  # shorter: unknown, or an edge between two surfaces
+        target, view = small_normal[known] / length[known, None], Camera(*size, camera.fov)
 
-    def error(ratio: float) -> float:
-        found = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]
-        return float(np.arccos(np.clip((found * target).sum(-1), -1, 1)).mean())
+        def error(ratio: float) -> float:
+            found = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]
+            return float(np.arccos(np.clip((found * target).sum(-1), -1, 1)).mean())
 
-    return float(min(RATIOS, key=error))
+        if known.sum() >= 16:
+            ratio = float(min(np.geomspace(*SETTINGS.range, SETTINGS.trials), key=error))
+    return depth(ratio, t).astype(np.float32), ratio
