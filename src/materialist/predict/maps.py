@@ -15,6 +15,7 @@ from materialist.predict.normals import normals_from_depth
 from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
 from materialist.types import Array, Photo, Prediction
 
+
 @dataclass(frozen=True)
 class MapSettings:
     """Limits within which the values of a foreign map are mended; beyond them the map is refused. Tuned by eye."""

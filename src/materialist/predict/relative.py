@@ -11,6 +11,7 @@ import numpy as np
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Camera
 
+
 @dataclass(frozen=True)
 class RelativeSettings:
     """Search for the ratio of the farthest surface to the nearest. Tuned by eye."""

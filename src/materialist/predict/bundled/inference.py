@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -11,38 +12,34 @@ import torch
 
 from materialist.camera import pixel_rays, rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.geometry.membrane import membrane
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
-from materialist.predict.bundled.relief import smooth_relief, with_relief
+from materialist.predict.bundled.relief import with_relief
 from materialist.types import Array, Camera, Materials, Prediction
 
-SIDES = (192, 384)
-"""Longest sides, pixels, at which the network sees a photo: the whole, and details."""
-EDGE_SIDE = 768
-"""Longest side at which edges of depth and normals are sought in the photo."""
-EDGE_REACH = 0.03
-"""How far the network's edges may be off, as a part of the longest side."""
-SMOOTH = 2.0
-"""What is smooth, and keeps out of the search for edges, is longer than this times that reach."""
-MEDIAN_DEPTH = 3.0
-"""Median of the depths given, scene units. A photo does not tell scale; this suits rooms and table tops in metres."""
-DEPTH_SPAN = 50.0
-"""Largest ratio of a depth to the median, either way."""
-SKY = (-1.0, -5.0)
-"""Logits of there being a surface below which a pixel is likely, and surely, sky."""
-DETAIL = 0.06
-"""Difference (sRGB-encoded) to a picture as smooth as an environment map from which something stands before the sky."""
-ENVMAP_TEXEL = np.pi / 256
-"""Size of a texel of the fitted environment map, radians."""
 _MIRROR = np.array([-1, 1, 1], np.float32)
-LEAST_ISLAND = 0.0005
-"""Specks of sky or surface smaller than this part of the picture are taken for their surroundings."""
+
+
+@dataclass(frozen=True)
+class InferenceSettings:
+    """How the network sees a photo and how its answers become a prior."""
+
+    sides: tuple[int, ...] = (192, 384)  # longest sides, pixels: the whole, and details; tuned on 2 photos
+    edge_side: int = 768  # longest side at which edges are sought in the photo, pixels; by eye
+    edge_reach: float = 0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
+    median_depth: float = 3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
+    depth_span: float = 50.0  # largest ratio of a depth to the median, either way
+    likely_sky: float = -1.0  # logit of a surface below which a pixel is sky where it is joined to sure sky; by eye
+    sure_sky: float = -5.0  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    least_island: float = 0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
+
+
+SETTINGS = InferenceSettings()
 
 
 def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = SIDES
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = SETTINGS.sides
 ) -> Prediction:
     """Maps of a photo at its own size.
 
@@ -56,23 +53,23 @@ def infer(
         sides: longest sides, pixels, at which the network sees the photo; at most the photo's own.
 
     Returns:
-        A Prediction without a name: albedo linear, depth with median MEDIAN_DEPTH, 0 where the network sees no surface.
+        A Prediction without a name: albedo linear, depth with a fixed median, 0 where there is no surface.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
     small = _network_size(size, max(sides))
     photo = resample.values(linear, small)
     maps = _mean_answer(network, linear, rays, sides, device)
-    surface = _without_specks(_surface(maps["mask"]) | _detailed(photo, rays))
+    surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
-    depth = _scaled(_behind(maps["depth"], maps["mask"], surface), surface)
+    depth = _scaled(maps["depth"], surface)
     albedo, roughness, metallic, normal = (maps[n] for n in ("albedo", "roughness", "metallic", "normal"))
     if small != size:
         guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
         albedo, roughness, metallic = (guided(m, guide, fine) for m in (albedo, roughness, metallic))
     depth, normal = with_edges(depth, normal, linear, rays)
-    depth *= MEDIAN_DEPTH / np.median(depth[depth > 0])
+    depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
     return Prediction(materials, normal, depth)
@@ -84,17 +81,15 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     rays: [H, W, 2] x and y of the photo's rays at z = -1.
     """
     size = linear.shape[:2]
-    middle = _network_size(size, EDGE_SIDE)
+    middle = _network_size(size, SETTINGS.edge_side)
     photo = linear_to_srgb(resample.values(linear, middle))
-    reach = max(2, round(EDGE_REACH * max(middle)))
+    reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = Guide(photo, radius=reach)
     depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
-    # Medians of a slope would print the photo's texture on it.
-    smooth = smooth_relief(np.where(known, coarse, np.nan), _unit(normal), seen, length=SMOOTH * reach)
-    sharp = np.where(known, smooth, 0) + weighted_median(np.where(known, coarse - smooth, 0), guide, known=known)
+    sharp = weighted_median(coarse, guide, known=known)
     planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
     normal = _unit(np.stack(planes, -1))
     logarithm = with_relief(np.where(known, coarse, np.nan), sharp, normal, seen, reach=reach)
@@ -180,10 +175,10 @@ def _network_size(size: tuple[int, int], side: int) -> tuple[int, int]:
 
 
 def _scaled(log_depth: Array, surface: Array) -> Array:
-    """Depth [h, w] with median MEDIAN_DEPTH over the surface, 0 elsewhere."""
+    """Depth [h, w] with the median of the settings over the surface, 0 elsewhere."""
     relative = log_depth - np.median(log_depth[surface])
-    limit = np.log(DEPTH_SPAN)
-    return np.where(surface, MEDIAN_DEPTH * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
+    limit = np.log(SETTINGS.depth_span)
+    return np.where(surface, SETTINGS.median_depth * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
 
 
 def _surface(logit: Array) -> Array:
@@ -191,43 +186,14 @@ def _surface(logit: Array) -> Array:
 
     White walls and windows look like sky, and a hole in a room costs more than a sky that is a far surface.
     """
-    likely, sure = (logit < limit for limit in SKY)
+    likely, sure = logit < SETTINGS.likely_sky, logit < SETTINGS.sure_sky
     _, labels = cv2.connectedComponents(likely.astype(np.uint8), connectivity=4)
     return ~(likely & np.isin(labels, np.unique(labels[sure & likely])))
 
 
-def _detailed(photo: Array, rays: Array) -> Array:
-    """[h, w] bool where the photo shows more than an environment map can: towers and twigs before a sky.
-
-    rays: [H, W, 2] of the photo at any size.
-    """
-    pixel = float(rays[0, -1, 0] - rays[0, 0, 0]) / max(photo.shape[1] - 1, 1)  # radians, near the middle
-    encoded = linear_to_srgb(photo)
-    smooth = cv2.GaussianBlur(encoded, (0, 0), max(ENVMAP_TEXEL / max(pixel, 1e-6), 0.8))
-    detail = (np.abs(encoded - smooth).max(-1) > DETAIL).astype(np.uint8)
-    return cv2.dilate(detail, np.ones((5, 5), np.uint8)) > 0
-
-
-def _behind(log_depth: Array, logit: Array, surface: Array) -> Array:
-    """The logarithm of depth [h, w], with what was taken for sky and kept where it belongs.
-
-    What borders on the sky (a tower) goes behind nearly all else. What does not (a bright window) is no hole in the
-    wall around it: its depth, which the network never learnt, is spanned by that.
-    """
-    sure = surface & (logit > 0)
-    if not sure.any():
-        return log_depth
-    _, labels = cv2.connectedComponents((surface & ~sure).astype(np.uint8), connectivity=4)
-    beside_sky = cv2.dilate((~surface).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    before_sky = (labels > 0) & np.isin(labels, np.unique(labels[beside_sky]))
-    far = np.percentile(log_depth[sure], 95)
-    depth = np.where(before_sky, np.maximum(log_depth, far), log_depth)
-    return np.where((labels > 0) & ~before_sky, membrane(depth, sure), depth)
-
-
 def _without_specks(surface: Array) -> Array:
     """The surface [h, w] bool without tiny islands of either kind."""
-    least = max(4, int(LEAST_ISLAND * surface.size))
+    least = max(4, int(SETTINGS.least_island * surface.size))
     for wanted in (True, False):
         count, labels, stats, _ = cv2.connectedComponentsWithStats((surface == wanted).astype(np.uint8), connectivity=4)
         small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] < least]
