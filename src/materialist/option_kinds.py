@@ -47,6 +47,8 @@ class Option:
     flag: str | None = ""
     """Names on the command line, with spaces; empty for the field's own, None where no command takes it."""
     metavar: str | None = None
+    written: bool = True
+    """Whether a list of edits may name it."""
 
     def checked(self, name: str, value: Any) -> Any:
         """The value in the type of the field. Raises InputError that names the value and what may be given."""

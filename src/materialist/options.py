@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SHARE: dict[str, Any] = {"low": 0, "high": 1}
 _SEED: dict[str, Any] = {"kind": "whole", "low": 0, "high": 2**31 - 1, "flag": None}
-_DEVICE: dict[str, Any] = {"kind": "word", "choices": ("auto", "cpu", "cuda"), "flag": None}
+_DEVICE: dict[str, Any] = {"kind": "word", "choices": ("auto", "cpu", "cuda"), "flag": None, "written": False}
 _SHIFT: dict[str, Any] = {"kind": "shift", **_SHARE, "metavar": "V|±D"}
 _PAINT: dict[str, Any] = {"kind": "paint", "choices": ("as-is", "glass", "mirror")}
 _UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": "axis that points up"}
@@ -103,7 +103,7 @@ class Relight(OperationOptions):
     dim: float | None = option(
         None, "Factor on windows and lamps that the photo shows; they stay put.", low=0, high=10, called="dimming",
         hint="(1 for as it is, 0 for off)")
-    lights: Array | None = option(None, "The lights that `dim` means.", kind="any", flag=None, needs="dim")
+    lights: Array | None = option(None, "The lights that `dim` means.", kind="any", flag=None, written=False)
     """[H, W] bool at working size; None takes those that are found."""
     envmap: Array | str | Path | None = option(None, "Another light: EXR or HDR, 2:1.", kind="file", metavar="FILE")
     """[h, 2h, 3] linear radiance >= 0 in the project's convention, or a file."""

@@ -9,7 +9,7 @@ from made_meshes import box_file, floor_scene
 
 from materialist.edits.core.topology import volume
 from materialist.edits.drop.convex import convex_pieces, thinned
-from materialist.edits.drop.drop import METRES, down, drop, upright
+from materialist.edits.drop.drop import down, drop, upright
 from materialist.edits.drop.drop_ground import Surroundings
 from materialist.edits.drop.ground import Field, blocks
 from materialist.edits.drop.physics import GRAVITY, Thing, fall
@@ -17,6 +17,7 @@ from materialist.edits.insert.insert import extent, insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import support_at
 from materialist.errors import InputError
+from materialist.options import Drop
 
 pytest.importorskip("mujoco")
 
@@ -221,7 +222,7 @@ def test_several_start_clear_of_each_other(box):
     a, b = (body.vertices @ UP for body in film[0].bodies)
     assert b.min() > a.max()
     told = film[0].provenance["edits"][-1]
-    assert told["kind"] == "drop" and told["metres"] == METRES and told["up"] == "auto"
+    assert told["kind"] == "drop" and told["metres"] == Drop.metres and told["up"] == "auto"
     assert np.linalg.norm(told["gravity"]) == pytest.approx(1, abs=1e-5)  # the one that was found
 
 

@@ -13,6 +13,7 @@ from materialist.edits.drop.physics import Pose
 from materialist.edits.insert.insert import extent
 from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
 from materialist.errors import InputError
+from materialist.options import Drop
 
 pytest.importorskip("mujoco")
 
@@ -52,21 +53,18 @@ def test_a_file_with_a_drop_says_the_same_before_and_after(tmp_path, box, rested
 
 def test_every_option_arrives(tmp_path, box, monkeypatch):
     asked = []
-    monkeypatch.setattr(
-        "materialist.edits.recipe.settle", lambda scene, *given, **options: asked.append((given, options))
-    )
+    monkeypatch.setattr("materialist.edits.recipe.settle", lambda scene, *given: asked.append(given))
     text = (
         "- drop: {mesh: [box.ply, b/ball.ply], at: [[10, 20], '30,40'], height: 2, spin: -1, scale: 0.5, metres: 0.1,"
         " material: [0.1, 0.2, 0.3], gravity: [0, -1, 0], seed: 7, up: z}\n"
     )
     (tmp_path / "edits.yaml").write_text(text)
     apply(floor_scene(), read_recipe(tmp_path / "edits.yaml"))
-    ((meshes, places), options) = asked[0]
+    meshes, places, options = asked[0]
     assert meshes == [tmp_path / "box.ply", tmp_path / "b" / "ball.ply"] and places == [(10, 20), (30, 40)]
-    assert options == {
-        "height": 2, "spin": -1, "scale": 0.5, "metres": 0.1, "material": "0.1,0.2,0.3", "gravity": (0, -1, 0),
-        "seed": 7, "up": "z",
-    }  # fmt: skip
+    assert options == Drop(
+        height=2, spin=-1, scale=0.5, metres=0.1, material="0.1,0.2,0.3", gravity=(0, -1, 0), seed=7, up="z"
+    )
 
 
 @pytest.mark.parametrize(

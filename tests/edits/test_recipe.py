@@ -108,7 +108,7 @@ def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
     asked = []
     monkeypatch.setattr(recipe, "without", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
     monkeypatch.setattr(recipe, "glass", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
-    monkeypatch.setattr(recipe, "settle", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "settle", lambda scene, *given: asked.append(given[-1].seed) or scene)
     (folder / "edits.yaml").write_text(
         "- remove: {mask: block.png}\n- remove: {mask: block.png, seed: 4}\n- glass: {mask: block.png}\n"
         "- drop: {mesh: a.ply, at: [1, 2]}\n- drop: {mesh: a.ply, at: [1, 2], seed: 0}\n"

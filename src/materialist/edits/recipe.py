@@ -16,27 +16,22 @@ from materialist.edits.remove.background import without
 from materialist.edits.remove.hole import told_shadow
 from materialist.edits.select.select import select
 from materialist.errors import InputError, OutputError
-from materialist.option_kinds import OperationOptions, declarations, parse_colour
-from materialist.options import MaterialEdit, Relight
+from materialist.option_kinds import OFF, ON, OperationOptions, declarations, numbers, parse_colour, several
+from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 from materialist.types import Array, Scene
 
-REGION = ("mask", "click", "box", "with")
-MATERIAL = tuple(declarations(MaterialEdit))
-LIGHT = (*(name for name in declarations(Relight) if name != "lights"), *REGION)
-INSERT = ("mesh", "at", "scale", "turn", "material", "size", "up")
-DROP = ("mesh", "at", "height", "spin", "scale", "material", "gravity", "metres", "seed", "up")
-REMOVE = ("background", "inpaint", "shadow", "grow", "seed")
-GLASS = ("ior", "transmission", "tint", "roughness", "hollow", "model", "thickness", *REMOVE)
+OPTIONS: dict[str, type[OperationOptions]] = {
+    kind.operation: kind for kind in (MaterialEdit, Relight, Insertion, Drop, Glass, Removal)
+}
+"""Kind of step -> its options."""
+REGION, PLACE = ("mask", "click", "box", "with"), ("mesh", "at")
+WHERE = {"insert": PLACE, "drop": PLACE}
+"""Kind of step -> what says where it acts; a region for the others."""
 KINDS = {
-    "edit": (*REGION, *MATERIAL), "relight": LIGHT, "insert": INSERT, "drop": DROP, "glass": (*REGION, *GLASS),
-    "remove": (*REGION, *REMOVE),
-}  # fmt: skip
+    name: (*WHERE.get(name, REGION), *(key for key, (told, _) in declarations(kind).items() if told.written))
+    for name, kind in OPTIONS.items()
+}
 """Kind of step -> what it may say."""
-OPTIONS: dict[str, type[OperationOptions]] = {"edit": MaterialEdit, "relight": Relight}
-
-
-ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
-"""How YAML spells a switch."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +162,8 @@ def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
     given = step.options
     where: dict[str, Any] = {
-        "click": [_numbers(c, 2, "click") for c in _list_of(given["click"])] if "click" in given else None,
-        "box": _numbers(given["box"], 4, "box") if "box" in given else None,
+        "click": [numbers(c, 2, "click") for c in several(given["click"])] if "click" in given else None,
+        "box": numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": _file(step, "mask") if "mask" in given else None,
     }
     return select(scene, method=given.get("with", "network"), **where)
@@ -189,9 +184,12 @@ def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 
 def _options(step: Step) -> Any:
-    """The dataclass of the step's options, of what the file says beside the region."""
-    said = {name: value for name, value in step.options.items() if name not in (*REGION, "skip")}
-    return OPTIONS[step.kind].read(said, folder=step.folder)
+    """The dataclass of the step's options, of what the file says beside its region or place."""
+    kind = OPTIONS[step.kind]
+    known = declarations(kind)
+    shared = {name: getattr(step, name) for name in ("seed", "device") if name in known}
+    said = {name: value for name, value in step.options.items() if name in known}
+    return kind.read(said, folder=step.folder, **shared)
 
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -205,29 +203,26 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 
 def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
-    given = step.options
-    missing = [name for name in ("mesh", "at") if name not in given]
-    if missing:
-        raise InputError(f"An insert needs its {missing[0]}, as in insert: {{mesh: mug.glb, at: [310, 220]}}.")
-    options: dict[str, Any] = {k: _number(given[k], k) for k in ("scale", "turn", "size") if k in given}
-    for place in [_numbers(one, 2, "at") for one in _list_of(given["at"])]:
-        edited = insert(edited, _file(step, "mesh"), place, **options, **_thing(step))
+    _needs(step, "insert: {mesh: mug.glb, at: [310, 220]}")
+    wanted = _options(step)
+    for place in _places(step):
+        edited = insert(edited, _file(step, "mesh"), place, wanted)
     return edited
 
 
 def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
-    given = step.options
-    missing = [name for name in ("mesh", "at") if name not in given]
-    if missing:
-        raise InputError(f"A drop needs its {missing[0]}, as in drop: {{mesh: [mug.glb, ball.ply], at: [310, 220]}}.")
-    options: dict[str, Any] = {
-        k: _number(given[k], k) for k in ("height", "spin", "scale", "metres") if k in given
-    } | _thing(step)
-    if "gravity" in given:
-        options["gravity"] = _numbers(given["gravity"], 3, "gravity")
-    options["seed"] = _seed(step)
-    places = [_numbers(one, 2, "at") for one in _list_of(given["at"])]
-    return settle(edited, _files(step, "mesh"), places, **options)
+    _needs(step, "drop: {mesh: [mug.glb, ball.ply], at: [310, 220]}")
+    return settle(edited, _files(step, "mesh"), _places(step), _options(step))
+
+
+def _needs(step: Step, example: str) -> None:
+    for name in PLACE:
+        if name not in step.options:
+            raise InputError(f"The {step.kind} needs its {name}, as in {example}.")
+
+
+def _places(step: Step) -> list[Any]:
+    return [numbers(one, 2, "at") for one in several(step.options["at"])]
 
 
 def _seed(step: Step) -> int:
@@ -236,17 +231,6 @@ def _seed(step: Step) -> int:
     if not (0 <= seed < 2**31 and seed == int(seed)):
         raise InputError(f"The seed is {seed:g}; give a whole number from 0 to {2**31 - 1}.")
     return int(seed)
-
-
-def _thing(step: Step) -> dict[str, Any]:
-    """What an inserted and a dropped mesh share."""
-    given, options = step.options, {}
-    if "material" in given:
-        colour = given["material"]
-        options["material"] = ",".join(colour) if isinstance(colour, list) else str(colour)
-    if "up" in given:
-        options["up"] = str(given["up"])
-    return options
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -282,7 +266,7 @@ def glass_arguments(scene: Scene, step: Step):
     if "tint" in given:
         tint = given["tint"]
         options["tint"] = tuple(
-            float(c) for c in parse_colour(tint if isinstance(tint, str) else _numbers(tint, 3, "tint"), "tint")
+            float(c) for c in parse_colour(tint if isinstance(tint, str) else numbers(tint, 3, "tint"), "tint")
         )
     if "hollow" in given:
         open_top = str(given["hollow"]).lower() == OPEN
@@ -325,22 +309,8 @@ def _files(step: Step, name: str) -> list[Path]:
     return [_file(step, name)]
 
 
-def _list_of(value: Any) -> list[Any]:
-    """A single entry, or a list of them: of lists, or of texts such as 310,220."""
-    several = isinstance(value, list) and value and all(isinstance(v, list) or "," in str(v) for v in value)
-    return value if several else [value]
-
-
 def _number(value: Any, name: str) -> float:
     try:
         return float(value)
     except (TypeError, ValueError) as error:
         raise InputError(f"The {name} must be a number, not {value!r}.") from error
-
-
-def _numbers(value: Any, count: int, name: str) -> tuple:
-    """`count` numbers from a list, or from a text such as 310,220."""
-    parts = value.split(",") if isinstance(value, str) else value
-    if not isinstance(parts, list) or len(parts) != count:
-        raise InputError(f"The {name} must be {count} numbers, not {value!r}.")
-    return tuple(_number(part, name) for part in parts)

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from materialist.edits.recipe import DROP, Step
+from materialist.edits.recipe import KINDS as STEPS
+from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio.edit_list import with_options
 from materialist.studio.session import Session
@@ -51,7 +52,7 @@ def set_option(session: Session, name: str, value: str | None) -> None:
             session.edits = session.edits.chosen(None)
         step = in_hand(session)
         session.next_object = {k: v for k, v in {**session.next_object, name: value}.items() if v is not None}
-        if step is not None and (step.kind == "insert" or name in DROP):
+        if step is not None and (step.kind == "insert" or name in STEPS["drop"]):
             assert session.edits.current is not None
             after = session.edits.put(session.edits.current, with_options(step, **{name: value}))
             colours = all(str(one).startswith("#") for one in (step.options.get(name), value))
@@ -104,7 +105,8 @@ def note_failure(session: Session, step: Step) -> None:
 
 def fallen(step: Step, height: float, tried: int = 0) -> Step:
     """The `drop` that takes the place of an `insert`; of a `drop`, one with the next seed, and so on when tried."""
-    options = {k: v for k, v in step.options.items() if k in (*DROP, "skip") and k not in ("height", "seed")}
+    kept = {*STEPS["drop"], "skip"} - {"height", "seed"}
+    options = {k: v for k, v in step.options.items() if k in kept}
     seed = tried + (int(step.options.get("seed", 0)) + 1 if step.kind == "drop" else 0)
     return replace(step, kind="drop", options={**options, "height": f"{height:.3g}", "seed": str(seed)})
 

@@ -18,83 +18,45 @@ from materialist.edits.insert.meshes import Model, read_model, repainted
 from materialist.edits.insert.support import Support
 from materialist.errors import InputError
 from materialist.io.video import MAX_FRAMES
+from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
-METRES = 0.2
-"""Longest side of a thing in the simulation: how fast it seems to fall tells its size."""
 UPRIGHT = 0.5
 """Cosine to the camera's up from which a plane can be a floor or a table top."""
 
 
-@dataclass(frozen=True)
-class Release:
-    """How things are let go of. Raises InputError for a number out of its range."""
-
-    height: float = 1.5
-    """Of the lowest one over the ground, in multiples of its longest side, 0 to 100."""
-    spin: float = 0.3
-    """Turns a second about an axis that `seed` chooses, -20 to 20."""
-    scale: float = 1.0
-    """As in `insert`; so are `material` and `up`."""
-    material: str = "as-is"
-    gravity: tuple[float, float, float] | None = None
-    """Direction in the camera frame; None chooses as `drop` says."""
-    metres: float = METRES
-    """What the longest side is taken for, 0.001 to 100."""
-    seed: int = 0
-    up: str = "auto"
-
-    def __post_init__(self) -> None:
-        _check("height", self.height, 0, 100)
-        _check("spin", self.spin, -20, 20)
-        _check("metres", self.metres, 1e-3, 100)
-
-
 def drop(
-    scene: Scene,
-    meshes: str | Path | Model | Sequence[str | Path | Model],
-    at: tuple[float, float] | Sequence[tuple[float, float]],
-    *,
-    frames: int = 48,
-    fps: float = 24.0,
-    height: float = Release.height,
-    spin: float = Release.spin,
-    scale: float = Release.scale,
-    material: str = Release.material,
-    gravity: tuple[float, float, float] | None = Release.gravity,
-    metres: float = Release.metres,
-    seed: int = Release.seed,
-    up: str = Release.up,
-) -> list[Scene]:
+    scene: Scene, meshes: str | Path | Model | Sequence[str | Path | Model],
+    at: tuple[float, float] | Sequence[tuple[float, float]], options: Drop | None = None, *, frames: int = 48,
+    fps: float = 24.0, **values: Any,
+) -> list[Scene]:  # fmt: skip
     """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
 
     The visible surface and the planes that continue it are the ground; bodies that are in the scene already count as
-    part of it. Things are rigid, of one density, and collide as a few convex pieces each.
+    part of it. Things are rigid, of one density, and collide as a few convex pieces each. Gravity is by default against
+    the normal of the ground under the first place if it can be a floor, of the largest plane that can, or the camera's
+    -Y.
 
     Args:
         meshes: files, or what `meshes.read_model` made of them.
         at: (x, y) at working size above which all fall, one over the other, or a place for each.
+        options, values: see `options.Drop`; `values` are fields of it, as in `drop(scene, meshes, at, height=2)`.
         frames, fps: length of the film in frames, 2 to 3600, and frames a second.
-        height: of the lowest one over the ground, in multiples of its longest side.
-        spin: turns a second about an axis that `seed` chooses.
-        scale, material, up: as in `insert`.
-        gravity: direction in the camera frame; by default against the normal of the ground under the first place if it
-            can be a floor, of the largest plane that can, or the camera's -Y.
-        metres: what the longest side is taken for; small things fall fast.
 
     Raises:
         InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
             missing.
     """
+    wanted = Drop.given(options, **values)
     if not 2 <= frames <= MAX_FRAMES:
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
-    _check("frame rate", fps, 1, 240)
-    release = Release(height, spin, scale, material, gravity, metres, seed, up)
-    falling = prepared(scene, meshes, at, release)
+    if not 1 <= fps <= 240:
+        raise InputError(f"The frame rate is {fps:g}; it must lie in [1, 240].")
+    falling = prepared(scene, meshes, at, wanted)
     film, last = [], scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
-        if poses is None or moves(poses, frame, metres):
+        if poses is None or moves(poses, frame, wanted.metres):
             last, poses = falling.at(frame), frame
         film.append(last)
     return film
@@ -134,30 +96,30 @@ def prepared(
     scene: Scene,
     meshes: str | Path | Model | Sequence[str | Path | Model],
     at: tuple[float, float] | Sequence[tuple[float, float]],
-    release: Release,
+    wanted: Drop,
 ) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
     load()
     meshes = [meshes] if isinstance(meshes, str | Path | Model) else meshes
-    models = [repainted(m if isinstance(m, Model) else read_model(m, up=release.up), release.material) for m in meshes]
+    models = [repainted(m if isinstance(m, Model) else read_model(m, up=wanted.up), wanted.material) for m in meshes]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")
     places = _places(at, len(models))
-    stood = [put(scene, model, place, scale=release.scale) for model, place in zip(models, places)]
-    direction = down(scene, stood[0][1], release.gravity)
+    stood = [put(scene, model, place, scale=wanted.scale) for model, place in zip(models, places)]
+    direction = down(scene, stood[0][1], wanted.gravity)
     to_up = upright(direction)
-    factor = release.metres / max(longest for *_, longest in stood)
+    factor = wanted.metres / max(longest for *_, longest in stood)
     around = Surroundings.of(scene, to_up, factor)
     points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
     names = [f"{model.name} at {place[0]:g},{place[1]:g}" for model, place in zip(models, places)]
-    shifts, tops, moved_aside = _starts(around, points, release, names)
-    field = around.ground([middle(p) for p in points], tops, release.metres)
+    shifts, tops, moved_aside = _starts(around, points, wanted, names)
+    field = around.ground([middle(p) for p in points], tops, wanted.metres)
     starts = [(bodies, shift) for (bodies, *_), shift in zip(stood, shifts)]
-    things = _things(starts, to_up, factor, release)
-    ground = [hull(block) for block in blocks_of(field, release.metres)]
+    things = _things(starts, to_up, factor, wanted)
+    ground = [hull(block) for block in blocks_of(field, wanted.metres)]
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
-        **{name: getattr(release, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
+        **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
         "gravity": [round(float(v), 6) for v in direction],
     }  # fmt: skip
     notes = (*(note for model in models for note in model.warnings), *moved_aside)
@@ -193,11 +155,6 @@ def upright(direction: Array) -> Array:
     return np.stack([x, np.cross(z, x), z])
 
 
-def _check(name: str, value: float, low: float, high: float) -> None:
-    if not (np.isfinite(value) and low <= value <= high):
-        raise InputError(f"The {name} is {value:g}; it must lie in [{low:g}, {high:g}].")
-
-
 def _places(at: Any, count: int) -> list[tuple[float, float]]:
     """A place for each mesh."""
     several = bool(np.ndim(at[0])) if len(at) else False
@@ -210,7 +167,7 @@ def _places(at: Any, count: int) -> list[tuple[float, float]]:
 
 
 def _starts(
-    around: Surroundings, points: list[Array], release: Release, names: list[str]
+    around: Surroundings, points: list[Array], wanted: Drop, names: list[str]
 ) -> tuple[list[Array], list[float], list[str]]:
     """For each thing the shift [3] to where it starts, and the z from which its ground is seen; and notes.
 
@@ -225,8 +182,8 @@ def _starts(
         for other_low, other_high in boxes:
             if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
                 least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
-        lift = max(least, release.height * release.metres)
-        found = around.start(own, lift, least, release.metres, boxes)
+        lift = max(least, wanted.height * wanted.metres)
+        found = around.start(own, lift, least, wanted.metres, boxes)
         if found is None:
             raise InputError(
                 f"There is no room for {name}: it would start inside of something; choose another place, or a larger "
@@ -234,7 +191,7 @@ def _starts(
             )
         shift, top = found
         if shift[:2].any():
-            share = float(np.hypot(*shift[:2])) / release.metres
+            share = float(np.hypot(*shift[:2])) / wanted.metres
             notes.append(f"{name} starts {share:.2g} of its size to the side: something stands in its way.")
         boxes.append((low + shift, high + shift))
         shifts.append(shift)
@@ -242,16 +199,16 @@ def _starts(
     return shifts, tops, notes
 
 
-def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, release: Release) -> list[Thing]:
+def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[Thing]:
     """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
-    rng = np.random.default_rng(release.seed)
+    rng = np.random.default_rng(wanted.seed)
     things = []
     for bodies, shift in starts:
         points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
         centre = (points.min(0) + points.max(0)) / 2
         axis = rng.normal(size=3)
-        turning = 2 * np.pi * release.spin * axis / np.linalg.norm(axis)
-        pieces = _pieces(bodies, to_up, factor, shift, release.seed)
+        turning = 2 * np.pi * wanted.spin * axis / np.linalg.norm(axis)
+        pieces = _pieces(bodies, to_up, factor, shift, wanted.seed)
         things.append(Thing(tuple(piece - centre for piece in pieces), centre, turning))
     return things
 

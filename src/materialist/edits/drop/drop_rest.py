@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from materialist.camera import project
-from materialist.edits.drop.drop import Falling, Release, moves, prepared
+from materialist.edits.drop.drop import Falling, moves, prepared
 from materialist.edits.drop.physics import Pose, fall
 from materialist.edits.insert.meshes import Model
 from materialist.errors import InputError
+from materialist.options import Drop
 from materialist.types import Body, Scene
 
 LONGEST = 20.0
@@ -24,19 +26,9 @@ STILL = 12
 
 
 def settle(
-    scene: Scene,
-    meshes: Sequence[str | Path | Model],
-    at: tuple[float, float] | Sequence[tuple[float, float]],
-    *,
-    height: float = Release.height,
-    spin: float = Release.spin,
-    scale: float = Release.scale,
-    material: str = Release.material,
-    gravity: tuple[float, float, float] | None = Release.gravity,
-    metres: float = Release.metres,
-    seed: int = Release.seed,
-    up: str = Release.up,
-) -> Scene:
+    scene: Scene, meshes: Sequence[str | Path | Model], at: tuple[float, float] | Sequence[tuple[float, float]],
+    options: Drop | None = None, **values: Any,
+) -> Scene:  # fmt: skip
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
 
     Everything is as in `drop.drop`, of which this is the last frame, however long that takes: things are at rest
@@ -47,7 +39,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
-    falling = prepared(scene, meshes, at, Release(height, spin, scale, material, gravity, metres, seed, up))
+    falling = prepared(scene, meshes, at, Drop.given(options, **values))
     poses, gone, rests = _rested(falling)
     names = falling.what["meshes"]
     if len(gone) == len(names):

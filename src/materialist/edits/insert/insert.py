@@ -13,6 +13,7 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.insert.meshes import Model, read_model, repainted
 from materialist.edits.insert.support import Support, picture_width, support_at
 from materialist.errors import InputError
+from materialist.options import Insertion
 from materialist.types import Array, Body, Scene
 
 SHARE = 1 / 6
@@ -24,15 +25,7 @@ SAMPLES = 6000
 
 
 def insert(
-    scene: Scene,
-    mesh: str | Path | Model,
-    at: tuple[float, float],
-    *,
-    scale: float = 1.0,
-    turn: float = 0.0,
-    material: str = "as-is",
-    size: float | None = None,
-    up: str = "auto",
+    scene: Scene, mesh: str | Path | Model, at: tuple[float, float], options: Insertion | None = None, **values: Any
 ) -> Scene:
     """The scene with a mesh standing on the surface under a pixel; photo, maps and light are shared.
 
@@ -40,11 +33,7 @@ def insert(
         mesh: an OBJ, PLY, STL, glTF or GLB file, or what `meshes.read_model` made of one.
         at: (x, y) at working size: where the middle of its base stands. Its up axis is the surface's normal, its
             front (+Z) looks to the camera.
-        scale: factor on its size, in (0, 1000].
-        turn: degrees about the up axis, > 0 counter-clockwise seen from above.
-        material: `as-is`, `glass`, `mirror`, a linear "R,G,B" or "#rrggbb"; see `meshes.repainted`.
-        size: longest side in scene units; by default 1/6 of the width that the picture shows at that depth.
-        up: axis of the file that points up; see `meshes.read_model`.
+        options, values: see `options.Insertion`; `values` are fields of it, as in `insert(scene, mesh, at, scale=2)`.
 
     Returns:
         The scene with one more body for each material of the mesh. What is wrong with the mesh, or its place, is added
@@ -54,16 +43,17 @@ def insert(
         InputError: a place outside the photo, on the sky, or so near that the mesh would reach behind the camera; a
             mesh that cannot be used; a number out of its range.
     """
-    model = repainted(mesh if isinstance(mesh, Model) else read_model(mesh, up=up), material)
-    placed, support, longest = put(scene, model, at, scale=scale, turn=turn, size=size)
+    wanted = Insertion.given(options, **values)
+    model = repainted(mesh if isinstance(mesh, Model) else read_model(mesh, up=wanted.up), wanted.material)
+    placed, support, longest = put(scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size)
     warnings = [*model.warnings]
     if _crosses(scene, placed, support):
         warnings.append(
             f"{model.name} runs into the surface behind or beside it; choose another place, or a smaller scale."
         )
     what: dict[str, Any] = {
-        "mesh": model.name, "at": [float(v) for v in at], "scale": scale, "turn": turn, "material": material,
-        "size": longest, "triangles": sum(len(body.faces) for body in placed),
+        "mesh": model.name, "at": [float(v) for v in at], "scale": wanted.scale, "turn": wanted.turn,
+        "material": wanted.material, "size": longest, "triangles": sum(len(body.faces) for body in placed),
     }  # fmt: skip
     return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *warnings), "insert", what)
 
@@ -76,11 +66,6 @@ def put(
 
     The side is the model's own, in scene units; see `insert`.
     """
-    for name, amount, high in (("scale", scale, 1e3), ("size", 1.0 if size is None else size, 1e9)):
-        if not (np.isfinite(amount) and 0 < amount <= high):
-            raise InputError(f"The {name} is {amount:g}; it must be above 0 and at most {high:g}.")
-    if not np.isfinite(turn):
-        raise InputError(f"The turn is {turn} degrees; give a finite number.")
     low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
