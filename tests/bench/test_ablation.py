@@ -13,10 +13,10 @@ from materialist.errors import InputError
 @pytest.fixture(scope="module")
 def rows(mitsuba, tmp_path_factory):
     patch = pytest.MonkeyPatch()
-    patch.setattr(ablation, "DELTAS", (0.0, 50.0))
-    patch.setattr(ablation, "STEPS", (2, 30))
-    patch.setattr(ablation, "INITS", 2)
-    patch.setattr(ablation, "SHORT", 20)
+    patch.setattr(ablation.AblationBench, "deltas", (0.0, 50.0))
+    patch.setattr(ablation.AblationBench, "steps", (2, 30))
+    patch.setattr(ablation.AblationBench, "inits", 2)
+    patch.setattr(ablation.AblationBench, "short", 20)
     out = tmp_path_factory.mktemp("ablation") / "out"
     bench.run("ablation", output=out, scenes=1, size=24, spp=4, predictor="truth", longest=20, goal=0.2, device="cpu")
     patch.undo()

@@ -80,11 +80,8 @@ def test_a_run_writes_rows_with_their_ceilings(mitsuba, monkeypatch, tmp_path):
     assert (out / "plot.png").stat().st_size > 1000
 
 
-def test_what_people_wait_for_is_timed(mitsuba, monkeypatch, tmp_path):
-    from materialist.bench import edit as module
-
-    monkeypatch.setattr(module, "LARGE", 300)
-    out = bench.run("edit", output=tmp_path / "out", scenes=0, latency=64, device="cpu")
+def test_what_people_wait_for_is_timed(mitsuba, tmp_path):
+    out = bench.run("edit", output=tmp_path / "out", scenes=0, latency=64, large=300, device="cpu")
     rows = json.loads((out / "report.json").read_text())["rows"]
     found = {row["method"]: row for row in rows}
     assert [*found] == [

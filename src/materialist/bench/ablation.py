@@ -65,6 +65,7 @@ class AblationBench(Benchmark):
 
     deltas: ClassVar = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)  # paper, table delta_ab
     steps: ClassVar = (50, 200, 1000, 2000)  # paper, table steps_ab
+    inits: ClassVar = 5  # first weights
     fovs: ClassVar = (0.8, 1.0, 1.2)  # factors on the true field of view
     short: ClassVar = 200  # steps of every other table, paper
 
@@ -198,7 +199,7 @@ def _steps(photo: _Photo) -> Iterator[dict[str, Any]]:
 
 def _init(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Figure ab_init: first weights of the material network."""
-    for seed in range(5):
+    for seed in range(photo.bench.inits):
         yield photo.materials(
             f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, photo.bench.short)), seed=seed
         )

@@ -60,6 +60,7 @@ class EditBench(Benchmark):
     spp: int = 256
     truth_spp: int = 576
     latency: int = 512
+    large: int = 4900  # sides of the large photo that an edit is brought into, pixels
 
     def run(self, data: Path | None, output: Path) -> None:
         chosen = tuple(kind.strip() for kind in str(self.kinds).split(","))
@@ -83,7 +84,7 @@ class EditBench(Benchmark):
                 rows.append({**row, "sample": sample.name})
                 write(report, output)
         if self.latency:
-            for row in _latencies(data, self.latency, self.seed, self.device):
+            for row in _latencies(self, data):
                 rows.append(row)
                 write(report, output)
 
@@ -142,7 +143,7 @@ def _scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:
     return {"inside": inner, "outside": outer, "overall": metrics.psnr(picture, truth)}
 
 
-def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator[dict[str, Any]]:
+def _latencies(bench: EditBench, data: Path | None) -> Iterator[dict[str, Any]]:
     """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
     from materialist.edits.composite.composite import composite, into_photo
     from materialist.edits.composite.layers import render_layers
@@ -151,6 +152,7 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     from materialist.edits.material.material import edit
     from materialist.edits.preview import Preview
 
+    size, seed, device = bench.latency, bench.seed, bench.device
     scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
     mask = np.zeros(scene.depth.shape, bool)
     mask[size // 3 : size // 2, size // 3 : size // 2] = True
@@ -171,13 +173,13 @@ def _latencies(data: Path | None, size: int, seed: int, device: str) -> Iterator
     composite(scene, changes[0], spp=256, seed=seed, device=device)
     yield {"method": "final: material, 256 paths", "sample": sample, **clock.read()}
     layers = render_layers(EditRenderer(scene, device=device), changes[0], spp=16, seed=seed)
-    photo = _enlarged(scene.photo)
+    photo = _enlarged(scene.photo, bench.large)
     clock = Clock()
     into_photo(photo, layers)
-    yield {"method": "final: into a large photo", "sample": "4900 x 4900", **clock.read()}
+    yield {"method": "final: into a large photo", "sample": f"{bench.large} x {bench.large}", **clock.read()}
 
 
-def _enlarged(photo: Photo, side: int = 4900, noise: float = 0.03) -> Photo:
+def _enlarged(photo: Photo, side: int, noise: float = 0.03) -> Photo:
     """The same photo with an original of `side` pixels, and grain."""
     import cv2
 
