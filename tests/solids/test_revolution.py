@@ -7,8 +7,7 @@ from solid_scenes import AXIS, CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, 
 from materialist.bench.glass_scenes import is_closed
 from materialist.solids.finder import surface_of_revolution, upright
 from materialist.solids.profile import fitted
-from materialist.solids.revolution import Revolution, profile_of
-from materialist.solids.vessel import vessel
+from materialist.solids.revolution import Revolution, profile_of, vessel
 
 POT = lines((0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.0, 0.7))
 

@@ -7,21 +7,26 @@ so that no ray through the picture passes between them. See docs/geometry.md for
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from materialist.errors import InputError
 from materialist.geometry.cuts import Cuts, find_cuts
 from materialist.types import Array, Camera, Mesh
 
-EXTRAPOLATION = 2.0
-"""Inverse depth at a pixel's corner stays within this factor of the pixel's own."""
-BEHIND = 1e-3
-"""A continued background lies at least this fraction of the depth behind the foreground that hides it."""
-OVERLAP = 0.02
-"""Pixels by which a tuck that had to leave the background's vertex reaches under the background instead."""
-LEAST_FACING = 0.02
-"""Shading normals keep n . v of at least this (89 degrees), so that every visible point can be shaded."""
 
+@dataclass(frozen=True)
+class BoundarySettings:
+    """How far depth is carried on to the corners of pixels, and under the foreground; tuned by eye."""
+
+    extrapolation: float = 2.0  # inverse depth at a pixel's corner stays within this factor of the pixel's own
+    behind: float = 1e-3  # part of the depth by which a continued background lies behind the foreground, at least
+    overlap: float = 0.02  # pixels by which a tuck that had to leave the background's vertex reaches under it
+    least_facing: float = 0.02  # least n . v of shading normals (89 degrees), so that every visible point can be shaded
+
+
+DEFAULT = BoundarySettings()
 # Corner slots of a pixel, and pixel slots around a grid corner, in reading order.
 TOP_LEFT, TOP_RIGHT, BOTTOM_LEFT, BOTTOM_RIGHT = range(4)
 QUAD = np.array([[TOP_LEFT, BOTTOM_LEFT, BOTTOM_RIGHT], [TOP_LEFT, BOTTOM_RIGHT, TOP_RIGHT]])
@@ -115,12 +120,12 @@ def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
     """[H, W, 4] inverse depth at the corners of each pixel, extrapolated from its centre with its own gradient.
 
     inverse: [H, W] 1 / scene unit. The gradient is the mean of the steps to linked neighbours (exact on planes), and
-    the result stays within a factor `EXTRAPOLATION` of the centre's value.
+    the result stays within a factor of the centre's value.
     """
     half_x = _half_step(inverse, cuts.link_x)  # [H, W] change over half a pixel to the right
     half_y = _half_step(inverse.T, cuts.link_y.T).T  # [H, W] ... downwards
     corners = np.stack([-half_x - half_y, half_x - half_y, half_y - half_x, half_x + half_y], -1) + inverse[..., None]
-    return np.clip(corners, inverse[..., None] / EXTRAPOLATION, inverse[..., None] * EXTRAPOLATION)
+    return np.clip(corners, inverse[..., None] / DEFAULT.extrapolation, inverse[..., None] * DEFAULT.extrapolation)
 
 
 def _half_step(inverse: Array, link: Array) -> Array:
@@ -190,18 +195,18 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     slope_y = (grid[:, 1] - grid[:, 0]).mean(1, keepdims=True)
     centre = grid.mean((1, 2))[:, None]
     beyond = centre + slope_x * (column - 0.5) + slope_y * (row - 0.5)
-    beyond = np.clip(beyond, centre / EXTRAPOLATION, centre * EXTRAPOLATION)
+    beyond = np.clip(beyond, centre / DEFAULT.extrapolation, centre * DEFAULT.extrapolation)
     inverse = np.where(shared, mean_inverse[joint], beyond)
     front_vertex = flat_vertex[front]  # [T, 4]
     tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
-    limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - BEHIND)
+    limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - DEFAULT.behind)
     loose = shared & (inverse > limit)  # the background comes in front at this corner: pass under it
-    # Moved by OVERLAP, such a corner must stay behind the front face carried on to there, whose slope is at most this.
+    # So moved, such a corner must stay behind the front face carried on to there, whose slope is at most this.
     slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
-    inverse = np.minimum(inverse, limit - 2 * OVERLAP * slope * loose)
+    inverse = np.minimum(inverse, limit - 2 * DEFAULT.overlap * slope * loose)
     torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
     screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
-    screen = screen - OVERLAP * loose[..., None] * offset[:, None]
+    screen = screen - DEFAULT.overlap * loose[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
 
@@ -248,8 +253,8 @@ def face_camera(normals: Array, points: Array) -> Array:
     facing = (unit * view).sum(-1, keepdims=True)
     aside = unit - facing * view
     aside_length = np.linalg.norm(aside, axis=-1, keepdims=True)
-    turned = LEAST_FACING * view + np.sqrt(1 - LEAST_FACING**2) * aside / np.maximum(aside_length, 1e-6)
+    turned = DEFAULT.least_facing * view + np.sqrt(1 - DEFAULT.least_facing**2) * aside / np.maximum(aside_length, 1e-6)
     # A normal that points straight away has no nearest turn; it is taken as flipped.
     turned = np.where(aside_length > 1e-6, turned, view)
-    unit = np.where(facing < LEAST_FACING, turned, unit)
+    unit = np.where(facing < DEFAULT.least_facing, turned, unit)
     return (unit / np.linalg.norm(unit, axis=-1, keepdims=True)).astype(np.float32)

@@ -1,24 +1,27 @@
-"""Everything the later stages need to know about the scene's shape, in one call."""
+"""The scene's shape in one call: mesh of the depth map, continued planes, creases."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.boundary import QUAD, depth_to_mesh, face_camera
 from materialist.geometry.completion import complete
-from materialist.geometry.creases import split_creases
 from materialist.geometry.ends import Ends
 from materialist.geometry.planes import find_planes
-from materialist.types import Array, Camera, Geometry
+from materialist.types import Array, Camera, Geometry, Mesh
 
 COMPLETIONS = ("planes", "floors", "none")
 """What can be added to what the picture shows: the dominant planes continued, the same with walls (planes that do not
 face up) ending at the frame, nothing."""
 SYNONYMS = {"planes,backs": "planes", "floors,backs": "floors"}
 """Names of older scenes and scripts, whose objects had backs."""
+CREASE = 40.0
+"""Angle between the normals of two pixels, degrees, from which neither has a part in the other's shading; by eye."""
 
 
 def build_geometry(
@@ -62,3 +65,66 @@ def completion_of(geometry: Geometry, told: str | None = None) -> str:
     if found in COMPLETIONS:
         return found
     return "planes" if (geometry.mesh.face_plane >= 0).any() else "none"
+
+
+def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CREASE) -> Mesh:
+    """The mesh with a vertex for each normal where pixels of different normals meet; its points stay where they are.
+
+    A normal that is the mean of a wall's and of the floor's below it belongs to neither, and lights the last row of the
+    wall from above: a bright line along every crease, and around the foot of everything that stands on something.
+    The corner of a pixel gets the mean normal of those pixels that have the vertex in common and whose normals are
+    within `crease` degrees of the pixel's own. Faces keep their order, everything but the visible pixels its normals.
+
+    mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
+    normal: [H, W, 3] unit, camera frame.
+    """
+    own = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
+    vertex = pixel_corners(mesh, depth > 0)[depth > 0].ravel()  # [4 P]
+    order = np.argsort(vertex, kind="stable")
+    sorted_vertex = vertex[order]
+    starts = np.flatnonzero(np.diff(sorted_vertex, prepend=-1))
+    place = np.empty_like(order)  # [4 P] which of its vertex's up to four pixels each one is
+    place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
+    around = np.full((len(mesh.vertices), 4), -1)
+    around[vertex, place] = np.repeat(np.arange(len(own)), 4)  # [V, 4] pixels that meet in a vertex
+    cosine = np.cos(np.radians(crease))
+    # Most vertices lie on no crease and stay as they are.
+    flat = np.ones(len(around), bool)
+    for i, j in combinations(range(4), 2):
+        both = around[:, j] >= 0  # places are filled from the first
+        flat[both] &= np.einsum("nk,nk->n", own[around[both, i]], own[around[both, j]]) > cosine
+    corner = np.flatnonzero(~flat[vertex])  # [C] of pixels, at creases
+    at, near = vertex[corner], around[vertex[corner]]  # [C], [C, 4]
+    alike = (near >= 0) & (np.einsum("njk,nk->nj", own[near], own[corner // 4]) > cosine)
+    alike[np.arange(len(corner)), place[corner]] = True
+    # Pixels with the same company share a vertex.
+    key, first, number = np.unique(at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True)
+    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(1, dtype=np.float64)  # [K, 3]
+    new = vertex.copy()
+    new[corner] = len(mesh.vertices) + number  # after the vertices there were
+    points = mesh.vertices[key // 16]
+    return _tidy(replace(
+        mesh,
+        vertices=np.concatenate([mesh.vertices, points]),
+        normals=np.concatenate([mesh.normals, face_camera(shading, points)]),
+        uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
+        faces=np.concatenate([new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]).astype(np.int32),
+    ))  # fmt: skip
+
+
+def pixel_corners(mesh: Mesh, surface: Array) -> Array:
+    """[H, W, 4] front vertices of each pixel's corners, read off the two faces that come first for each pixel."""
+    faces = mesh.faces[: 2 * int(surface.sum())].reshape(-1, 6)
+    corner = np.full((*surface.shape, 4), -1, np.int64)
+    # Faces of a pixel: top left, bottom left, bottom right; top left, bottom right, top right.
+    corner[surface] = faces[:, [0, 5, 1, 2]]
+    return corner
+
+
+def _tidy(mesh: Mesh) -> Mesh:
+    """The mesh without vertices that no face has."""
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces] = True
+    number = np.cumsum(used) - 1
+    kept = {name: getattr(mesh, name)[used] for name in ("vertices", "normals", "uv")}
+    return replace(mesh, faces=number[mesh.faces].astype(np.int32), **kept)

@@ -18,37 +18,27 @@ from materialist.geometry.planes import Plane
 from materialist.geometry.polygon import clip, triangulate
 from materialist.types import Array, Camera, Mesh
 
-BEHIND = 0.01
-"""Inside the picture a continuation lies at least this fraction of the depth behind the observed surface."""
-EXTENT = 2.0
-"""A continuation reaches this many scene radii (median distance of the surface from the camera) from the plane's
-visible middle: under the camera and somewhat behind it, but not so far that it hides a hemisphere of light."""
-GROUND_EXTENT = 20.0
-"""The same for ground under open sky."""
-SKY_SHARE = 0.05
-"""Share of the picture without a surface from which a scene counts as outdoors."""
-UPWARD = 0.7
-"""Least Y of the normal of a floor or table top. Only those go on behind the camera: a wall or ceiling there would
-shut out the light that the picture never shows."""
-WALL_REACH = 0.8
-"""How far a wall or ceiling goes beyond the picture, to each side of the middle of what is seen of it, as a multiple of
-the farthest that is seen: where it ends is not known, and one continued too far shuts out the light from beside and
-above."""
-WALL_BEHIND = 1.2
-"""The same for what lies behind things that the picture shows."""
-BOUNDING = 0.9
-"""A plane that has this share of the other points in front of it bounds the scene (floor, wall, ceiling) and goes on
-freely; any other (a table top above a floor) only between its own pixels and across the frame sides that it touches."""
-TOUCH = 0.2
-"""Share of a frame side that a plane must cover to touch it."""
-ONE_SIDE = 0.9
-"""Share of a plane's pixels that must lie on one side of another plane for the planes to stop at each other."""
-CELLS = 256
-"""Cells of the continuation along the picture's longer side; at least a pixel each."""
-RIM = 0.01
-"""Pixels by which the part beyond the frame keeps clear of it, against round-off."""
-MOST_TRIANGLES = 8000
-"""Bound on the triangles of one plane beyond one side of the frame."""
+
+@dataclass(frozen=True)
+class CompletionSettings:
+    """Which planes go on, and how far; distances in scene radii (median distance of the surface) unless said."""
+
+    behind: float = 0.01  # part of the depth by which a continuation lies behind the observed surface; tuned by eye
+    extent: float = 2.0  # from the plane's visible middle: under the camera and somewhat behind it; tuned by eye
+    ground_extent: float = 20.0  # the same for ground under open sky; tuned by eye
+    sky_share: float = 0.05  # share of the picture without a surface from which a scene counts as outdoors
+    upward: float = 0.7  # least Y of the normal of a floor; a wall behind the camera would shut out unseen light
+    wall_reach: float = 0.8  # extent of a wall in its own seen size, beyond the picture; tuned on 8 scenes
+    wall_behind: float = 1.2  # the same for what lies behind things that the picture shows; tuned on 8 scenes
+    bounding: float = 0.9  # share of the other points in front of a plane from which it bounds the scene (floor, wall)
+    touch: float = 0.2  # share of a frame side that a plane must cover to go on across it
+    one_side: float = 0.9  # share of a plane's pixels on one side of another for the planes to stop at each other
+    cells: int = 256  # cells of a continuation along the picture's longer side; at least a pixel each
+    rim: float = 0.01  # pixels by which the part beyond the frame keeps clear of it, against round-off
+    most_triangles: int = 8000  # of one plane beyond one side of the frame
+
+
+DEFAULT = CompletionSettings()
 
 
 @dataclass(frozen=True)
@@ -87,8 +77,8 @@ class Wall:
 def walls_of(planes: list[Plane], depth: Array, camera: Camera) -> list[Wall]:
     """The walls and ceilings that `complete` continues."""
     found = []
-    for sheet in _sheets(planes, np.asarray(depth, np.float64), camera, EXTENT):
-        if sheet.plane.normal[1] < UPWARD:
+    for sheet in _sheets(planes, np.asarray(depth, np.float64), camera):
+        if sheet.plane.normal[1] < DEFAULT.upward:
             place = sheet.points @ axes(sheet.plane.normal).T
             (left, down), (right, up) = place.min(0), place.max(0)
             seen = replace(sheet.ends, left=float(left), right=float(right), down=float(down), up=float(up))
@@ -102,71 +92,61 @@ def complete(
     depth: Array,
     camera: Camera,
     *,
-    extent: float = EXTENT,
     walls: bool = True,
     ends: Sequence[Ends] = (),
 ) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
-    extent: how far from its visible middle a plane is continued, in scene radii (see `EXTENT`).
-    walls: whether planes that do not face up (`UPWARD`) go on beyond the picture, too, not only behind what it shows.
-    ends: where walls end beyond the picture, if that is known, in place of `WALL_REACH`.
+    walls: whether planes that do not face up go on beyond the picture, too, not only behind what it shows.
+    ends: where walls end beyond the picture, if that is known.
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
     of the scene nor cross the frame (the flat side of an object) are left alone.
     """
     depth = np.asarray(depth, np.float64)
-    sheets = _sheets(planes, depth, camera, extent, ends)
+    sheets = _sheets(planes, depth, camera, ends)
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
         found = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
-        if walls or sheet.plane.normal[1] >= UPWARD:
+        if walls or sheet.plane.normal[1] >= DEFAULT.upward:
             found.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
         parts += [_patch(sheet, corners, camera) for corners in found if len(corners)]
     return join(parts)
 
 
-def _sheets(
-    planes: list[Plane], depth: Array, camera: Camera, extent: float, ends: Sequence[Ends] = ()
-) -> list[_Sheet]:
-    return [sheet for k, plane in enumerate(planes) if (sheet := _sheet(k, plane, depth, camera, extent, ends))]
-
-
-def _sheet(
-    index: int, plane: Plane, depth: Array, camera: Camera, extent: float, ends: Sequence[Ends] = ()
-) -> _Sheet | None:
-    """Measure a plane; None if it is not part of the scene's structure."""
+def _sheets(planes: list[Plane], depth: Array, camera: Camera, ends: Sequence[Ends] = ()) -> list[_Sheet]:
+    """The planes that are part of the scene's structure, measured."""
     surface = depth > 0
     points = unproject(depth, camera).astype(np.float64)
     radius = float(np.median(np.linalg.norm(points[surface], axis=-1)))
-    if -plane.offset < 0.02 * radius:  # a plane through the camera would cut the view open
-        return None
-    others = points[surface & ~plane.mask]
-    bounding = len(others) == 0 or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > BOUNDING
-    mask = plane.mask
-    touches = tuple(bool(side.mean() > TOUCH) for side in (mask[-1], mask[:, 0], mask[:, -1], mask[0]))
-    if not (bounding or any(touches)):
-        return None
-    pixels = np.flatnonzero(mask)
-    pixels = pixels[:: max(1, len(pixels) // 20_000)]
-    own = points.reshape(-1, 3)[pixels]
-    own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
-    outdoors = np.mean(~surface) > SKY_SHARE and plane.normal[1] > UPWARD
-    half_size = behind = (GROUND_EXTENT if outdoors else extent) * radius
-    told = None
-    if plane.normal[1] < UPWARD:
-        half_size, behind = min(half_size, WALL_REACH * _size(own)), min(behind, WALL_BEHIND * _size(own))
-        told = ends_of(plane, ends)
-    x, y = axes(plane.normal) @ own.mean(0)
-    square = Ends(
-        (float(plane.normal[0]), float(plane.normal[1]), float(plane.normal[2])), float(plane.offset),
-        float(x - half_size), float(x + half_size), float(y - half_size), float(y + half_size),
-    )  # fmt: skip
-    return _Sheet(index, plane, own, pixels, bool(bounding), touches, told or square, behind)
+    found = []
+    for index, plane in enumerate(planes):
+        others = points[surface & ~plane.mask]
+        bounding = not len(others) or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > DEFAULT.bounding
+        sides = plane.mask[-1], plane.mask[:, 0], plane.mask[:, -1], plane.mask[0]
+        touches = tuple(bool(side.mean() > DEFAULT.touch) for side in sides)
+        # A plane through the camera would cut the view open.
+        if -plane.offset < 0.02 * radius or not (bounding or any(touches)):
+            continue
+        pixels = np.flatnonzero(plane.mask)
+        pixels = pixels[:: max(1, len(pixels) // 20_000)]
+        own = points.reshape(-1, 3)[pixels]
+        own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
+        outdoors = np.mean(~surface) > DEFAULT.sky_share and plane.normal[1] > DEFAULT.upward
+        half = behind = (DEFAULT.ground_extent if outdoors else DEFAULT.extent) * radius
+        told = None
+        if plane.normal[1] < DEFAULT.upward:
+            half, behind = min(half, DEFAULT.wall_reach * _size(own)), min(behind, DEFAULT.wall_behind * _size(own))
+            told = ends_of(plane, ends)
+        x, y = (float(v) for v in axes(plane.normal) @ own.mean(0))
+        nx, ny, nz = (float(v) for v in plane.normal)
+        square = Ends((nx, ny, nz), float(plane.offset), x - half, x + half, y - half, y + half)
+        found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, told or square, behind))
+    return found
 
 
 def _size(points: Array) -> float:
@@ -193,10 +173,10 @@ def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
             continue
         height = sheet.points @ other.plane.normal - other.plane.offset  # [N] above the other plane
         share = float(np.mean(height > 0))
-        if max(share, 1 - share) >= ONE_SIDE:
+        if max(share, 1 - share) >= DEFAULT.one_side:
             sign = 1 if share > 0.5 else -1
             walls.append(sign * np.array([[*other.plane.normal, -other.plane.offset]]))
-    if sheet.plane.normal[1] < UPWARD:
+    if sheet.plane.normal[1] < DEFAULT.upward:
         walls.append(np.array([[0.0, 0, -1, 0]]))  # in front of the camera
     return np.concatenate(walls)
 
@@ -204,7 +184,7 @@ def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
 def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) -> Array:
     """[Q, 4, 3] corners of the quads that continue the plane behind what the picture shows, scene units."""
     height, width = farthest.shape
-    cell = max(1, max(height, width) // CELLS)
+    cell = max(1, max(height, width) // DEFAULT.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
     x, y = (xs[None] - width / 2) / camera.focal, (height / 2 - ys[:, None]) / camera.focal
     rays = np.stack(np.broadcast_arrays(x, y, np.array(-1.0)), -1)  # [h+1, w+1, 3] through the cell corners
@@ -218,7 +198,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     hidden = np.where(sheet.plane.mask, 0, farthest)  # on the plane's own pixels there is nothing to add
     hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)  # [h, w] farthest in the cell
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
-    keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - BEHIND) * hidden)
+    keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - DEFAULT.behind) * hidden)
     if not sheet.bounding:
         keep &= _within_hull(sheet.pixels, (xs[:-1] + xs[1:]) / 2, (ys[:-1] + ys[1:]) / 2, width)
     return points4[keep]
@@ -241,7 +221,7 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     square = sheet.ends.corners() - basis @ origin
     for wall in walls:
         square = clip(square, _line(wall, basis, origin))
-    side_x, side_y = (camera.width / 2 + RIM) / camera.focal, (camera.height / 2 + RIM) / camera.focal
+    side_x, side_y = (camera.width / 2 + DEFAULT.rim) / camera.focal, (camera.height / 2 + DEFAULT.rim) / camera.focal
     # a . p >= 0 inside the frustum: bottom, left, right, top
     frustum = np.array([[0.0, 1, -side_y], [1, 0, -side_x], [-1, 0, -side_x], [0, -1, -side_y]])
     spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
@@ -250,7 +230,7 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
         line = _line(np.append(inward, 0), basis, origin)
         if sheet.bounding or touched:
             piece = clip(square, -line)
-            pieces.append(triangulate(piece, np.zeros(2), 0.2 * spread, 0.2, MOST_TRIANGLES))
+            pieces.append(triangulate(piece, np.zeros(2), 0.2 * spread, 0.2, DEFAULT.most_triangles))
         square = clip(square, line)  # what is beyond this side is done; go on with the rest
     return np.concatenate(pieces or [np.zeros((0, 3, 2))]) @ basis + origin
 

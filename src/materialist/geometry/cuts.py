@@ -9,18 +9,19 @@ import numpy as np
 from materialist.camera import unproject
 from materialist.types import Array, Camera
 
-SUPPORT_PIXELS = 3
-"""A slope counts as the surface's own only if it holds over this many pixels beside the pair."""
-SLANTED = 25.0
-"""Degrees. Only where the predicted normal is at least this grazing can a steep slope be a surface seen from the side;
-where it faces the camera, the slope is an edge that the depth network has smeared."""
-STEADY_FACTOR = 2.0
-"""Where the slope is steady, as on a plane, a step up to this many times as large still belongs to the surface."""
-BENDING_FACTOR = 3.0
-"""A slope that grows towards the pair by a share s raises that allowance by this times s ..."""
-SUPPORT_FACTOR = 5.0
-"""... but never above this many times the smallest slope. The steepest smooth case is the rim of a sphere, whose last
-step is up to 4.2 times the smallest of the three before it wherever tau = 6 calls it grazing."""
+
+@dataclass(frozen=True)
+class CutSettings:
+    """Which steps in depth are the surface's own; tuned by eye unless derived."""
+
+    support: int = 3  # pixels beside a pair over which a slope must hold to count as the surface's own
+    slanted: float = 25.0  # degrees from grazing: where normals face the camera more, a steep slope is a smeared edge
+    steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
+    bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by
+    most: float = 5.0  # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
+
+
+DEFAULT = CutSettings()
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,9 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     2. the leg itself is grazing: it makes an angle below sqrt(2) tau with the view ray. A triangle's plane is at least
        as grazing as any of its edges, and its steeper leg is at most about sqrt(2) times less so: every grazing
        triangle is cut, and only across its slope, not along the boundary;
-    3. its step in inverse depth exceeds what the slope on either side, over `SUPPORT_PIXELS` pixels, lets expect.
+    3. its step in inverse depth exceeds what the slope on either side, over `support` pixels, lets expect.
        Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut. This exception
-       holds only where the predicted normals, if given, agree that the surface is slanted (`SLANTED`).
+       holds only where the predicted normals, if given, agree that the surface is slanted (`CutSettings.slanted`).
 
     depth: [H, W] planar scene units, 0 = no surface. tau: degrees. normal: [H, W, 3] predicted unit normals or None.
     """
@@ -66,9 +67,9 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
 
 
 def _slanted(normal: Array, points: Array) -> Array:
-    """[H, W] bool: predicted normal [H, W, 3] within `SLANTED` of grazing, seen from the camera at points [H, W, 3]."""
+    """[H, W] bool: predicted normal [H, W, 3] within `slanted` of grazing, seen from the camera at points [H, W, 3]."""
     length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(points, axis=-1)
-    return np.abs((normal * points).sum(-1)) <= np.sin(np.radians(SLANTED)) * length
+    return np.abs((normal * points).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted)) * length
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:
@@ -121,7 +122,7 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
     for side in (-1, 1):
         least, first = np.full_like(step, np.inf), np.zeros_like(step)  # smallest slope, and the one next to the pair
         held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
-        for reach in range(1, min(SUPPORT_PIXELS, width - 2) + 1):
+        for reach in range(1, min(DEFAULT.support, width - 2) + 1):
             here, there = (slice(reach, None), slice(None, -reach))[::side]
             reached = np.zeros(step.shape, bool)
             reached[:, here] = pair[:, there]
@@ -132,6 +133,6 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
             first = np.where(held & (reach == 1), beside, first)
         steady = np.isfinite(least) & (least > 0)
         least = np.where(steady, least, 1)
-        bending = first * (STEADY_FACTOR + BENDING_FACTOR * (first / least - 1))
-        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, SUPPORT_FACTOR * least), 0))
+        bending = first * (DEFAULT.steady + DEFAULT.bending * (first / least - 1))
+        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, DEFAULT.most * least), 0))
     return np.abs(step) > allowed

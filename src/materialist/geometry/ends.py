@@ -12,10 +12,8 @@ from materialist.errors import InputError
 from materialist.geometry.planes import Plane
 from materialist.types import Array
 
-SAME_NORMAL = np.cos(np.radians(15.0))
-"""Planes found anew on changed maps are taken for the same one within this angle,"""
-SAME_OFFSET = 0.15
-"""and within this relative difference of their distances from the camera."""
+_SAME_NORMAL, _SAME_OFFSET = np.cos(np.radians(15.0)), 0.15
+"""A plane found anew on changed maps is the same one within this angle (cosine) and relative distance; tuned by eye."""
 _NUMBERS = ("offset", "left", "right", "down", "up")
 
 
@@ -74,7 +72,7 @@ def ends_of(plane: Plane, ends: Iterable[Ends]) -> Ends | None:
     close = [
         (float(np.dot(e.normal, plane.normal)), e)
         for e in ends
-        if np.dot(e.normal, plane.normal) > SAME_NORMAL
-        and abs(e.offset - plane.offset) <= SAME_OFFSET * max(-e.offset, -plane.offset)
+        if np.dot(e.normal, plane.normal) > _SAME_NORMAL
+        and abs(e.offset - plane.offset) <= _SAME_OFFSET * max(-e.offset, -plane.offset)
     ]
     return max(close, key=lambda pair: pair[0])[1] if close else None

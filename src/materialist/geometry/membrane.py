@@ -6,8 +6,8 @@ import numpy as np
 
 from materialist.types import Array
 
-SWEEPS = 14
-"""Relaxations at each size; the coarser sizes have done the rest."""
+_SWEEPS = 14
+"""Relaxations at each size; the coarser sizes have done the rest (by eye)."""
 
 
 def membrane(values: Array, known: Array) -> Array:
@@ -56,7 +56,7 @@ def _relaxed(values: Array, known: Array) -> Array:
     rows, columns = np.flatnonzero((~known).any(1)), np.flatnonzero((~known).any(0))
     window = np.s_[max(rows[0] - 1, 0) : rows[-1] + 2, max(columns[0] - 1, 0) : columns[-1] + 2]
     part, free = values[window].copy(), ~known[window]
-    for _ in range(SWEEPS):
+    for _ in range(_SWEEPS):
         framed = np.pad(part, ((1, 1), (1, 1), (0, 0)), mode="edge")
         mean = (framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]) / 4
         part[free] = mean[free]

@@ -11,29 +11,25 @@ from materialist.camera import pixel_rays
 from materialist.geometry.boundary import check_maps
 from materialist.types import Array, Camera
 
-SAMPLES = 12_000
-"""Points that take part in the search; the labels are then made for every pixel."""
-HYPOTHESES = 400
-TOLERANCE = 0.025
-"""Relative depth error of a pixel that still lies on a plane. Depth from a network bends planes by about this much."""
-BENT = 0.08
-"""Relative depth error up to which a plane may grow from there, as long as it stays connected and its normals agree:
-a table top that the network has bent stays one plane instead of three."""
-STEP = 0.01
-"""Change of that error between neighbours that ends the growth: the rim of a book, not the bend of a table."""
-SMALL_PICTURE = 150
-"""Pixels along the longer side below which the bend itself makes larger steps, and `STEP` grows in proportion."""
-SAME_NORMAL = np.cos(np.radians(25.0))
-"""Predicted normals of a plane's pixels agree with their own mean within this angle."""
-FLAT = np.cos(np.radians(10.0))
-"""Half of them even within this angle; on a patch of a ball or a jug they spread evenly up to the bound above."""
-LIKE_GEOMETRY = np.cos(np.radians(55.0))
-"""Their mean agrees with the plane through the points within this angle. Loose: a depth network's relief is not metric,
-so that a plane's slope in depth can be far off while its predicted normals are right."""
-LEAST_SHARE = 0.05
-"""A dominant plane holds at least this share of the pixels with a surface."""
-SPECK_SHARE = 0.004
-"""Connected patches below this share of the picture are chance agreement, not part of the plane."""
+
+@dataclass(frozen=True)
+class PlaneSettings:
+    """What counts as one plane: relative depth errors, and cosines between predicted normals; tuned by eye."""
+
+    samples: int = 12_000  # points that take part in the search; labels are made for every pixel
+    hypotheses: int = 400  # planes that are tried
+    tolerance: float = 0.025  # error of a pixel on a plane; networks bend planes by about this much
+    bent: float = 0.08  # error up to which a plane grows, where connected: a bent table top stays one plane
+    step: float = 0.01  # change of the error between neighbours that ends the growth: the rim of a book
+    small_picture: int = 150  # pixels along the longer side below which `step` grows in proportion
+    same_normal: float = np.cos(np.radians(25.0))  # normals of a plane's pixels agree with their mean
+    flat: float = np.cos(np.radians(10.0))  # half of them even so: on a ball they spread evenly up to the bound above
+    like_geometry: float = np.cos(np.radians(55.0))  # the mean agrees with the plane: networks' relief is not metric
+    least: float = 0.05  # least share of the pixels with a surface
+    speck: float = 0.004  # connected patches below this share of the picture are chance agreement
+
+
+DEFAULT = PlaneSettings()
 
 
 @dataclass(frozen=True)
@@ -56,18 +52,18 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, m
     """Find the dominant planes, largest first, by RANSAC on inverse depth (linear in screen space on a plane).
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame.
-    A plane's pixels agree with it in depth (`TOLERANCE`, growing to `BENT`), and in predicted normal with each other;
-    it is reported if they are at least `LEAST_SHARE` of the pixels with a surface. Raises InputError for unusable maps.
+    A plane's pixels agree with it in depth, and in predicted normal with each other (`PlaneSettings`); it is reported
+    if they are at least 5 % of the pixels with a surface. Raises InputError for unusable maps.
     """
     depth, normal = check_maps(depth, normal, camera)
     rays = pixel_rays(camera).astype(np.float64)  # [H, W, 3], z = -1
-    stride = max(1, int(np.sqrt(depth.size / SAMPLES)))
+    stride = max(1, int(np.sqrt(depth.size / DEFAULT.samples)))
     thin = np.s_[stride // 2 :: stride, stride // 2 :: stride]
     small = _Maps(rays[thin], normal[thin].astype(np.float64), depth[thin])
     rng = np.random.default_rng(seed)
     found: list[_Fit] = []
     free = small.depth > 0  # [h, w]
-    least = LEAST_SHARE * free.sum()
+    least = DEFAULT.least * free.sum()
     for _ in range(2 * max_planes):  # some of the candidates are unsound and only use up their pixels
         if len(found) == max_planes or free.sum() < max(3.0, least):
             break
@@ -77,8 +73,8 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, m
         fit, grown = _grow(small, free, fit)
         if grown.sum() < least:
             break
-        flat = np.median(small.normal[grown] @ fit.facing) > FLAT
-        if flat and _unit(-fit.coefficients) @ fit.facing > LIKE_GEOMETRY:
+        flat = np.median(small.normal[grown] @ fit.facing) > DEFAULT.flat
+        if flat and _unit(-fit.coefficients) @ fit.facing > DEFAULT.like_geometry:
             found.append(fit)
         free &= ~grown
     return _label(_Maps(rays, normal.astype(np.float64), depth), found)
@@ -101,7 +97,7 @@ class _Maps:
 
     def alike(self, fit: _Fit) -> Array:
         """[H, W] bool: has a surface whose predicted normal is like the plane's."""
-        return (self.depth > 0) & (self.normal @ fit.facing > SAME_NORMAL)
+        return (self.depth > 0) & (self.normal @ fit.facing > DEFAULT.same_normal)
 
 
 @dataclass(frozen=True)
@@ -119,21 +115,21 @@ def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None
     rays, facing, depth = maps.rays[free], maps.normal[free], maps.depth[free]  # [N, 3], [N, 3], [N]
     count = len(depth)
     best, best_score = None, 2
-    for _ in range(HYPOTHESES):
+    for _ in range(DEFAULT.hypotheses):
         seed = facing[rng.integers(count)]
         draw = rng.integers(count, size=12)
-        trio = draw[facing[draw] @ seed > SAME_NORMAL][:3]
+        trio = draw[facing[draw] @ seed > DEFAULT.same_normal][:3]
         if len(trio) < 3 or abs(np.linalg.det(rays[trio])) < 1e-6:
             continue
         coefficients = np.linalg.solve(rays[trio], 1 / depth[trio])
-        close = np.abs(depth * (rays @ coefficients) - 1) < TOLERANCE
-        score = int(np.count_nonzero(close & (facing @ seed > SAME_NORMAL)))
+        close = np.abs(depth * (rays @ coefficients) - 1) < DEFAULT.tolerance
+        score = int(np.count_nonzero(close & (facing @ seed > DEFAULT.same_normal)))
         if score > best_score:
             best, best_score = _Fit(coefficients, seed), score
     for _ in range(5):
         if best is None:
             return None
-        best = _refit(maps, free & maps.alike(best) & (np.abs(maps.error(best)) < TOLERANCE))
+        best = _refit(maps, free & maps.alike(best) & (np.abs(maps.error(best)) < DEFAULT.tolerance))
     return best
 
 
@@ -157,12 +153,12 @@ def _grow(maps: _Maps, free: Array, fit: _Fit) -> tuple[_Fit, Array]:
 
 
 def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
-    """[H, W] bool: free pixels within `TOLERANCE`, and what is smoothly connected to them within `BENT`."""
+    """[H, W] bool: free pixels within the tolerance, and what is smoothly connected to them within `bent`."""
     error = maps.error(fit)
     alike = free & maps.alike(fit)
-    core = alike & (np.abs(error) < TOLERANCE)
-    wide = alike & (np.abs(error) < BENT)
-    step = STEP * max(1.0, SMALL_PICTURE / max(error.shape))
+    core = alike & (np.abs(error) < DEFAULT.tolerance)
+    wide = alike & (np.abs(error) < DEFAULT.bent)
+    step = DEFAULT.step * max(1.0, DEFAULT.small_picture / max(error.shape))
     jump_x, jump_y = np.abs(np.diff(error, axis=1)) > step, np.abs(np.diff(error, axis=0)) > step
     calm = wide.copy()
     calm[:, 1:] &= ~jump_x
@@ -185,7 +181,7 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
     planes = []
     for k, fit in enumerate(found):
         mask = _without_specks(label == k)
-        if mask.sum() < LEAST_SHARE * surface.sum():
+        if mask.sum() < DEFAULT.least * surface.sum():
             continue
         size = float(np.linalg.norm(fit.coefficients))
         planes.append(Plane(-fit.coefficients / size, -1 / size, mask))
@@ -193,10 +189,10 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
 
 
 def _without_specks(mask: Array) -> Array:
-    """[H, W] bool without connected patches smaller than `SPECK_SHARE` of the picture."""
+    """[H, W] bool without connected patches smaller than `PlaneSettings.speck` of the picture."""
     patches, count = ndimage.label(mask)
     sizes = np.bincount(patches.ravel(), minlength=count + 1)
-    keep = sizes >= SPECK_SHARE * mask.size
+    keep = sizes >= DEFAULT.speck * mask.size
     keep[0] = False
     return keep[patches]
 

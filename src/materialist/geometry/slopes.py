@@ -12,22 +12,18 @@ from materialist.types import Array
 
 Pairs = tuple[Array, Array, Array, Array]
 """Linked neighbours, [P] each: the first, the second, the step wanted between them, and its weight."""
-STEEPEST = 0.12
-"""Smallest n.v that is followed (7 degrees): beyond, the slope runs to infinity."""
 SHARP = 0.5
-"""Least standard deviation of the window of `depth_slopes`, pixels: hardly more than the four neighbours."""
-FAR = 1.5
-"""Pixels over which `continued` follows a plane; farther out values stay."""
+"""Least standard deviation of the window of `depth_slopes`, pixels: hardly more than the four neighbours; by eye."""
 
 
-def slopes(normal: Array, rays: Array, steepest: float = STEEPEST) -> tuple[Array, Array]:
+def slopes(normal: Array, rays: Array, steepest: float = 0.12) -> tuple[Array, Array]:
     """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
 
     n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r).
 
     Args:
         normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
-        steepest: smallest n.v that is followed.
+        steepest: smallest n.v that is followed (0.12: 7 degrees): beyond, the slope runs to infinity.
     """
     x, y = rays[..., 0], rays[..., 1]
     across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
@@ -95,14 +91,14 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     return found[..., 1] * spread, found[..., 2] * spread
 
 
-def continued(values: Array, known: Array) -> Array:
-    """[H, W] float64: a map carried on along the planes of its last known pixels."""
+def continued(values: Array, known: Array, far: float = 1.5) -> Array:
+    """[H, W] float64: a map carried on along the planes of its last known pixels for `far` pixels, constant beyond."""
     from scipy.ndimage import distance_transform_edt
 
     right, down = depth_slopes(values, known)
     away, (i, j) = distance_transform_edt(~known, return_indices=True)
     rows, columns = np.indices(known.shape)
-    part = np.minimum(1, FAR / np.maximum(away, 1e-9))
+    part = np.minimum(1, far / np.maximum(away, 1e-9))
     beyond = values[i, j] + part * (right[i, j] * (columns - j) + down[i, j] * (rows - i))
     return np.where(known, values, beyond).astype(np.float64)
 

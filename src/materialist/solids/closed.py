@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.geometry.contour import region
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
 from materialist.solids.front import smooth_front
 from materialist.solids.shell import DEFAULT as SHELL
-from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined
+from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined, region
 from materialist.types import Array, Camera
 
 

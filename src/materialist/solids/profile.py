@@ -13,28 +13,28 @@ import numpy as np
 
 from materialist.types import Array
 
-BEND = 0.03
-"""Weight of second differences against that of points."""
-LEAN = 2.0
-"""Weight of normals against that of places."""
-ROUNDS = 3
-"""How often the function is solved for; each time what rays pass freely, and lay in the body, is pushed out."""
-PUSHED, PUSH = 0.5, 0.3
-"""Value that such a cell is given, and its weight."""
-MARGIN = 12
-"""Cells around what is seen."""
-BELOW = 3.0
-"""Cells below the surface at which no ray passes."""
-GAP = 7
-"""Cells along a line without a point that are no gap in what is seen."""
-STRETCH, STRETCH_INSIDE = 0.2, 0.5
-"""Parts of the object's height over which its outside is looked at, to go on below, and the inside of a ring."""
-MEETING, LEVEL = 0.2, 0.8
-"""What a ring's inside must end at: the foot of its outside (part of the height), nearly level (radians)."""
-CLEAR = 3.0
-"""Cells around points that are seen in which no ray pushes: there the points tell the border."""
-BESIDE = 2.5
-"""Cells within which a line must have a point that is seen, to be of the object."""
+
+@dataclass(frozen=True)
+class ProfileSettings:
+    """How smooth the function is, and how it goes on where nothing is seen; tuned by eye."""
+
+    bend: float = 0.03  # weight of second differences against that of points: larger is smoother
+    lean: float = 2.0  # weight of normals against that of places
+    rounds: int = 3  # solutions; after each, places that rays pass freely and that lay in the body are pushed out
+    pushed: float = 0.5  # value that such a place is given, cells
+    push: float = 0.3  # its weight
+    margin: int = 12  # cells around what is seen
+    below: float = 3.0  # cells below the surface at which no ray passes
+    gap: int = 7  # cells along a line without a point that are no gap in what is seen
+    stretch: float = 0.2  # part of the height over which the outside is looked at, to go on below
+    stretch_inside: float = 0.5  # the same for the inside of a ring
+    meeting: float = 0.2  # part of the height within which a ring's inside must end at the foot of its outside
+    level: float = 0.8  # angle from the level within which it must end, radians
+    clear: float = 3.0  # cells around points that are seen in which no ray pushes: there the points tell the border
+    beside: float = 2.5  # cells within which a line must have a point that is seen, to be of the object
+
+
+DEFAULT = ProfileSettings()
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Profile:
             line = line[np.r_[True, np.abs(np.diff(line, axis=0)).max(1) > 1e-6]]
             place = line * self.cell + [0, self.low]
             ends = np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6
-            if len(line) < 4 or not ends or tree.query(place)[0].min() > BESIDE * self.cell + level:
+            if len(line) < 4 or not ends or tree.query(place)[0].min() > DEFAULT.beside * self.cell + level:
                 continue
             normal = np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
             normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
@@ -129,26 +129,28 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     from scipy.sparse.linalg import splu
 
     seen = points[:count]
-    low = min(float(seen[:, 1].min()), max(floor, float(seen[:, 1].min() - np.ptp(seen[:, 1])))) - MARGIN * cell
+    low = min(float(seen[:, 1].min()), max(floor, float(seen[:, 1].min() - np.ptp(seen[:, 1])))) - DEFAULT.margin * cell
     shape = (
-        int(np.ceil((seen[:, 1].max() - low) / cell)) + MARGIN,
-        int(np.ceil(seen[:, 0].max() / cell)) + MARGIN,
+        int(np.ceil((seen[:, 1].max() - low) / cell)) + DEFAULT.margin,
+        int(np.ceil(seen[:, 0].max() / cell)) + DEFAULT.margin,
     )
     at = lambda places: (places - [0, low]) / cell  # noqa: E731  (column, row)
     free = _cells(at(passed), shape)
     told = free & _far(at(seen), shape)
     rows, wanted = _points(at(points), leaning, shape)
-    matrix = rows.T @ rows + BEND * _bending(shape)
+    matrix = rows.T @ rows + DEFAULT.bend * _bending(shape)
     right = rows.T @ wanted
     pushed = np.zeros(shape, bool)
-    for _ in range(ROUNDS):
-        values = splu((matrix + _diagonal(PUSH * pushed)).tocsc()).solve(right + PUSH * PUSHED * pushed.ravel())
+    for _ in range(DEFAULT.rounds):
+        values = splu((matrix + _diagonal(DEFAULT.push * pushed)).tocsc()).solve(
+            right + DEFAULT.push * DEFAULT.pushed * pushed.ravel()
+        )
         values = values.reshape(shape)
-        before, pushed = pushed, pushed | (told & (values < PUSHED / 2))
+        before, pushed = pushed, pushed | (told & (values < DEFAULT.pushed / 2))
         if (before == pushed).all():
             break
     off = float(np.sqrt(np.mean(_read(values, at(seen)) ** 2)))
-    below = np.clip(np.round(at(seen) - BELOW * leaning[:count]).astype(int), 0, np.array(shape[::-1]) - 1)
+    below = np.clip(np.round(at(seen) - DEFAULT.below * leaning[:count]).astype(int), 0, np.array(shape[::-1]) - 1)
     return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
 
 
@@ -160,10 +162,10 @@ def _rounded(profile: Profile, leaning: Array) -> Array:
     for line, away, nearest in _borders(profile):
         known = _known(away, profile)
         starts = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))
-        if not len(starts) or line[starts[0], 0] < GAP * profile.cell:
+        if not len(starts) or line[starts[0], 0] < DEFAULT.gap * profile.cell:
             continue
         k = starts[0] + int(np.argmax(away[starts[0] :] < profile.cell))  # there is a point right here
-        found = _onward(profile, line[k:], leaning[nearest[k:]], STRETCH, -1)
+        found = _onward(profile, line[k:], leaning[nearest[k:]], DEFAULT.stretch, -1)
         if len(found) > 1:
             return found[1:]
     return np.zeros((0, 3))
@@ -176,13 +178,15 @@ def _ring(profile: Profile, leaning: Array, foot: float) -> Array:
     """
     for line, away, nearest in _borders(profile):
         known = _known(away, profile)
-        ends = np.flatnonzero(known & ~np.roll(known, -1) & (line[:, 1] > foot + MEETING * np.ptp(profile.seen[:, 1])))
-        if not len(ends) or line[ends[-1], 0] < GAP * profile.cell:
+        ends = np.flatnonzero(
+            known & ~np.roll(known, -1) & (line[:, 1] > foot + DEFAULT.meeting * np.ptp(profile.seen[:, 1]))
+        )
+        if not len(ends) or line[ends[-1], 0] < DEFAULT.gap * profile.cell:
             continue
         k = ends[-1] - int(np.argmax(away[ends[-1] :: -1] < profile.cell))
-        found = _onward(profile, line[k::-1], leaning[nearest[k::-1]], STRETCH_INSIDE, 1)
-        met = len(found) > 1 and abs(found[-1, 1] - foot) < MEETING * np.ptp(profile.seen[:, 1])
-        if met and found[-1, 2] > 1.5 * np.pi - LEVEL:
+        found = _onward(profile, line[k::-1], leaning[nearest[k::-1]], DEFAULT.stretch_inside, 1)
+        met = len(found) > 1 and abs(found[-1, 1] - foot) < DEFAULT.meeting * np.ptp(profile.seen[:, 1])
+        if met and found[-1, 2] > 1.5 * np.pi - DEFAULT.level:
             return found[1:]
     return np.zeros((0, 3))
 
@@ -200,7 +204,7 @@ def _known(away: Array, profile: Profile) -> Array:
     """[K] bool: places of a line with points beside them, small gaps too."""
     from scipy.ndimage import maximum_filter1d
 
-    return maximum_filter1d(away < BESIDE * profile.cell, GAP, mode="nearest")
+    return maximum_filter1d(away < DEFAULT.beside * profile.cell, DEFAULT.gap, mode="nearest")
 
 
 def _onward(profile: Profile, line: Array, leaning: Array, stretch: float, way: int) -> Array:
@@ -214,7 +218,7 @@ def _onward(profile: Profile, line: Array, leaning: Array, stretch: float, way: 
     angle = np.unwrap(np.arctan2(leaning[part, 1], leaning[part, 0]))
     middle = 0.0 if way < 0 else np.pi
     angle += 2 * np.pi * np.round((middle - angle[0]) / (2 * np.pi))
-    if part.sum() < GAP or abs(angle[0] - middle) > np.pi / 2:
+    if part.sum() < DEFAULT.gap or abs(angle[0] - middle) > np.pi / 2:
         return np.zeros((0, 3))
     rate, first = np.polyfit(along[part], angle, 1)
     rate, at, found = -way * rate, line[0].copy(), []
@@ -241,10 +245,10 @@ def _cells(at: Array, shape: tuple[int, int]) -> Array:
 
 
 def _far(at: Array, shape: tuple[int, int]) -> Array:
-    """[h, w] bool: cells farther than CLEAR from the places [M, 2] (column, row)."""
+    """[h, w] bool: cells farther than `clear` from the places [M, 2] (column, row)."""
     from scipy.ndimage import distance_transform_edt
 
-    return distance_transform_edt(~_cells(at, shape)) > CLEAR
+    return distance_transform_edt(~_cells(at, shape)) > DEFAULT.clear
 
 
 def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:
@@ -260,7 +264,11 @@ def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:
     up = np.stack([x - 1, -x, 1 - x, x], 1)
     weight = 1 / np.sqrt(np.bincount(index, minlength=shape[0] * shape[1])[index])
     parts, wanted = [], []
-    for columns, target, strength in ((value, 0 * x, 1.0), (out, leaning[:, 0], LEAN), (up, leaning[:, 1], LEAN)):
+    for columns, target, strength in (
+        (value, 0 * x, 1.0),
+        (out, leaning[:, 0], DEFAULT.lean),
+        (up, leaning[:, 1], DEFAULT.lean),
+    ):
         parts.append(columns * (weight * strength)[:, None])
         wanted.append(target * weight * strength)
     rows = np.repeat(np.arange(3 * len(at)), 4)

@@ -15,7 +15,6 @@ import numpy as np
 from materialist.camera import project
 from materialist.solids.profile import Profile, fitted
 from materialist.solids.shell import Shell, inside_out, joined
-from materialist.solids.vessel import vessel
 from materialist.types import Array, Camera
 
 
@@ -31,6 +30,9 @@ class RevolutionSettings:
     before: float = 1.5  # cells before the front at which rays are free for certain
     sunk: float = 0.3  # part of its height that an object reaches below what is seen of it, at most; tuned by eye
     air: float = 0.004  # part of its height that an object stays above the ground
+    side: float = 0.5  # least outward part of the normals of a side; above the last of it is the lid
+    under: float = 3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
+    lip: int = 12  # points of the rounded rim of an open vessel
     base_facing: float = 0.35  # n.v of the lowest visible part above which it ends in an edge, at a flat base
 
 
@@ -212,3 +214,52 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
         vertices.astype(np.float32), faces.reshape(-1, 3).astype(np.int32), normals.astype(np.float32),
         np.clip(place, 0, 1).astype(np.float32),
     )  # fmt: skip
+
+
+def vessel(profile: Profile, wall: float) -> tuple[Array, Array] | None:
+    """The line around the wall of an open vessel: up its outside, over a round rim, down its inside.
+
+    Args:
+        wall: its thickness, scene units.
+
+    Returns:
+        Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the
+        axis to the axis; None where the profile is no single body around its axis, or has no room inside.
+    """
+    outer, inner = _around(profile.lines()), _around(profile.lines(wall))
+    if outer is None or inner is None:
+        return None
+    place, lean = outer
+    top = _last_side(outer)
+    rim = None if top is None else _last_side(outer, place[top, 1] - wall / 2)  # the round lip ends where the side did
+    within = None if rim is None else _last_side(inner, place[rim, 1] - DEFAULT.under * wall)
+    if rim is None or within is None:
+        return None
+    # Next to the lid the inside is as far from the outside as the wall is thick.
+    near = np.flatnonzero((place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > DEFAULT.side))[::-1]
+    upper = place[near] - wall * lean[near]
+    if not len(near) or upper[:, 0].min() <= 0 or inner[0][within, 0] >= place[: rim + 1, 0].max():
+        return None
+    inside = np.concatenate([upper, inner[0][: within + 1][::-1]])
+    facing = -np.concatenate([lean[near], inner[1][: within + 1][::-1]])
+    r, height = upper[0, 0], place[rim, 1]
+    half, middle = (place[rim, 0] - r) / 2, (place[rim, 0] + r) / 2
+    angle = np.pi * np.arange(1, DEFAULT.lip) / DEFAULT.lip
+    round_ = np.stack([np.cos(angle), np.sin(angle)], -1)
+    lip = np.array([middle, height]) + half * round_
+    return np.concatenate([place[: rim + 1], lip, inside]), np.concatenate([lean[: rim + 1], round_, facing])
+
+
+def _around(lines: list[tuple[Array, Array]]) -> tuple[Array, Array] | None:
+    """The only line, from the axis below to the axis above; None if there are others, or it is a ring."""
+    if len(lines) != 1 or max(lines[0][0][0, 0], lines[0][0][-1, 0]) > 1e-6:
+        return None
+    place, lean = lines[0]
+    return (place, lean) if place[0, 1] < place[-1, 1] else None
+
+
+def _last_side(line: tuple[Array, Array], below: float = np.inf) -> int | None:
+    """The last point of a line, up to a height, that is on a side."""
+    place, lean = line
+    sides = np.flatnonzero((lean[:, 0] > DEFAULT.side) & (place[:, 1] <= below))
+    return int(sides[-1]) if len(sides) else None

@@ -4,8 +4,7 @@ import numpy as np
 from geometry_scenes import plane_depth, sphere_depth
 
 from materialist.geometry.boundary import depth_to_mesh
-from materialist.geometry.build import build_geometry
-from materialist.geometry.creases import split_creases
+from materialist.geometry.build import build_geometry, split_creases
 from materialist.types import Camera
 
 CAMERA = Camera(48, 36, 50.0)
