@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from materialist.geometry.build import build_geometry
-from materialist.types import Camera, Materials, Photo, Prediction, Scene
+from materialist.types import Body, Camera, Materials, Photo, Prediction, Scene, Surface
 
 
 def block_mask(height: int, width: int) -> np.ndarray:
@@ -59,3 +59,14 @@ def rendered_scene(native: int = 1, block: float = 2.0) -> Scene:
 def _shrunk(original: np.ndarray, native: int) -> np.ndarray:
     h, w = original.shape[0] // native, original.shape[1] // native
     return original.reshape(h, native, w, native, 3).mean((1, 3)).astype(np.float32)
+
+
+def tetrahedron() -> Body:
+    """A red one, right of the block, half a unit before the wall."""
+    corners = np.float32([[0.2, -0.3, -2.4], [0.7, -0.3, -2.4], [0.45, -0.3, -2.0], [0.45, 0.3, -2.3]])
+    faces = np.int32([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+    middle = corners.mean(0)
+    normals = (corners - middle) / np.linalg.norm(corners - middle, axis=-1, keepdims=True)
+    grey = np.full((1, 1), 0.5, np.float32)
+    red = np.float32([[[0.7, 0.05, 0.05]]])
+    return Body(corners, faces, normals, np.zeros((4, 2), np.float32), Surface(red, grey, 0 * grey))

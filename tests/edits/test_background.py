@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
 from scipy import ndimage
 
 from materialist.edits.composite.composite import composite
-from materialist.edits.composite.revealed import _continued
 from materialist.edits.remove.background import joined, without
 from materialist.edits.remove.hole import make_hole, told_shadow
 from materialist.errors import InputError
@@ -62,8 +61,6 @@ def test_the_composite_shows_the_wall_and_keeps_the_rest():
 @pytest.mark.parametrize("native", [1, 3])
 def test_what_was_put_before_it_stays_whole(native):
     """A mask that lies on a thing before the object takes nothing of the thing away, nor copies it."""
-    from test_composite import tetrahedron
-
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.renderer import EditRenderer
 
@@ -118,19 +115,6 @@ def test_a_background_in_one_place_changes_no_other():
     near = np.abs(patches - alone)[MASK].mean()  # another scene has other noise
     assert np.abs(given - alone)[MASK].mean() < 2 * near + 1e-3
     assert np.abs(given - patches)[other].mean() > 0.05
-
-
-def test_given_places_are_those_of_a_background():
-    from materialist.edits.composite.revealed import _given
-
-    scene = flat_scene()
-    other = np.zeros((36, 48), bool)
-    other[4:9, 38:44] = True
-    edited = without(without(scene, MASK), other, background=0.5 * scene.photo.linear)
-    filled = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
-    given = _given(scene, edited, filled)
-    assert given[other].all() and not given[MASK].any() and filled[MASK].all()
-    assert not _given(edited, edited, filled).any()
 
 
 def test_what_is_odd_about_a_background_is_told(tmp_path):
@@ -241,19 +225,6 @@ def test_what_the_object_cast_goes_with_it_unless_it_is_to_stay():
     assert found.painted[beside & ~found.gone].mean() > 0.7 and not kept.painted[beside & ~kept.gone].any()
 
 
-def test_the_light_of_the_surroundings_goes_on_in_the_filled_place():
-    filled = np.zeros((20, 30), bool)
-    filled[5:15, 8:22] = True
-    plane = np.where(np.arange(30)[None] < 15, 0, 1) * np.ones((20, 1), int)
-    change = np.where((plane == 0)[..., None], 0.2, -0.1) * np.ones(3)
-    change[filled] = 7.0  # what it says there itself is not read
-    change[2:4] = -0.9  # and this is another surface that came to light
-    found = _continued(change, filled, plane)
-    np.testing.assert_allclose(found[filled & (plane == 0)], 0.2, atol=1e-6)
-    np.testing.assert_allclose(found[filled & (plane == 1)], -0.1, atol=1e-6)
-    assert not found[~filled].any()
-
-
 def test_parts_of_a_plane_that_do_not_reach_the_hole_are_other_surfaces():
     label = np.zeros((12, 20), int)
     label[:, 12:15] = 1
@@ -274,112 +245,9 @@ def test_how_much_of_a_shadow_goes_is_told_by_word_or_number():
             told_shadow(value)
 
 
-def test_light_that_comes_back_outshines_nothing():
-    """Where an object's guessed back hid a strong light, its neighbour must not glow when it goes."""
-    from materialist.edits.composite.revealed import _too_bright
-
-    scene = flat_scene()
-    grey = np.full((36, 48, 3), 0.2, np.float32)
-    grey[:, :12] = 0.8  # a quarter of it is bright
-    scene = replace(scene, photo=replace(scene.photo, linear=grey))
-    filled = np.zeros((36, 48), bool)
-    filled[10:20, 20:30] = True
-    gained = np.full((36, 48, 3), 0.9, np.float32)
-    kept = gained - _too_bright(scene, gained, filled)
-    np.testing.assert_allclose(kept[:, :12], 0, atol=1e-6)  # as bright as anything already
-    np.testing.assert_allclose(kept[30, 40], 0.6, rtol=1e-5)  # shade may go
-    np.testing.assert_array_equal(kept[filled], gained[filled])
-    assert not _too_bright(scene, -gained, filled).any()
-
-
-def test_changes_beside_a_filled_place_are_those_of_the_light():
-    """Not what surfaces leave that do not meet there, nor what the fit misses, nor too much shade on a thing."""
-    from materialist.edits.composite.revealed import MOST, RIM, _believed, _trust
-
-    scene = rendered_scene()
-    photo, filled = scene.photo.linear, block_mask(36, 48)
-    rim = ~filled & (ndimage.distance_transform_edt(~filled) <= RIM)
-    brighter = 1.2 * photo
-    spoiled = np.where(rim[..., None], 9 * photo, brighter)
-    for plane, least in ((-1, np.exp(-MOST)), (0, 0.1)):
-        label = np.full(filled.shape, plane)
-        trust = _trust(scene, photo, filled)
-        np.testing.assert_array_equal(trust, 1)
-        found = _believed(photo, spoiled, filled, label, trust)
-        np.testing.assert_array_equal(found[filled], spoiled[filled])
-        np.testing.assert_allclose(found[rim] + 0.02, 1.2 * (photo[rim] + 0.02), rtol=0.05)
-        np.testing.assert_allclose(found[~filled & ~rim], brighter[~filled & ~rim], rtol=1e-4)
-        darker = _believed(photo, 0.1 * photo, filled, label, trust)[~filled]
-        assert (darker + 0.02 >= least * (photo[~filled] + 0.02) * 0.999).all() and (darker < photo[~filled]).all()
-    missed = np.zeros(filled.shape, bool)
-    missed[4:12, 4:12] = True
-    fit = np.where(missed[..., None], 2 * photo, photo)
-    found = _believed(fit, 1.2 * fit, filled, scene.geometry.plane_label, _trust(scene, fit, filled))
-    np.testing.assert_allclose(found[6:10, 6:10], fit[6:10, 6:10], rtol=0.01)
-    np.testing.assert_allclose(found[30:, 30:], (1.2 * fit)[30:, 30:], rtol=0.02)
-
-
-@pytest.mark.parametrize("native", [1, 3])
-def test_under_a_body_nothing_of_the_photo_is_left(native):
-    from materialist.edits.composite.composite import into_photo
-    from materialist.edits.composite.layers import Layers
-    from materialist.edits.composite.revealed import _as_body
-
-    scene = rendered_scene(native)
-    body = block_mask(36, 48)
-    shown = np.broadcast_to(np.float32([0.1, 0.3, 0.2]), scene.photo.linear.shape)
-    photo = _as_body(scene.photo, body, shown)
-    base = np.where(body[..., None], shown, scene.photo.linear)
-    out = into_photo(photo, Layers(base, base, body, body, base))
-    inside = np.kron(ndimage.binary_erosion(body), np.ones((native, native))) > 0
-    outside = np.kron(~ndimage.binary_dilation(body, iterations=2), np.ones((native, native))) > 0
-    np.testing.assert_allclose(out[inside], np.broadcast_to([0.1, 0.3, 0.2], out[inside].shape), rtol=1e-5)
-    np.testing.assert_array_equal(out[outside], scene.photo.original[outside])
-
-
-def test_glass_goes_on_under_the_rim_of_what_stands_before_it():
-    from materialist.edits.composite.native_layer import NativeLayer
-    from materialist.edits.composite.revealed import RIM, _under
-
-    covered = np.zeros((20, 30), bool)
-    covered[:, :12] = True
-    inside = np.zeros(covered.shape, np.float32)
-    inside[5:15, 10:25] = 1
-    covered &= inside == 0
-    shown = np.where(covered[..., None], 0.2, np.where(inside[..., None] > 0, 9, 0.7)).astype(np.float32)
-    more, under = _under(NativeLayer(inside, inside, shown), covered, shown)
-    assert more[6:14, 10:12].all() and not more[6:14, 10 + int(RIM) : 21].any()
-    np.testing.assert_array_equal(under[more], np.full((more.sum(), 1), np.float32(0.2)))
-    np.testing.assert_array_equal(under[~more], shown[~more])
-    assert _under(None, covered, shown)[0] is covered
-
-
-def test_what_is_revealed_has_glass_under_the_rim_of_what_stands_before_it():
-    from types import SimpleNamespace
-
-    from materialist.edits.composite.layers import Layers
-    from materialist.edits.composite.native_layer import NativeLayer
-    from materialist.edits.composite.revealed import revealed
-
-    scene = rendered_scene()
-    removed = without(scene, MASK)
-    base = scene.photo.linear
-    inside = np.zeros(MASK.shape, np.float32)
-    inside[14:20, 20:30] = 1
-    covered = MASK & (inside == 0)
-    glass = np.where(covered[..., None], np.float32([0.1, 0.6, 0.2]), base).astype(np.float32)
-    everywhere = np.ones(MASK.shape, bool)
-    portrait = NativeLayer(inside, inside, np.zeros_like(base))
-    layers = Layers(base, glass, everywhere, MASK, glass, native=portrait, covered=covered)
-    studio = SimpleNamespace(scene=scene, emitter_pixels=lambda edited: ~everywhere)
-    photo, found = revealed(studio, removed, layers, spp=1)
-    for picture in (found.base, found.edited, photo.linear):
-        np.testing.assert_allclose(picture[16, 20:22], np.full((2, 3), [0.1, 0.6, 0.2]), atol=1e-5)
-
-
 def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
-    from materialist.edits.composite.composite import into_photo
+    from materialist.edits.composite.into_photo import into_photo
     from materialist.edits.composite.layers import Layers
     from materialist.edits.composite.native_layer import NativeLayer
 

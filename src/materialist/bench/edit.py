@@ -145,7 +145,8 @@ def _scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:
 
 def _latencies(bench: EditBench, data: Path | None) -> Iterator[dict[str, Any]]:
     """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
-    from materialist.edits.composite.composite import composite, into_photo
+    from materialist.edits.composite.composite import composite
+    from materialist.edits.composite.into_photo import into_photo
     from materialist.edits.composite.layers import render_layers
     from materialist.edits.core.renderer import EditRenderer
     from materialist.edits.light.relight import relight

@@ -10,7 +10,7 @@ import numpy as np
 
 from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
-from materialist.edits.select.boxes import Box, grown
+from materialist.edits.select.objects import Box
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Prediction, Scene
@@ -102,7 +102,12 @@ def boxes(mask: Array, loose: float) -> dict[str, Box]:
     """The boxes around a mask [H, W] bool: exact, and larger by `loose` of its shorter side on every side."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     exact = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-    return {"exact box": exact, "loose box": grown(exact, loose, mask.shape)}
+    more = max(1, round(loose * min(exact[2] - exact[0], exact[3] - exact[1])))
+    around = (
+        max(exact[0] - more, 0), max(exact[1] - more, 0),
+        min(exact[2] + more, mask.shape[1]), min(exact[3] + more, mask.shape[0]),
+    )  # fmt: skip
+    return {"exact box": exact, "loose box": around}
 
 
 def _scene(sample: SyntheticSample, found: Prediction) -> Scene:

@@ -82,7 +82,7 @@ class Preview:
         """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""
         from dataclasses import replace
 
-        from materialist.edits.composite.composite import into_photo, onto_working
+        from materialist.edits.composite.into_photo import into_photo, onto_working
 
         if quick:
             return onto_working(self.scene.photo, self.layers(edited))

@@ -12,7 +12,7 @@ from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.emitters import WHITE, in_photo
 from materialist.edits.core.emitters import KEY, base_of, emitting
 from materialist.edits.light import emitters
-from materialist.edits.light.emitters import _explained, _patch, dimmed, visible_lights
+from materialist.edits.light.emitters import _patch, dimmed, visible_lights
 from materialist.edits.light.frames import moving_light
 from materialist.edits.light.relight import relight, rotated
 from materialist.errors import InputError
@@ -70,7 +70,7 @@ def test_the_window_is_found_and_a_speck_is_not():
 
 def test_its_radiance_is_found():
     _, fit = rooms()
-    ambient, radiance, share = _explained(fit, visible_lights(fit), [(1.0, 1.0, 1.0)], 0, "auto")
+    ambient, radiance, share = (dimmed(fit, 1.0).provenance[KEY][key] for key in ("ambient", "radiance", "share"))
     assert 6 <= radiance <= 12
     np.testing.assert_allclose(ambient * fit.envmap.mean(), 0.15, rtol=0.25)
     assert ambient + share == pytest.approx(1, abs=0.25)  # the two together are the photo
@@ -107,7 +107,7 @@ def test_the_window_stays_while_the_rest_turns():
 def test_frames_share_the_dimmed_lights_and_the_picture_that_they_are_compared_with(monkeypatch):
     _, fit = rooms()
     asked = []
-    monkeypatch.setattr(emitters, "_explained", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
+    monkeypatch.setattr(emitters, "_estimated", lambda *given: asked.append(given) or (0.8, 6.0, 0.2))
     film = list(moving_light(fit, 3, dim=0.25))
     assert len(asked) == 1 and film[0].bodies is film[2].bodies and len(film[0].bodies) == 1
     np.testing.assert_allclose(film[0].bodies[0].surface.emission, 1.5)

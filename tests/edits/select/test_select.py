@@ -6,8 +6,8 @@ from edit_scenes import flat_scene
 from PIL import Image
 from table_top import overlap, table_top
 
-from materialist.edits.select.objects import borne_out, contrast, convexity, edge_map
-from materialist.edits.select.select import Features, select
+from materialist.edits.select import objects
+from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 
 
@@ -77,67 +77,46 @@ def test_sam2_without_weights_says_what_to_do(table, monkeypatch, tmp_path):
         select(table[0], click=(50, 50), method="sam2")
 
 
-def test_a_guessed_relief_is_not_believed():
-    rng = np.random.default_rng(0)
-    colour = rng.random((60, 80)).astype(np.float32) * 0.1
-    colour[:, 40] = 3
-    shape = np.zeros((60, 80), np.float32)
-    shape[30] = 2  # a horizon that the photo does not show
-    assert borne_out(shape, colour) < 0.3
-    shape = np.zeros((60, 80), np.float32)
-    shape[:, 40] = 2
-    assert borne_out(shape, colour) > 0.8
-
-
-def test_contrast_sees_colour_through_texture():
-    y, x = np.mgrid[:40, :60]
-    checks = np.where((x + y) % 2 == 0, 20.0, -20.0)
-    lab = np.stack([50 + checks, np.where(x < 30, 40.0, 0.0), 0 * checks], -1).astype(np.float32)
-    right = contrast(x < 30, lab)
-    wrong = contrast(x < 15, lab)
-    assert right[20, 28:32].min() > 0.8 and wrong[20, 13:17].max() < 0.2
-
-
-def test_the_edge_of_a_box_is_inside_it_and_its_foot_is_not():
-    """One turn of the surface, seen as an edge of a thing and as the corner between a thing and the ground."""
-    rows = np.arange(48)[:, None] + 0 * np.arange(40)
-    up, ahead = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
-    strength = {}
-    for name, above, below in (("convex", up, ahead), ("concave", ahead, up)):
-        normal = np.where((rows < 24)[..., None], above, below).astype(np.float32)
-        turns = convexity(normal)
-        # A right angle turns as much towards the viewer as upwards.
-        assert turns[22:26].max() == pytest.approx(0.5**0.5 * (name == "convex"), abs=1e-5) and turns[:20].max() == 0
-        # The photo has an edge there, too, so that the shape's is believed.
-        linear = np.where((rows < 24)[..., None], 0.5, 0.2).repeat(3, -1).astype(np.float32)
-        features = Features(linear, np.full(rows.shape, 2.0, np.float32), normal)
-        strength[name] = edge_map(features)[22:26].max()
-    assert strength["concave"] > 1.5 * strength["convex"]
-
-
 def test_a_click_on_the_last_row_of_an_odd_size():
-    """Half of 341 rows is 170, and half of row 340 as well."""
-    scene = flat_scene(341, 512)
-    assert select(scene, click=(60, 340), method="grabcut").any()
-    assert select(scene, click=(511, 340), method="grabcut").any()
+    scene = flat_scene(171, 256)
+    assert select(scene, click=(30, 170), method="grabcut").any()
+    assert select(scene, click=(255, 170), method="grabcut").any()
 
 
-def test_a_likelihood_counts_only_where_it_is_sure():
-    """A disc on a plate: a map that is sure gets the plate, one that says "perhaps" does not outdo the disc's edge."""
-    from materialist.edits.select.objects import certainty, object_around
-    from materialist.edits.select.select import Features
+def around(mask, more):
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return columns[0] - more, rows[0] - more, columns[-1] + 1 + more, rows[-1] + 1 + more
 
-    y, x = np.mgrid[:96, :96] - 47.5
-    disc, plate = np.hypot(x, y) < 14, np.hypot(x, y) < 36
-    colour = np.where(disc[..., None], [0.7, 0.2, 0.1], np.where(plate[..., None], [0.5, 0.45, 0.4], [0.4, 0.45, 0.5]))
-    normal = np.broadcast_to(np.float32([0, 0, 1]), (96, 96, 3)).copy()
-    features = Features(colour.astype(np.float32), np.full((96, 96), 2, np.float32), normal)
 
-    def found(likely):
-        return object_around(features, [(48, 48)], likely.astype(np.float32))
+@pytest.mark.parametrize("more", [0, 6])
+@pytest.mark.parametrize("which", [0, 1])
+def test_boxes_need_not_be_exact(table, which, more):
+    scene, *things = table
+    assert overlap(select(scene, box=around(things[which], more)), things[which]) > 0.85
 
-    iou = lambda a, b: (a & b).sum() / (a | b).sum()  # noqa: E731
-    sure, perhaps = np.where(plate, 0.98, 0.02), np.where(plate, 0.6, 0.35)
-    assert certainty(sure) > 0.9 and certainty(perhaps) < 0.6
-    assert iou(found(sure), plate) > 0.85
-    assert iou(found(perhaps), disc) > 0.85
+
+@pytest.mark.parametrize("certain", [False, True])
+def test_the_network_is_believed_where_it_is_certain(table, monkeypatch, certain):
+    """It is told a half of the object."""
+    scene, first, _ = table
+    half = first & (np.indices(first.shape)[1] < 50)
+    likely = np.where(half, 0.95 if certain else 0.55, 0.02 if certain else 0.4).astype(np.float32) * (first | half)
+    assert (objects.certainty(likely) > 0.7) == certain
+    monkeypatch.setattr(objects, "clicknet", lambda scene, points: likely)
+    monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: first)
+    monkeypatch.setattr(objects, "refined", lambda scene, rough, points, likely: rough)
+    for found in (select(scene, box=around(first, 6)), select(scene, click=(45, 50))):
+        assert overlap(found, half if certain else first) > 0.9
+
+
+def test_an_object_that_ends_outside_of_the_box_is_not_meant(table, monkeypatch):
+    scene, first, _ = table
+    monkeypatch.setattr(objects, "clicknet", lambda scene, points: np.ones(first.shape, np.float32))
+    box = around(first, 6)
+    np.testing.assert_array_equal(select(scene, box=box), select(scene, box=box, method="grabcut"))
+
+
+def test_a_box_on_nothing_says_what_to_do(table, monkeypatch):
+    monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: np.zeros(label.shape, bool))
+    with pytest.raises(InputError, match="draw the box a little larger"):
+        select(table[0], box=(50, 50, 60, 60), method="grabcut")

@@ -40,10 +40,7 @@ class Layers:
     native: NativeLayer | None = None
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
     covered: Array | None = None
-    """[H, W] bool: other new bodies, seen in place of a surface of the photo; part of `changed`."""
-    replaced: Array | None = None
-    """[H, W] bool: pixels that show another surface, other materials, or the sky of another light; None for not
-    known."""
+    """[H, W] bool: glass in place of a surface of the photo: the rendering alone is seen; part of `changed`."""
     held: Array | None = None
     """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
 
@@ -58,26 +55,24 @@ def render_layers(
     """
     scene = renderer.scene
     base, other = renderer.pair(edited)
-    replaced, relit = replaced_pixels(scene, edited), is_relit(scene, edited)
-    changed = replaced | relit  # another light changes every pixel
+    relit = is_relit(scene, edited)
+    changed = changed_pixels(scene, edited)
     guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
     alone, covered = None, None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
-        covered = anything = renderer.covered(edited)
-        if alone is not None:
-            covered = anything & (alone.inside == 0)
-        changed, replaced = changed | covered, replaced | anything
+        anything = renderer.covered(edited)
+        covered = anything if alone is None else anything & (alone.inside == 0)
+        changed = changed | covered
+        covered = covered & ~renderer.emitter_pixels(edited)  # `emitters.in_photo` lays them on the photo
         if clean:
             albedo, normal = renderer.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(
         base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress, focused=focused(edited),
     )  # fmt: skip
-    if relit:
-        replaced = replaced | (edited.depth == 0)
     held = texture_held(scene.materials.albedo, edited.materials.albedo)
-    return replace(layers, relit=relit, native=alone, covered=covered, replaced=replaced, held=held)
+    return replace(layers, relit=relit, native=alone, covered=covered, held=held)
 
 
 def texture_held(albedo: Array, edited: Array) -> Array:
@@ -118,18 +113,12 @@ def focused(scene: Scene) -> bool:
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
-    return replaced_pixels(scene, edited) | is_relit(scene, edited)
-
-
-def replaced_pixels(scene: Scene, edited: Scene) -> Array:
-    """[H, W] bool: where the maps or the depth of the two scenes differ, whatever their light."""
     a, b = scene.materials, edited.materials
     changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
-    # Where a surface was taken away, what stands behind it is seen, but for what a body hides before and after.
     changed = (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
     if changed.any() and scene.bodies and scene.bodies == edited.bodies[: len(scene.bodies)]:
-        changed &= body_coverage(scene) < 1
-    return changed
+        changed &= body_coverage(scene) < 1  # a body hides the surface before and after
+    return changed | is_relit(scene, edited)
 
 
 def difference(

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
-from materialist.edits.select.objects import likely
+from materialist.edits.select.objects import Box, object_at, object_in
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
-_SIZE = 256
-"""Longer side at which an object is looked for; the border is then refined at working size."""
 
 
 def select(
@@ -32,8 +30,7 @@ def select(
         click: (x, y) at working size, or several, all of them on the object.
         box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
-        method: `network` (colour, depth, normals, and ClickNet), `grabcut` (without ClickNet) or `sam2` (needs its
-            weights).
+        method: `network` (ClickNet and GrabCut), `grabcut` (without ClickNet) or `sam2` (needs its weights).
         device: `auto`, `cpu` or `cuda`, for `sam2`.
 
     Raises:
@@ -53,66 +50,14 @@ def select(
 
         found = segment(scene.photo.linear, points, frame, device=device)
     elif frame is not None:
-        from materialist.edits.select.boxes import in_box
-
-        found = in_box(scene, frame, network=method == "network")
-    elif method == "network":
-        found = from_clicks(scene, points, likely(scene, points))
+        found = object_in(scene, frame, network=method == "network")
     else:
-        found = from_clicks(scene, points)
+        found = object_at(scene, points, network=method == "network")
     found = found & (scene.depth > 0)
     if not found.any():
         other = "draw the box a little larger" if frame is not None else "click another place on the object"
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
     return found
-
-
-def from_clicks(scene: Scene, points: Sequence[tuple[int, int]], share: Array | None = None) -> Array:
-    """[H, W] bool of the object that all (column, row) points lie on; `share` [H, W]: what is `likely`."""
-    import cv2
-
-    from materialist.edits.select.objects import object_around
-    from materialist.edits.select.refine import refined
-
-    small, scale = _smaller(scene)
-    # Rounded sides may be half a pixel short.
-    seeds = [(min(int(x * scale), small.shape[1] - 1), min(int(y * scale), small.shape[0] - 1)) for x, y in points]
-    shrunk = None if share is None else np.asarray(cv2.resize(share, small.shape[::-1], interpolation=cv2.INTER_AREA))
-    rough = object_around(small, seeds, shrunk)
-    return refined(scene, _larger(rough, scene), points, share)
-
-
-class Features:
-    """What tells surfaces apart, [H, W, ...] at one size: Lab colour, log depth, normals."""
-
-    def __init__(self, linear: Array, depth: Array, normal: Array):
-        import cv2
-
-        from materialist.color import linear_to_srgb
-
-        self.lab = cv2.cvtColor(linear_to_srgb(linear), cv2.COLOR_RGB2LAB)  # L in [0, 100]
-        self.depth, self.normal, self.surface = depth, normal, depth > 0
-        self.shape = depth.shape
-
-
-def _smaller(scene: Scene) -> tuple[Features, float]:
-    import cv2
-
-    height, width = scene.depth.shape
-    scale = min(1.0, _SIZE / max(height, width))
-    size = (max(2, round(width * scale)), max(2, round(height * scale)))
-    shrink = lambda v, how: np.array(cv2.resize(np.ascontiguousarray(v, np.float32), size, interpolation=how))  # noqa: E731
-    normal = shrink(scene.normal, cv2.INTER_AREA)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    depth = shrink(scene.depth, cv2.INTER_NEAREST)
-    return Features(shrink(scene.photo.linear, cv2.INTER_AREA), depth, normal), scale
-
-
-def _larger(mask: Array, scene: Scene) -> Array:
-    import cv2
-
-    height, width = scene.depth.shape
-    return np.asarray(cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)) > 0.5
 
 
 def _given(scene: Scene, mask: Array | str | Path) -> Array:
@@ -140,7 +85,7 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
     return points
 
 
-def _box(scene: Scene, box) -> tuple[int, int, int, int]:
+def _box(scene: Scene, box: Sequence[float]) -> Box:
     try:
         x0, y0, x1, y1 = (float(v) for v in box)
     except (TypeError, ValueError) as error:

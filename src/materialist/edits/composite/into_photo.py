@@ -1,0 +1,176 @@
+"""The difference of two renderings, laid on the photo at its native size (docs/editing.md has the formulas)."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.edits.composite.layers import Layers
+from materialist.edits.composite.native_layer import NativeLayer
+from materialist.edits.composite.upsample import GuidedUpsample, matte, strips, window
+from materialist.types import Array, Photo
+
+WHITE = 0.995
+"""Channel of a linear photo from which it is clipped."""
+
+
+@dataclass(frozen=True)
+class CompositeSettings:
+    """How the photo's residual over the fit follows an edit."""
+
+    floor: float = 0.02
+    """Radiance added to both sides of edited / base; larger trusts ratios of dark pixels less (tuned by eye)."""
+    most_detail: float = 2.0
+    """Largest factor on the photo's detail beyond working size under another light (tuned by eye)."""
+    light_fade: float = 12.0
+    """How fast the fit's error goes when the light changes, per logarithm of the change (tuned by eye)."""
+    rim: float = 4.0
+    """Working pixels that the change beside a new body is continued under its outline (derived: upsampling's reach)."""
+    threads: int = 4
+    """Strips of a large photo that are made at a time, about 0.2 GB each (derived: memory)."""
+
+
+DEFAULT = CompositeSettings()
+
+
+def into_photo(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAULT) -> Array:
+    """[H0, W0, 3] the photo with the difference of two renderings added.
+
+    out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
+    At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
+    """
+    out = photo.original.copy()
+    if not layers.reached.any():
+        return _in_front(out, layers.native, photo.hdr)
+    stack = np.concatenate(_terms(photo, layers, settings), -1)  # [H, W, 9]
+    stack[~layers.reached, :6] = 0
+    upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
+    alpha = matte(layers.changed, photo.original)
+    stack, clear = _under_bodies(stack, layers, settings)
+    changed = layers.changed
+    reached = (stack[..., :3] != 0).any(-1)
+    if not reached.any():
+        return _in_front(out, layers.native, photo.hdr)
+    box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
+
+    def laid(rows: slice) -> None:
+        here, share = out[rows, columns], alpha[rows, columns]
+        large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
+        above = np.zeros_like(here)
+        for part, members in ((share, changed & clear), (1 - share, ~changed & clear)):
+            where = np.flatnonzero((part > 0).any(0))
+            if where.size:
+                own = slice(int(where[0]), int(where[-1]) + 1)
+                there = slice(columns.start + own.start, columns.start + own.stop)
+                side = upsample(stack, members, rows, there)
+                large[:, own] += part[:, own, None] * side
+                if part is share and not photo.hdr:
+                    above[:, own] = _above_white(here[:, own], side, share[:, own, None])
+        change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
+        held = here if photo.hdr or layers.relit else _unclipped(here, reference)
+        moved = np.maximum(held + change + excess * (held - reference) - above, 0)
+        out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
+
+    with ThreadPoolExecutor(min(settings.threads, os.cpu_count() or 1)) as threads:
+        list(threads.map(laid, strips(box.stop, start=box.start)))
+    return _in_front(out, layers.native, photo.hdr)
+
+
+def onto_working(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAULT) -> Array:
+    """[H, W, 3] the same at working size, where nothing is enlarged; borders as hard as the mask.
+
+    A fraction of the time of `into_photo`: for pictures while a slider moves.
+    """
+    change, excess, reference = _terms(photo, layers, settings)
+    held = photo.linear if photo.hdr or layers.relit else _unclipped(photo.linear, reference)
+    moved = np.maximum(held + change + excess * (held - reference), 0)
+    return np.where(layers.reached[..., None], moved, photo.linear)
+
+
+def _terms(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+    """(change, factor - 1, reference), [H, W, 3] each."""
+    change, excess, reference = (_other_light if layers.relit else _same_light)(photo, layers, settings)
+    if layers.covered is not None:
+        # A body in place of the photo's surface: the rendering alone is seen, and no residual of the photo.
+        own = layers.covered[..., None]
+        change = np.where(own, layers.edited - reference, change)
+        excess = np.where(own, -1, excess)
+    return change.astype(np.float32), excess.astype(np.float32), reference
+
+
+def _same_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+    """out = edited + factor (photo - base).
+
+    The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
+    factor = edited / base, and does not grow (a ratio above 1 is taken as 1). Where an edit takes a pattern away
+    (`layers.held`), the residual at its rim goes, too.
+    """
+    factor = np.minimum((layers.edited + settings.floor) / (layers.base + settings.floor), 1)
+    if layers.held is not None:
+        factor = factor * layers.held[..., None]
+    return layers.edited - layers.base, factor - 1, layers.base
+
+
+def _other_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+    """out = edited + factor (photo - small) + kept (small - base), small the photo at working size.
+
+    Beyond working size the photo has texture, which goes with the light: factor = edited / base. At working size the
+    fit's error is mostly shading, which belongs to the old light: it is kept as far as the new light is the old one
+    but for a constant g per channel, kept = g exp(-light_fade |ln(edited / base) - ln g|), averaged nearby.
+    """
+    import cv2
+
+    base, edited, floor = layers.base, layers.edited, settings.floor
+    ratio = np.log((np.maximum(edited, 0) + floor) / (np.maximum(base, 0) + floor))
+    overall = np.median(ratio.reshape(-1, 3), axis=0)
+    size = max(3, max(ratio.shape[:2]) // 8)
+    away = cv2.blur(np.abs(ratio - overall), (size, size), borderType=cv2.BORDER_REFLECT)
+    kept = np.exp(overall - settings.light_fade * away)
+    held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
+    change = edited + kept * (held - base) - photo.linear
+    return change, np.minimum(np.exp(ratio), settings.most_detail) - 1, photo.linear
+
+
+def _under_bodies(stack: Array, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array]:
+    """(stack [H, W, 9], [H, W] bool where it is known), continued under the rim of bodies at native resolution.
+
+    Pixels beside a body look up values under its rim when they are enlarged, where the layers show the body itself.
+    """
+    from scipy import ndimage
+
+    clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
+    if clear.all() or not clear.any():
+        return stack, clear
+    away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
+    return stack[row, column], away <= settings.rim
+
+
+def _above_white(photo: Array, side: Array, share: Array) -> Array:
+    """[h, w, 3] excess over white that a surface brighter than white would bring into mixed pixels.
+
+    White is mixed in, as a photo's pixels would be enlarged, lest a few hundredths of a highlight fill a pixel.
+    """
+    change, excess, reference = side[..., :3], side[..., 3:6], side[..., 6:]
+    own = photo + change + excess * (photo - reference)
+    return np.where((share > 0) & (share < 1), share * np.maximum(own - np.maximum(photo, 1), 0), 0)
+
+
+def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:
+    """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share.
+
+    At the rim of bodies brighter than an ordinary photo's white, white is mixed in, as a photo's pixels would be
+    enlarged: a few hundredths of a lamp's radiance would fill a pixel, and its outline would be ragged.
+    """
+    if native is None:
+        return picture
+    share = native.share[..., None]
+    own = native.picture if hdr else np.where(share < 1, np.minimum(native.picture, 1), native.picture)
+    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
+
+
+def _unclipped(photo: Array, base: Array) -> Array:
+    """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
+    return np.where(photo >= WHITE, np.maximum(photo, base), photo)
