@@ -256,8 +256,8 @@ def test_errors_name_the_file_that_was_asked_for(tmp_path, name, monkeypatch):
 
 
 def test_a_file_in_place_of_a_folder_is_named(tmp_path):
+    from materialist.io.atomic import ensure_writable
     from materialist.io.image import ensure_image_writable
-    from materialist.io.target import ensure_writable
 
     (tmp_path / "photo.png").touch()
     for check, name in ((ensure_image_writable, "deep/out.png"), (ensure_writable, "out.scene")):

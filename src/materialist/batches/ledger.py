@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
-from materialist.io.beside import make_folder
+from materialist.io.atomic import make_folder
 
 LEDGER = "batch.jsonl"
 LOCK = ".batch.lock"

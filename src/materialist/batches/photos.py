@@ -13,10 +13,10 @@ from pathlib import Path
 from materialist.batches.ledger import LEDGER
 from materialist.batches.remote import is_url, list_url, shown
 from materialist.errors import InputError
-from materialist.io.decode import FORMATS
+from materialist.io.atomic import MARKER
+from materialist.io.bitmap import FORMATS
+from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.examples import PREFIX
-from materialist.io.raw import RAW_SUFFIXES
-from materialist.io.target import MARKER
 
 SUFFIXES = RAW_SUFFIXES | frozenset(
     (".png", ".jpg", ".jpeg", ".heic", ".heif", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".bmp", ".avif", ".mpo")

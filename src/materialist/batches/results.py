@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from materialist.errors import OutputError, SceneError
-from materialist.io.target import MARKER
+from materialist.io.atomic import MARKER
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
 """What the hash covers beside the camera. Times, memory, paths and pictures with figures in them are left out."""

@@ -22,7 +22,7 @@ from materialist.batches.remote import is_url, local_copy
 from materialist.batches.results import file_hash, package_hash, whole_size
 from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
-from materialist.io.target import ensure_writable
+from materialist.io.atomic import ensure_writable
 from materialist.types import Array, Scene
 
 INVERSION = "materialist.pipeline:invert"

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import OutputError
-from materialist.io.beside import make_folder
+from materialist.io.atomic import make_folder
 from materialist.plain import plain
 
 CEILING = "ceiling"

@@ -73,9 +73,9 @@ def invert(
     force: Force = False,
 ) -> None:
     """Decompose a photo into geometry, materials and light, and write it as a scene package."""
+    from materialist.io.atomic import ensure_writable
     from materialist.io.package import save_scene
     from materialist.io.photo import read_photo
-    from materialist.io.target import ensure_writable
 
     # Everything that can be wrong is found before the work starts.
     width_height = parse_size(envmap_size)

@@ -79,7 +79,7 @@ def check_before(
 
 def check_saved(output: Path, save: Path | None, force: bool, full_render: bool) -> None:
     """Everything about --save that can be wrong, before the work starts."""
-    from materialist.io.target import ensure_writable
+    from materialist.io.atomic import ensure_writable
 
     if save is None:
         return

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import OutputError
-from materialist.io.beside import make_folder, own
-from materialist.io.target import files_below
+from materialist.io.atomic import files_below, make_folder, process_tag
 
 MARKER = "materialist-export.json"
 """The file that makes a folder an export: nothing else is ever replaced. It lists what was written."""
@@ -98,7 +97,7 @@ def _not_ours(folder: Path) -> str:
 
 
 def _beside(path: Path, kind: str, suffix: str = "") -> Path:
-    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{own()}{suffix}")
+    return path.absolute().with_name(f".{path.name[:40]}.{kind}-{process_tag()}{suffix}")
 
 
 def _reason(error: OSError) -> str:

@@ -1,4 +1,4 @@
-"""What decoding a file gives, and how large a photo may be."""
+"""A decoded photo, and the sizes that a photo may have."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 from materialist.errors import InputError
 from materialist.types import Array
 
+OVER_WHITE = "Transparent parts are laid over white."
 MAX_PIXELS = 200_000_000
 """Largest photo accepted, pixels: the largest phone sensors; 2.4 GB as float32."""
 MIN_SIDE = 8

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, OutputError
-from materialist.io.beside import partial
+from materialist.io.atomic import partial
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
-from materialist.io.beside import make_folder, partial
+from materialist.io.atomic import make_folder, partial
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.io import display
-from materialist.io.relief import relief
 from materialist.metrics import psnr
 from materialist.types import Array, Scene
 
@@ -87,12 +86,9 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
         tile("Depth", _range(scene.depth), _depth(scene.depth)),
     ]
     world = tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0)
-    mesh = scene.geometry.mesh
-    shape = [
-        tile("Geometry", f"{len(mesh.faces):,} triangles, turned", relief(mesh, scene.camera)),
-        tile("Planes", _plane_note(scene.geometry.plane_label), _labels(scene.geometry.plane_label, photo)),
-    ]
-    return [[*pictures, *maps], [world, *shape]] if aspect < 0.6 else [pictures, maps, [world, *shape]]
+    label = scene.geometry.plane_label
+    planes = tile("Planes", _plane_note(label, len(scene.geometry.mesh.faces)), _labels(label, photo))
+    return [[*pictures, *maps], [world, planes]] if aspect < 0.6 else [pictures, maps, [world, planes]]
 
 
 def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
@@ -206,6 +202,6 @@ def _range(depth: Array) -> str:
     return f"{seen.min():.3g} to {seen.max():.3g}" if len(seen) else "none"
 
 
-def _plane_note(label: Array) -> str:
+def _plane_note(label: Array, triangles: int) -> str:
     count = len(np.unique(label[label >= 0]))
-    return f"{count} continued" if count else "none continued"
+    return f"{count or 'none'} continued, {triangles:,} triangles"

@@ -12,13 +12,12 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import InputError, MaterialistError, OutputError, SceneError
-from materialist.io.bodies import read_bodies, write_bodies
+from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
+from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
-from materialist.io.ply import read_ply, write_ply
-from materialist.io.target import MARKER, interrupted_replacement, whole_folder
 from materialist.plain import is_utf8, plain
 from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 

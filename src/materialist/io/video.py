@@ -12,7 +12,7 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError, SetupError
-from materialist.io.beside import partial
+from materialist.io.atomic import partial
 from materialist.io.image import probe_beside, write_png_bytes
 from materialist.types import Array
 

@@ -145,7 +145,7 @@ def _note(job: Job, message: Message) -> None:
 
 
 def _sweep(folder: Path, pid: int) -> None:
-    """Remove what a stopped worker was writing (`io.beside.partial` names it)."""
+    """Remove what a stopped worker was writing (`io.atomic.partial` names it)."""
     for leftover in folder.glob(f".*partial-{pid}-*"):
         if leftover.is_dir():
             shutil.rmtree(leftover, ignore_errors=True)

@@ -12,7 +12,7 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import SetupError
-from materialist.io.beside import partial
+from materialist.io.atomic import partial
 from materialist.jobs.worker import Report
 from materialist.types import Array, Materials, Prediction, Scene
 

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import InputError, MaterialistError
-from materialist.io.decode import RAW_SUFFIXES, check_size
+from materialist.io.decode import RAW_SUFFIXES
+from materialist.io.decoded import check_size
 
 MAX_MEGABYTES = 60
 """Largest upload."""

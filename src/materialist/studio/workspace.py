@@ -22,7 +22,7 @@ import psutil
 
 from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError, OutputError
-from materialist.io.beside import partial
+from materialist.io.atomic import partial
 from materialist.types import Array
 
 CARD = "project.json"

@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.io.beside import make_folder
+from materialist.io.atomic import make_folder
 
 NAME = "checkpoint.pt"
 VERSION = 2

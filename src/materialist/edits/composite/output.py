@@ -9,9 +9,9 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import OutputError
-from materialist.io.beside import partial
+from materialist.io.atomic import partial
+from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import ensure_image_writable, write_image
-from materialist.io.raw import RAW_SUFFIXES
 from materialist.types import Array, Photo
 
 

@@ -1,14 +1,15 @@
-"""Folders that appear whole or not at all: written beside the target, then renamed.
+"""Files and folders that appear whole or not at all: written under a hidden name beside the target, then renamed.
 
-A killed run leaves only `.NAME.HASH.partial-PID-HOST` (being written) or `.NAME.HASH.replaced-PID-HOST` (the old
-scene, moved aside); both are recognised by name and removed by the next save to the same target, unless their process
-still runs. Of another machine's processes nobody knows here: theirs stay for a day.
+A killed run leaves only `.NAME.HASH.partial-PID-HOST` (unfinished) or `.NAME.HASH.replaced-PID-HOST` (the old scene,
+moved aside). The next save to the same target recognises both by name and removes them, unless their process still
+runs. A process of another machine cannot be asked, so its folders stay for a day.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import shutil
 import time
@@ -20,7 +21,6 @@ from pathlib import Path
 import psutil
 
 from materialist.errors import OutputError
-from materialist.io.beside import host, make_folder, own
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
@@ -34,6 +34,30 @@ JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers leave in folders."""
 KEPT_FOR = 24 * 3600
 """Seconds for which another machine's unfinished folder is left alone."""
+
+
+def process_tag() -> str:
+    """`PID-HOST`: this process among those of all machines (containers) that may share a folder."""
+    return f"{os.getpid()}-{host()}"
+
+
+def host() -> str:
+    """Eight hexadecimal digits for this machine's name."""
+    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it; the OSError says which file stands in the way, if one does."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        file = next((path for path in (folder, *folder.parents) if os.path.lexists(path)), folder)
+        raise NotADirectoryError(error.errno, f"{file} is a file, not a folder") from error
+
+
+def partial(path: Path, suffix: str | None = None) -> Path:
+    """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
+    return path.with_name(f".partial-{process_tag()}{path.suffix.lower() if suffix is None else suffix}")
 
 
 def ensure_writable(path: str | Path, force: bool = False) -> None:
@@ -151,7 +175,7 @@ def _stem(target: Path) -> str:
 
 
 def _sibling(target: Path, kind: str) -> Path:
-    return target.with_name(f"{_stem(target)}{kind}-{own()}")
+    return target.with_name(f"{_stem(target)}{kind}-{process_tag()}")
 
 
 def _absolute(path: str | Path) -> Path:

@@ -1,13 +1,20 @@
-"""The scene's mesh as a binary PLY that ordinary tools open and that comes back bit for bit."""
+"""Meshes of a scene package: `mesh.ply`, and the bodies `bodies/N.ply` with their maps.
+
+The PLY is written and read here and not by a mesh library, because every float comes back bit for bit with the pixel
+and the plane of each face.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from materialist.errors import OutputError, SceneError
-from materialist.types import Array, Mesh
+from materialist.errors import InputError, OutputError, SceneError
+from materialist.io.exr import read_exr, write_exr
+from materialist.types import Body, Mesh, Surface
 
 _VERTEX = np.dtype([(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "s", "t")])
 _FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
@@ -68,15 +75,50 @@ def read_ply(path: str | Path) -> Mesh:
     vertices = np.frombuffer(body[:split], "<f4").reshape(-1, 8)
     faces = np.frombuffer(body[split:], _FACE)
     return Mesh(
-        _own(vertices[:, :3]),
+        np.array(vertices[:, :3], np.float32, order="C"),
         faces["vertex_indices"].astype(np.int32),
-        _own(vertices[:, 3:6]),
-        _own(vertices[:, 6:]),
+        np.array(vertices[:, 3:6], np.float32, order="C"),
+        np.array(vertices[:, 6:], np.float32, order="C"),
         faces["pixel"].astype(np.int32),
         faces["plane"].astype(np.int16),
     )
 
 
-def _own(array: Array) -> Array:
-    """A writable contiguous float32 copy."""
-    return np.array(array, np.float32, order="C")
+def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
+    """Write the files below the package `folder`; returns the entries for scene.json."""
+    (folder / "bodies").mkdir()
+    entries: list[dict[str, Any]] = []
+    for k, body in enumerate(bodies):
+        count, surface = len(body.faces), body.surface
+        nowhere, kind = np.zeros(count, np.int32), np.full(count, -1, np.int16)
+        write_ply(folder / "bodies" / f"{k}.ply", Mesh(body.vertices, body.faces, body.normals, body.uv, nowhere, kind))
+        for name in ("albedo", "roughness", "metallic"):
+            write_exr(folder / "bodies" / f"{k}.{name}.exr", getattr(surface, name))
+        entries.append(
+            {
+                "name": body.name, "transmission": surface.transmission, "ior": surface.ior,
+                "tint": list(surface.tint), "emission": list(surface.emission),
+                "glass_roughness": surface.glass_roughness,
+            }
+        )  # fmt: skip
+    return entries
+
+
+def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, ...]:
+    """The bodies of the package `folder`. Raises SceneError where a file is missing or damaged."""
+    return tuple(_read_body(folder / "bodies", k, entry) for k, entry in enumerate(entries))
+
+
+def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
+    mesh = read_ply(folder / f"{number}.ply")
+    try:
+        albedo, roughness, metallic = (
+            read_exr(folder / f"{number}.{name}.exr") for name in ("albedo", "roughness", "metallic")
+        )
+    except InputError as error:
+        raise SceneError(f"{error} Save the scene again.") from error
+    surface = Surface(
+        albedo, roughness, metallic, float(entry["transmission"]), float(entry["ior"]), tuple(entry["tint"]),
+        tuple(entry.get("emission", (0.0, 0.0, 0.0))), entry.get("glass_roughness"),
+    )  # fmt: skip
+    return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))
