@@ -3,7 +3,7 @@
 import pytest
 from made_batch import photos
 
-from materialist.batches.edits import edits_for, edits_key, missing_files
+from materialist.batches.edits import edits_key, missing_files
 from materialist.batches.run import batch
 from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
@@ -17,12 +17,6 @@ def recipe(tmp_path):
         (tmp_path / name).write_text(name)
     (tmp_path / "edits.yaml").write_text(TEXT)
     return tmp_path / "edits.yaml"
-
-
-def test_the_name_is_put_into_every_file_of_a_list(recipe):
-    drop, edit = edits_for(recipe, "a")
-    assert drop.options["mesh"] == ["a.ply", "ball.ply"] and edit.options["mask"] == "m/a.png"
-    assert drop.options["at"] == ["3", "4"]
 
 
 def test_the_key_changes_with_a_mesh_and_with_nothing_else(recipe):

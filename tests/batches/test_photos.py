@@ -35,15 +35,6 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
     assert found["https://host/x.jpg"] == "https://me:secret@host/x.jpg?signature=1"
 
 
-def test_a_comment_may_stand_behind_a_name(tmp_path):
-    photos(tmp_path, "a", "c#1", "d #2")
-    listing = tmp_path / "list.txt"
-    listing.write_text(
-        "a.png # the kitchen\nb.png\t#none\nc#1.png  ## twice\nd #2.png\n # alone\n#\nhttps://h/x.jpg#y\n"
-    )
-    assert ids(listing) == ["a.png", "b.png", "c#1.png", "d #2.png", "https://h/x.jpg#y"]
-
-
 @pytest.mark.parametrize(
     ("make", "said"), [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")]
 )
@@ -102,13 +93,3 @@ def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
     shuffled = list(texts)
     random.shuffle(shuffled)
     assert unique_names(shuffled) == names
-
-
-def test_linked_folders_are_followed_once(tmp_path):
-    (tmp_path / "other").mkdir()
-    (tmp_path / "photos").mkdir()
-    (tmp_path / "photos" / "a.png").touch()
-    (tmp_path / "other" / "b.png").touch()
-    (tmp_path / "photos" / "more").symlink_to(tmp_path / "other")
-    (tmp_path / "other" / "back").symlink_to(tmp_path / "photos")
-    assert ids(tmp_path / "photos") == ["a.png", "more/b.png"]

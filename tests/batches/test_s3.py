@@ -4,9 +4,7 @@ import pytest
 from made_batch import photos
 
 from materialist.batches.photos import list_photos
-from materialist.batches.remote import local_copy, version
 from materialist.batches.run import batch
-from materialist.errors import InputError
 
 WHY = "needs moto[server] and s3fs"
 
@@ -36,26 +34,6 @@ def bucket(monkeypatch):
 
 def ids(source):
     return [photo.id for photo in list_photos(source, runs="elsewhere")]
-
-
-def test_listed_versioned_and_fetched(bucket, tmp_path):
-    photos(tmp_path, "x", "y")
-    content = (tmp_path / "x.png").read_bytes()
-    for key in ("x.png", "deep/y.jpg", "readme.txt", ".hidden.png"):
-        bucket(key, content)
-    assert ids("s3://photos") == ["s3://photos/deep/y.jpg", "s3://photos/x.png"]
-    assert ids("s3://photos/*.png") == ids("s3://photos/x.png") == ["s3://photos/x.png"]
-    with local_copy("s3://photos/x.png") as file:
-        assert file.read_bytes() == content and file.suffix == ".png"
-    assert not file.exists()
-    before = version("s3://photos/x.png")
-    bucket("x.png", (tmp_path / "y.png").read_bytes())
-    ids("s3://photos")  # what was listed before is not remembered
-    assert version("s3://photos/x.png") != before
-    with pytest.raises(InputError, match="nothing at s3://photos/none"), local_copy("s3://photos/none.png"):
-        pass
-    with pytest.raises(InputError, match="s3://nobody"):
-        ids("s3://nobody/here")
 
 
 def test_a_batch_resumes_with_what_has_changed(bucket, tmp_path):

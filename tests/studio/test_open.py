@@ -8,7 +8,6 @@ from studio_scenes import click, named
 from materialist.jobs.queue import STOPPED, Job
 from materialist.jobs.worker import FAILED
 from materialist.studio import tasks
-from materialist.studio.progress import failure
 from materialist.studio.tab_open import _following, _opened
 
 
@@ -48,16 +47,3 @@ def test_the_list_and_what_is_wrong_with_it_are_shown(studio, session):
     last = list(_opened(named(studio), session, session.project))[-1]
     assert len(last["steps"]) == 1 and "exactly one" in last["stage"]["badge"] and "alert" in last["progress"]
     session.act("remove", 0)
-
-
-def test_what_failed_is_called_by_its_name(tmp_path):
-    spec = {"photo": str(tmp_path / "original.jpg"), "scene": str(tmp_path / "photo.scene"), "title": "Kitchen.JPG"}
-    job = Job(
-        "invert",
-        "me",
-        tmp_path,
-        tasks.invert,
-        spec,
-        message=f"{tmp_path}/original.jpg is cut off; {tmp_path}/x.exr as well.",
-    )
-    assert failure(job) == "Kitchen.JPG is cut off; x.exr as well."

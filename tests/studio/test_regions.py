@@ -30,21 +30,6 @@ def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
     assert np.array_equal(changed, session.selection.mask) and changed[40, 50]
 
 
-def test_a_region_that_cannot_be_changed_changes_nothing(session, tmp_path):
-    loaded(session, tmp_path, "- edit: {click: [25, 24], hue: 50}")
-    session.act("choose", 0)
-    stack, selection, past = session.edits, session.selection, session._past
-
-    def refuse(steps):
-        raise InputError("no")
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(session.live, "edited", refuse)
-        with pytest.raises(InputError, match="no"):
-            click(session, 50, 40, "add")
-    assert (session.edits, session.selection, session._past) == (stack, selection, past)
-
-
 @pytest.mark.parametrize(
     ("bad", "words"),
     [("edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 5}", "exactly one"), ("relight: {rotate: abc}", "rotate"),

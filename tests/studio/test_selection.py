@@ -54,14 +54,3 @@ def test_box_and_brush():
 def test_nonsense_from_the_page(data):
     with pytest.raises(InputError):
         read_pick(data)
-
-
-def test_a_pick_is_read():
-    pick = read_pick({"tool": "brush", "mode": "add", "points": [[1, 2], [3, 4]], "radius": 5})
-    assert pick["points"] == [[1, 2], [3, 4]] and pick["radius"] == 5
-    with pytest.raises(InputError, match="stroke"):
-        Selection().brush(room(), [], 5, "add")
-    with pytest.raises(InputError, match="sky"):
-        Selection().click(room(), 3, 1, "new")
-    with pytest.raises(InputError, match="outside"):
-        Selection().click(room(), 300, 1, "new")

@@ -9,9 +9,7 @@ from studio_scenes import block, click, room
 
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
-from materialist.studio import objects
 from materialist.studio.edit_list import EditList
-from materialist.studio.objects import library_file
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -76,20 +74,6 @@ def test_a_selection_that_grows_takes_its_edit_along(session):
     assert len(session.edits.steps) == 2
 
 
-@pytest.mark.parametrize("what", ["toggle", "up", "down"])
-def test_another_edit_is_ticked_or_moved_and_keeps_its_region(session, what):
-    click(session)
-    session.material(hue="90")
-    session.deselect()
-    click(session, 50, 40)
-    session.material(hue="20")
-    masks = {step.options["hue"]: step.options["mask"] for step in session.edits.steps}
-    session.act(what, 0 if what != "up" else 1)
-    click(session, 25, 38, "add")  # still the second is in hand
-    after = {step.options["hue"]: step.options["mask"] for step in session.edits.steps}
-    assert after["90"] == masks["90"] and session.edits.steps[session.edits.current].options["hue"] == "20"
-
-
 def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
     place_lamp(session, 40, 40)
     session.act("toggle", 0)
@@ -126,34 +110,6 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
         session.act("remove", 7)
     with pytest.raises(InputError, match="not known"):
         session.act("rm -rf", 0)
-
-
-def test_light_and_lamps(session):
-    place_lamp(session, 40, 40)
-    place_lamp(session, 10, 40)
-    assert len(session.edits.steps) == 1 and len(apply(room(), list(session.edits.steps)).lamps) == 2
-    assert stage(session)["lamps"] == [[40, 40], [10, 40]]
-    with pytest.raises(InputError, match="no surface"):
-        place_lamp(session, 5, 1)
-    session.light(lamps=None)
-    assert session.edits.steps == ()
-
-
-def test_an_object_is_placed_moved_and_seen(session):
-    with pytest.raises(InputError, match="Choose an object"):
-        objects.place(session, 45, 40)
-    objects.set_option(session, "mesh", library_file(session, "Cube"))
-    objects.place(session, 50, 40)
-    before = stage(session)["picture"]
-    objects.place(session, 15, 40)
-    objects.set_option(session, "scale", "1.5")
-    assert len(session.edits.steps) == 1 and session.edits.steps[0].options["at"] == ["15", "40"]
-    assert stage(session)["picture"] != before
-    steps = session.edits.steps
-    with pytest.raises(InputError):
-        objects.set_option(session, "scale", "1e9")
-    assert session.edits.steps == steps
-    assert len(apply(room(), read_recipe(session.workspace / "edits.yaml")).bodies) == 1
 
 
 def test_uploaded_recipes_stay_on_the_desk(session, tmp_path):
@@ -215,12 +171,6 @@ def typed(tmp_path):
         return [call[1:] for call in calls]
 
     return run
-
-
-def test_the_commands_do_not_take_the_photo_apart_twice(typed):
-    assert [call[0] for call in typed(USUAL)] == ["render", "export"]
-    scene = typed(USUAL, photo=False)[0][1]
-    assert scene.startswith("/") and scene.endswith("my photos/photo-001/photo.scene")
 
 
 def test_edits_are_in_what_the_commands_export(typed):

@@ -4,8 +4,6 @@ import pytest
 from studio_scenes import click
 
 from materialist.errors import InputError
-from materialist.studio import objects
-from materialist.studio.objects import library_file
 from materialist.studio.tab_light import place_lamp
 
 
@@ -28,20 +26,6 @@ def test_each_change_of_light_is_taken_back_alone(session):
     assert session.edits.steps[0].options["envmap"] == "light-window.exr"
 
 
-def test_a_sun_is_switched_and_moved(session):
-    before = back(session)
-    session.light(sun=["45", "40"], sun_power="1")
-    for azimuth in range(0, 90, 10):
-        session.light(sun=[str(azimuth), "40"], sun_power="1")
-    for power in ("1.2", "1.4"):
-        session.light(sun=["80", "40"], sun_power=power)
-    session.light(sun=None, sun_power=None)
-    assert back(session) == before + 4 and session.edits.steps == ()
-    for sun, power in ((["80", "40"], "1.4"), (["80", "40"], "1"), (["45", "40"], "1")):
-        session.undo()
-        assert (session.edits.steps[0].options["sun"], session.edits.steps[0].options["sun_power"]) == (sun, power)
-
-
 def test_a_colour_is_dragged_and_a_texture_is_not(session):
     click(session)
     session.material(hue="10")
@@ -56,21 +40,6 @@ def test_a_colour_is_dragged_and_a_texture_is_not(session):
     assert back(session) == before + 4
     session.undo()
     assert session.edits.steps[0].options["texture"] == "b.png"
-
-
-def test_an_object_put_elsewhere_is_a_change_each_time(session):
-    objects.set_option(session, "mesh", library_file(session, "Cube"))
-    before = back(session)
-    for x in (50, 15, 30):
-        objects.place(session, x, 40)
-    assert back(session) == before + 3
-    for scale in ("0.5", "0.6"):
-        objects.set_option(session, "scale", scale)
-    for made_of in ("glass", "mirror", "#101010", "#202020", "#303030"):
-        objects.set_option(session, "material", made_of)
-    assert back(session) == before + 7
-    session.undo()
-    assert session.edits.steps[0].options["material"] == "mirror"
 
 
 def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_way_back(session):

@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from materialist.errors import OutputError
 from materialist.studio.workspace import CARD, WorkFolder
 
 
@@ -50,12 +49,6 @@ def test_a_card_cannot_lead_the_photo_elsewhere(tmp_path):
     card = json.loads((project.folder / CARD).read_text())
     (project.folder / CARD).write_text(json.dumps({**card, "photo": "../../secret.png"}))
     assert work.projects()[0].photo == project.folder / "secret.png"
-
-
-def test_a_file_in_the_way_is_one_sentence(tmp_path):
-    (tmp_path / "file").write_text("x")
-    with pytest.raises(OutputError, match="cannot be made"):
-        WorkFolder(tmp_path / "file" / "work")
 
 
 def test_caches_of_dead_studios_go(tmp_path):

@@ -1,8 +1,8 @@
-"""RUNS/batch.jsonl: what a batch has done, one line an event, only ever added to.
+"""RUNS/batch.jsonl: the events of a batch, one line each, only ever appended.
 
 A line is written in one piece and flushed to the disk before the next photo begins, so that a batch that is killed at
-any moment can be gone on with: a last line that was cut off is passed over. A lock that vanishes with its process
-keeps a second batch out of the folder.
+any moment can be resumed: a last line that was cut off is skipped. A lock that vanishes with its process keeps a
+second batch out of the folder.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
     try:
         events = read_events(path) if held else []
         if resume and not force:
-            _same_options(events, options, folder)
+            _require_same(events, options, folder)
         ledger = Ledger(path, events, lock)
         ledger.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
         ledger.append("start", format=FORMAT, options=options, anew=not resume)
@@ -119,26 +119,16 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     return events
 
 
-def _same_options(events: list[dict[str, Any]], options: dict[str, Any], folder: Path) -> None:
-    name = _difference(events, options)
-    if name is not None:
-        before = _last_options(events)
-        raise InputError(
-            f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
-            "name another folder, or add --force to redo what differs."
-        )
-
-
-def _difference(events: list[dict[str, Any]], options: dict[str, Any]) -> str | None:
-    """An option that is not what it was at the last start; None where all are, or where there was none."""
-    before = _last_options(events)
-    differing = [name for name in sorted({*before, *options}) if before.get(name) != options.get(name)]
-    return differing[0] if before and differing else None
-
-
-def _last_options(events: list[dict[str, Any]]) -> dict[str, Any]:
+def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder: Path) -> None:
+    """Raise InputError where an option is not what it was at the last start."""
     starts = [entry for entry in events if entry["event"] == "start"]
-    return starts[-1].get("options", {}) if starts else {}
+    before = starts[-1].get("options", {}) if starts else {}
+    for name in sorted({*before, *options}):
+        if before and before.get(name) != options.get(name):
+            raise InputError(
+                f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
+                "name another folder, or add --force to redo what differs."
+            )
 
 
 def _locked(folder: Path) -> int:

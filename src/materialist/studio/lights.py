@@ -10,6 +10,7 @@ from materialist.types import Array
 
 ROWS = 128
 """Rows of the computed maps; columns are twice as many."""
+Colour = tuple[float, float, float]
 
 
 def names() -> list[str]:
@@ -19,89 +20,78 @@ def names() -> list[str]:
 
 def light(name: str, rows: int = ROWS) -> Array:
     """[rows, 2 rows, 3] float32 linear radiance, centre column along -Z; see docs/conventions.md."""
-    return np.ascontiguousarray(_LIGHTS[name](*_directions(rows)), np.float32)
-
-
-def _directions(rows: int) -> tuple[Array, Array]:
-    """(azimuth, elevation) of texel centres, degrees, [rows, 2 rows] each; azimuth 0 ahead, > 0 to the right."""
     elevation = 90 - 180 * (np.arange(rows) + 0.5) / rows
     azimuth = 360 * (np.arange(2 * rows) + 0.5) / (2 * rows) - 180
-    return np.meshgrid(azimuth, elevation)  # type: ignore[return-value]
+    return np.ascontiguousarray(_LIGHTS[name](*np.meshgrid(azimuth, elevation)), np.float32)
 
 
-def _panel(azimuth: Array, elevation: Array, at: tuple[float, float], size: tuple[float, float]) -> Array:
-    """[h, w, 1]: 1 inside a soft-edged rectangle, degrees."""
-    across = np.abs((azimuth - at[0] + 180) % 360 - 180) / (size[0] / 2)
-    up = np.abs(elevation - at[1]) / (size[1] / 2)
-    return (1 / (1 + np.exp(np.clip(14 * (np.maximum(across, up) - 1), -60, 60))))[..., None]
+def _panel(az: Array, el: Array, at: tuple[float, float], size: tuple[float, float], colour: Colour) -> Array:
+    """[h, w, 3]: a soft-edged rectangle; `at` and `size` in degrees."""
+    across = np.abs((az - at[0] + 180) % 360 - 180) / (size[0] / 2)
+    up = np.abs(el - at[1]) / (size[1] / 2)
+    return (1 / (1 + np.exp(np.clip(14 * (np.maximum(across, up) - 1), -60, 60))))[..., None] * np.array(colour)
 
 
-def _spot(azimuth: Array, elevation: Array, at: tuple[float, float], width: float) -> Array:
-    """[h, w, 1]: a Gaussian of `width` degrees around a direction."""
-    az, el, a0, e0 = (np.radians(v) for v in (azimuth, elevation, *at))
-    cosine = np.sin(el) * np.sin(e0) + np.cos(el) * np.cos(e0) * np.cos(az - a0)
-    return np.exp(-((np.degrees(np.arccos(np.clip(cosine, -1, 1))) / width) ** 2))[..., None]
+def _spot(az: Array, el: Array, at: tuple[float, float], width: float, colour: Colour) -> Array:
+    """[h, w, 3]: a Gaussian of `width` degrees around a direction."""
+    a, e, a0, e0 = (np.radians(v) for v in (az, el, *at))
+    cosine = np.sin(e) * np.sin(e0) + np.cos(e) * np.cos(e0) * np.cos(a - a0)
+    return np.exp(-((np.degrees(np.arccos(np.clip(cosine, -1, 1))) / width) ** 2))[..., None] * np.array(colour)
 
 
-def _rgb(*values: float) -> Array:
-    return np.array(values, np.float32)
+def _room(el: Array, wall: Colour, floor: Colour) -> Array:
+    """[h, w, 3]: walls above, a floor below."""
+    share = (1 / (1 + np.exp(-el / 6)))[..., None]
+    return share * np.array(wall) + (1 - share) * np.array(floor)
 
 
-def _room(elevation: Array, wall: Array, floor: Array) -> Array:
-    """Walls above, a floor below."""
-    share = (1 / (1 + np.exp(-elevation / 6)))[..., None]
-    return share * wall + (1 - share) * floor
+def _softboxes(az: Array, el: Array) -> Array:
+    key = _panel(az, el, (-70, 40), (60, 50), (9, 8.73, 8.28))
+    fill = _panel(az, el, (95, 15), (30, 80), (1.8, 1.9, 2))
+    return _room(el, (0.10, 0.10, 0.11), (0.06, 0.06, 0.06)) + key + fill
 
 
-def _softbox(azimuth: Array, elevation: Array) -> Array:
-    dark = _room(elevation, _rgb(0.10, 0.10, 0.11), _rgb(0.06, 0.06, 0.06))
-    key = 9 * _panel(azimuth, elevation, (-70, 40), (60, 50)) * _rgb(1.0, 0.97, 0.92)
-    return dark + key + 2 * _panel(azimuth, elevation, (95, 15), (30, 80)) * _rgb(0.9, 0.95, 1.0)
+def _window(az: Array, el: Array) -> Array:
+    places = [(80 + dx, 18 + dy) for dx in (-11, 11) for dy in (-14, 14)]
+    panes = sum(_panel(az, el, place, (19, 24), (6.8, 7.6, 8.8)) for place in places)
+    return _room(el, (0.16, 0.15, 0.14), (0.12, 0.10, 0.08)) + panes
 
 
-def _window(azimuth: Array, elevation: Array) -> Array:
-    room = _room(elevation, _rgb(0.16, 0.15, 0.14), _rgb(0.12, 0.10, 0.08))
-    panes = sum(_panel(azimuth, elevation, (80 + dx, 18 + dy), (19, 24)) for dx in (-11, 11) for dy in (-14, 14))
-    return room + 8 * panes * _rgb(0.85, 0.95, 1.1)
+def _sky(el: Array, share: Array, low: Colour, high: Colour, ground: Colour) -> Array:
+    """[h, w, 3]: from `low` at the horizon to `high`, by a share [h, w] of the way, over a ground."""
+    sky = (1 - share[..., None]) * np.array(low) + share[..., None] * np.array(high)
+    return np.where(el[..., None] > 0, sky, np.array(ground))
 
 
-def _overcast(azimuth: Array, elevation: Array) -> Array:
+def _overcast(az: Array, el: Array) -> Array:
     # CIE standard overcast sky: the zenith is three times as bright as the horizon.
-    sky = (1 + 2 * np.sin(np.radians(np.maximum(elevation, 0))))[..., None] / 3 * _rgb(0.95, 1.0, 1.08)
-    return np.where(elevation[..., None] > 0, sky, _rgb(0.22, 0.22, 0.20))
+    share = np.sin(np.radians(np.maximum(el, 0)))
+    return _sky(el, share, (0.95 / 3, 1 / 3, 0.36), (0.95, 1.0, 1.08), (0.22, 0.22, 0.20))
 
 
-def _noon(azimuth: Array, elevation: Array) -> Array:
-    height = np.sin(np.radians(np.maximum(elevation, 0)))[..., None]
-    sky = (1 - height) * _rgb(0.75, 0.85, 1.0) + height * _rgb(0.22, 0.42, 0.95)
-    ground = np.where(elevation[..., None] > 0, sky, _rgb(0.30, 0.27, 0.22))
-    return ground + 160 * _spot(azimuth, elevation, (-50, 55), 2.5) * _rgb(1.0, 0.95, 0.85)
+def _noon(az: Array, el: Array) -> Array:
+    share = np.sin(np.radians(np.maximum(el, 0)))
+    sky = _sky(el, share, (0.75, 0.85, 1.0), (0.22, 0.42, 0.95), (0.30, 0.27, 0.22))
+    return sky + _spot(az, el, (-50, 55), 2.5, (160, 152, 136))
 
 
-def _sunset(azimuth: Array, elevation: Array) -> Array:
-    height = np.clip(elevation / 60, 0, 1)[..., None]
-    sky = (1 - height) * _rgb(0.85, 0.42, 0.22) + height * _rgb(0.12, 0.16, 0.38)
-    glow = 3 * _spot(azimuth, elevation, (75, 4), 30) * _rgb(1.0, 0.45, 0.15)
-    ground = np.where(elevation[..., None] > 0, sky + glow, _rgb(0.10, 0.07, 0.06))
-    return ground + 120 * _spot(azimuth, elevation, (75, 7), 2.5) * _rgb(1.0, 0.55, 0.22)
+def _sunset(az: Array, el: Array) -> Array:
+    sky = _sky(el, np.clip(el / 60, 0, 1), (0.85, 0.42, 0.22), (0.12, 0.16, 0.38), (0.10, 0.07, 0.06))
+    glow = np.where(el[..., None] > 0, _spot(az, el, (75, 4), 30, (3, 1.35, 0.45)), 0)
+    return sky + glow + _spot(az, el, (75, 7), 2.5, (120, 66, 26.4))
 
 
-def _candle(azimuth: Array, elevation: Array) -> Array:
-    room = _room(elevation, _rgb(0.05, 0.035, 0.025), _rgb(0.03, 0.02, 0.015))
-    return room + 30 * _spot(azimuth, elevation, (-60, 10), 7) * _rgb(1.0, 0.55, 0.22)
+def _candle(az: Array, el: Array) -> Array:
+    return _room(el, (0.05, 0.035, 0.025), (0.03, 0.02, 0.015)) + _spot(az, el, (-60, 10), 7, (30, 16.5, 6.6))
 
 
-def _neon(azimuth: Array, elevation: Array) -> Array:
-    room = _room(elevation, _rgb(0.03, 0.03, 0.06), _rgb(0.02, 0.02, 0.03))
-    pink = 7 * _panel(azimuth, elevation, (-90, 15), (10, 80)) * _rgb(1.0, 0.12, 0.5)
-    return room + pink + 7 * _panel(azimuth, elevation, (90, 15), (10, 80)) * _rgb(0.1, 0.7, 1.0)
-
-
-def _even(azimuth: Array, elevation: Array) -> Array:
-    return np.ones((*elevation.shape, 3), np.float32)
+def _neon(az: Array, el: Array) -> Array:
+    pink = _panel(az, el, (-90, 15), (10, 80), (7, 0.84, 3.5))
+    blue = _panel(az, el, (90, 15), (10, 80), (0.7, 4.9, 7))
+    return _room(el, (0.03, 0.03, 0.06), (0.02, 0.02, 0.03)) + pink + blue
 
 
 _LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
-    "Softboxes": _softbox, "Window": _window, "Overcast": _overcast, "Noon": _noon, "Sunset": _sunset,
-    "Candle": _candle, "Neon": _neon, "Even": _even,
+    "Softboxes": _softboxes, "Window": _window, "Overcast": _overcast, "Noon": _noon, "Sunset": _sunset,
+    "Candle": _candle, "Neon": _neon, "Even": lambda az, el: np.ones((*el.shape, 3)),
 }  # fmt: skip
