@@ -56,7 +56,7 @@ def _named(options: dict, name: str) -> dict:
 
 
 def _content(step: Step, key: str, file: Any) -> str | list[str] | None:
-    """What tells one content of a file from another: of a mesh, its materials and textures, too."""
+    """Hash of a file; of a mesh, also the hashes of its materials and textures."""
     path = step.folder / str(file)
     try:
         beside = [file_hash(other) for other in files_beside(path)] if key == "mesh" else []

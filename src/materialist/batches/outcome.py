@@ -16,7 +16,7 @@ COLUMNS = (
     "peak_rss_mb", "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture_hash",
     "photo_hash", "warnings",
 )  # fmt: skip
-"""What the summary says of each photo; of a photo that failed there is only the reason."""
+"""Columns of the summary; a photo that failed has only the reason."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Status:
 
     total: int
     done: int
-    """Including those that were finished before."""
+    """Including photos that an earlier call finished."""
     failed: int
     rate: float
     """Photos per second of this call; 0 while none is through."""

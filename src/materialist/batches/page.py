@@ -50,7 +50,7 @@ def _facts(outcome: Outcome) -> list[tuple[str, str]]:
 
 
 def _card(runs: Path, row: Row) -> dict[str, Any]:
-    """What the template shows of a photo beside its row; links are relative to the page."""
+    """Values of the template for one photo; links are relative to the page."""
     if row["status"] != "done":
         return {"row": row}
     figures: list[tuple[Any, str]] = [

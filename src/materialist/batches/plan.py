@@ -1,4 +1,4 @@
-"""What a batch has to do: which photos are finished, and what is left."""
+"""The plan of a batch: which photos are finished, and which tasks are left."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from materialist.predict import CHOICES
 
 
 def check_options(options: dict[str, Any]) -> None:
-    """Refuse, before any photo is touched, what would fail every photo in the same way. Raises InputError."""
+    """Refuse options that would fail every photo in the same way. Raises InputError."""
     InvertOptions.given(**options)
     known = {choice.partition("[")[0].partition(":")[0] for choice in CHOICES.split(", ")}
     for part in ("predictor", "albedo", "roughness", "metallic", "normal", "depth"):
@@ -36,7 +36,7 @@ def check_options(options: dict[str, Any]) -> None:
 
 
 def plan(photos: Iterable[Listed], ledger: Ledger, template: PhotoTask) -> tuple[list[PhotoTask], list[str]]:
-    """Tasks for what is not finished, and ids of what is; `template` has what all tasks have in common.
+    """Tasks for the unfinished photos, and ids of the finished ones; `template` holds the common fields of all tasks.
 
     A photo is finished when the ledger says so with the same options, the photo (by hash) and the edits are what they
     were, and the results are whole. Where only the edit is missing or another, the task keeps the scene.

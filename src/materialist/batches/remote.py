@@ -21,7 +21,7 @@ def is_url(text: str) -> bool:
 
 
 def shown(url: str) -> str:
-    """The URL without what may be secret in it: a user and password, a signed query."""
+    """The URL without its secrets: user, password and signed query."""
     return re.sub(r"://[^/@]*@", "://", url).split("?")[0] if is_url(url) else url
 
 
@@ -38,7 +38,7 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
 
 
 def version(url: str) -> str:
-    """What changes when the file behind the URL does, told without fetching it where the store can say."""
+    """A text that changes with the file behind the URL; the store gives it without a download where it can."""
     with _told(url):
         system, path = _system(url)
         return f"url:{system.ukey(path)}"
@@ -76,7 +76,7 @@ def _suffix(url: str) -> str:
 
 @contextmanager
 def _told(url: str) -> Iterator[None]:
-    """Whatever a store raises, as one sentence that keeps the URL's secrets."""
+    """Turn the errors of a store into one sentence without the URL's secrets."""
     try:
         yield
     except (InputError, SetupError):

@@ -12,14 +12,14 @@ from materialist.errors import OutputError, SceneError
 from materialist.io.atomic import MARKER
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
-"""What the hash covers beside the camera. Times, memory, paths and pictures with figures in them are left out."""
+"""Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 NEEDED = (
     *("photo.exr", "photo.png", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "rerender.png"),
     *(f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in MAPS),
     *("overview.png", "report.json", MARKER),
 )
-"""What a package must hold to be whole."""
+"""Files of a whole package."""
 
 
 def scene_path(runs: Path, name: str) -> Path:
@@ -49,7 +49,7 @@ def replace_file(path: Path, content: bytes) -> None:
 
 
 def package_hash(path: str | Path) -> str:
-    """SHA-256 (hex) of what an inversion found: camera, photo at working size, prior, maps, light, mesh, re-rendering.
+    """SHA-256 (hex) of an inversion's result: camera, photo at working size, prior, maps, light, mesh, re-rendering.
 
     Two packages with equal hashes hold equal arrays, bit for bit; how long they took and where the photo lay differs.
     Raises SceneError where a file is missing.

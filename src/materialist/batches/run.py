@@ -197,7 +197,7 @@ class _Run:
         self._written, self._writing = self._worked, 0.0
 
     def work(self, pool: Pool) -> None:
-        """Until every photo is over, or something happens that would stop all of them."""
+        """Run until every photo is over, or an error occurs that would fail all of them."""
         try:
             while self._waiting or self._stages:
                 while self._waiting and pool.free() > 0:

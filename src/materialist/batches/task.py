@@ -26,7 +26,7 @@ from materialist.io.atomic import ensure_writable
 from materialist.types import Array, Scene
 
 INVERSION = "materialist.pipeline:invert"
-"""What a worker calls on a photo, as module:function."""
+"""The function that a worker calls on a photo, as module:function."""
 SINGLE_THREAD = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OIDN_NUM_THREADS"), "1"),
     "OIDN_SET_AFFINITY": "0",
@@ -42,10 +42,10 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class PhotoTask:
-    """A photo, and what is to become of it."""
+    """A photo, and how to process it."""
 
     id: str
-    """What the ledger knows the photo by: its path below the folder, its line in the list, or its URL."""
+    """The key of the photo in the ledger: its path below the folder, its line in the list, or its URL."""
     name: str
     """Its results are NAME.scene, NAME.png and thumbs/NAME.jpg."""
     location: str
@@ -82,7 +82,7 @@ class PhotoTask:
 
 
 def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
-    """Do a task. Returns what the ledger and the summary say of it; raises what the inversion or the edit raises."""
+    """Do a task. Returns the facts for the ledger and the summary; raises the errors of the inversion and the edit."""
     start, processor = time.perf_counter(), time.process_time()
     if task.edits is not None and not task.replace_picture and task.picture.exists():
         raise OutputError(f"{task.picture} exists and is not of this batch; move it away.")

@@ -35,7 +35,7 @@ class Pool(Protocol):
 
 @dataclass
 class _Place:
-    """Where a worker is, or can be started."""
+    """A place for one worker."""
 
     environment: Mapping[str, str]
     worker: Worker | None = None
@@ -65,7 +65,7 @@ class LocalPool:
         place.worker.begin(task, arguments)
 
     def wait(self, seconds: float) -> list[tuple[Any, Message]]:
-        """What the workers said. Raises SetupError when none can start at all."""
+        """Messages of the workers. Raises SetupError when none can start at all."""
         begun = {place.worker.connection: place for place in self._places if place.worker is not None}
         found = []
         for connection in wait(list(begun), seconds):

@@ -1,4 +1,4 @@
-"""A worker process, seen by whoever started it: tasks go in, messages come out, and its death is one of them."""
+"""The starting side of a worker process: it sends tasks and receives messages, the last one about the process's end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LOST = "lost"
 
 @dataclass(frozen=True)
 class Message:
-    """What a worker told."""
+    """One message of a worker."""
 
     kind: str
     """A kind of `worker`, or LOST."""
@@ -117,7 +117,7 @@ class Worker:
 
 
 def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
-    """Why a process ended, from its exit code and the end of its stderr; the same keys as `worker.failure`."""
+    """The reason of a process's end, from its exit code and the end of its stderr; the same keys as `worker.failure`."""
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""
@@ -133,7 +133,7 @@ def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
 
 
 def sentence(facts: dict[str, Any]) -> str:
-    """Why a task failed, for a page; the trace of a bug goes to the terminal."""
+    """The reason of a failure as a sentence for a page; the trace of a bug goes to the terminal."""
     if not facts["bug"]:
         return str(facts["reason"])
     sys.stderr.write(facts["trace"])

@@ -28,9 +28,9 @@ class Job:
 
     kind: str
     owner: str
-    """Who asked for it: the person, not the page, so that a reloaded page finds it."""
+    """The person who asked for it (not the page), so that a reloaded page finds it."""
     folder: Path
-    """Where it writes."""
+    """The folder that it writes to."""
     task: Callable[..., Any] = field(repr=False)
     """Importable function task(report, **arguments)."""
     arguments: dict[str, Any] = field(default_factory=dict)

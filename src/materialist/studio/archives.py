@@ -144,12 +144,12 @@ def unpack_member(pack: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path, s
 
 
 _DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
-"""What the packers of a zip raise."""
+"""Errors of the packers of a zip."""
 
 
 @contextmanager
 def readable_zip(shown: str, advice: str) -> Iterator[None]:
-    """Whatever is wrong with a zip file as an InputError that ends with the advice."""
+    """Turn the errors of a zip file into an InputError that ends with the advice."""
     try:
         yield
     except (*_DAMAGED, NotImplementedError, RuntimeError, EOFError, OSError) as error:

@@ -56,7 +56,7 @@ class Pane:
 
 @dataclass(frozen=True)
 class GlassState:
-    """What a client waits for."""
+    """The state of a client's last request."""
 
     asked: int
     """Number of the last request; 0 for none."""
@@ -117,7 +117,7 @@ class GlassClient:
             self.changed.notify_all()
 
     def pane(self, step: Step) -> Pane | None:
-        """The last picture of a glass step: of these values, or of values that it had before."""
+        """The last picture of a glass step, perhaps with earlier values."""
         with self.changed:
             found = self._panes.get(_place(step))
         return found[1] if found else None
@@ -129,7 +129,7 @@ class GlassClient:
 
     @property
     def state(self) -> GlassState:
-        """What is under way."""
+        """The state of the last request."""
         with self.changed:
             if self._number == self._answered:
                 return GlassState(self._number, False, self._message, bool(self._message))
@@ -221,7 +221,7 @@ def _place(step: Step) -> str:
 
 
 def body_key(request: Request) -> str:
-    """What a body and its background depend on: two requests with the same key differ in the glass alone."""
+    """Key of a body and its background: requests with the same key differ only in VALUES."""
     fixed = {name: value for name, value in request["glass"].items() if name not in VALUES}
     return json.dumps([request["scene"], request["others"], fixed], default=str)
 

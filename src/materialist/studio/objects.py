@@ -112,7 +112,7 @@ def fallen(step: Step, height: float, tried: int = 0) -> Step:
 
 
 def file_of(name: str) -> str:
-    """What the file of a computed mesh is called."""
+    """The file name of a computed mesh."""
     return f"thing-{name.lower()}.ply"
 
 

@@ -51,13 +51,13 @@ class LivePreview:
         return self._preview.done()
 
     def wait(self) -> None:
-        """Until the preview is there. Raises what went wrong with it."""
+        """Wait for the preview. Raises the error of its building, if there was one."""
         self._preview.result()
 
     def edited(self, steps: tuple[Step, ...]) -> Scene:
-        """The scene after the steps, glass left out: its body takes long, and another process makes it.
+        """The scene after the steps without glass, whose body another process builds.
 
-        Raises InputError, for values of glass that cannot be as well.
+        Raises InputError, also for glass with values out of range.
         """
         for step in steps:
             if glass.is_traced(step):
@@ -79,7 +79,7 @@ class LivePreview:
     def picture(self, steps: tuple[Step, ...], client: glass.GlassClient | None = None) -> Array:
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
 
-        Glass is what the client has of it, else a sketch.
+        Glass comes from the client, or is sketched where the client has no pane yet.
         """
         if not steps:
             return self.scene.photo.linear

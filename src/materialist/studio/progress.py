@@ -56,7 +56,7 @@ def shown(jobs: JobQueue, job: Job) -> str:
 
 
 def failure(job: Job) -> str:
-    """Why a job failed, its files by their names alone; the photo as its owner calls it."""
+    """The reason of a failure; it names files without their folders, and the photo by its title."""
     text = job.message
     for step in job.arguments.get("steps", ()):
         text = text.replace(f"{step.folder}/", "")

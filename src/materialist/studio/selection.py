@@ -1,4 +1,4 @@
-"""What is selected: objects that were clicked, boxed or brushed, one over the other."""
+"""The selection: the union of regions that were clicked, boxed or brushed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _QUALITY = 88
 """JPEG quality of live pictures."""
 REPLACE, ADD, REMOVE = "new", "add", "remove"
 PART, INSIDE = 0.4, 0.9
-"""An object is a part of what is selected up to this share of it, and with at least this share of itself in it."""
+"""An object is a part of the selection if it covers less than PART of it, and lies in it by more than INSIDE."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Selection:
         return self._with(found, mode)
 
     def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
-        """With what is in a box."""
+        """With the object in a box."""
         if mode == REMOVE:
             x0, y0, x1, y1 = (round(v) for v in box)
             gone = np.zeros(scene.depth.shape, bool)

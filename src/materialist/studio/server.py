@@ -56,7 +56,7 @@ def check_port(host: str, port: int) -> None:
 
 
 def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
-    """What the studio was started on: a scene package as a project, or a photo as a file. Raises InputError."""
+    """The target of the command: a scene package as a project, or a photo as a file. Raises InputError."""
     if target is None:
         return None
     path = Path(target)

@@ -1,4 +1,4 @@
-"""One page and what is open on it: a scene, a selection, a list of edits, and the way back."""
+"""The state of one page: its scene, selection, list of edits and undo history."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class FinalPicture:
 
 
 class Session:
-    """What one page has open. Its methods may be called from any thread."""
+    """The state of one page. Its methods may be called from any thread."""
 
     def __init__(self, person: str):
         self.person = person
@@ -129,7 +129,7 @@ class Session:
             self.edits, self._kept = EditList(steps), kept
 
     def close(self) -> None:
-        """Give the memory back; what was done stays in the work folder."""
+        """Give the memory back; the edits stay in the work folder."""
         with self.lock:
             if self.live is not None:
                 self.live.close()

@@ -71,7 +71,7 @@ def _asked(client: glass.GlassClient, edits: EditList) -> glass.GlassState:
 
 
 def _in_hand_off(edits: EditList) -> bool:
-    """Whether sliders move what is not in the picture."""
+    """Whether the step in hand is switched off."""
     return edits.in_hand is not None and edits.in_hand.skipped
 
 
@@ -90,7 +90,7 @@ def _lamps(edits: EditList) -> list[list[float]]:
 
 
 def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None = None, waiting: bool = False) -> str:
-    """What a picture that is not path traced shows, and what it leaves out."""
+    """The label of a picture that is not path traced: its kind, and its omissions."""
     if not steps:
         return "Photo"
     panes = [step for step in steps if glass.is_traced(step)]

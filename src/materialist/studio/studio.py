@@ -28,14 +28,14 @@ _LEAST_FREE = 1.2e9
 
 @dataclass
 class Studio:
-    """What all pages share."""
+    """The state that all pages share."""
 
     work: WorkFolder
     jobs: JobQueue
     alone: bool = True
     """Served on this machine only: everyone on it is the same person."""
     start: Project | Path | None = None
-    """What to open first: a scene, or a photo to show on the opening tab."""
+    """The scene to open first, or the photo to show on the opening tab."""
     seed: int = 0
     """Of inversions."""
     device: str = "auto"
@@ -46,7 +46,7 @@ class Studio:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def person(self, token: Any) -> str:
-        """Who a page belongs to, from the token its browser keeps. Raises InputError for a made-up one."""
+        """The person of a page, from the token that its browser keeps. Raises InputError for an invalid token."""
         if self.alone:
             return ALONE
         if not isinstance(token, str) or not re.fullmatch(r"[a-z0-9]{16,32}", token):
@@ -66,13 +66,13 @@ class Studio:
             return known
 
     def projects(self, person: str) -> list[Project]:
-        """What a person may open: all on one's own machine, else one's own and what the studio was started on."""
+        """The projects that a person may open: all on one's own machine, else one's own and `start`."""
         every = self.work.projects(None if self.alone else person)
         start = self.start
         return every if not isinstance(start, Project) or start in every else [*every, start]
 
     def project(self, name: str, person: str) -> Project:
-        """The one of a name that came from a page. Raises InputError where this person has none of that name."""
+        """The project of a name that came from a page. Raises InputError where this person has no such project."""
         for project in self.projects(person):
             if project.name == name:
                 return project

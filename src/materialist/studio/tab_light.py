@@ -18,7 +18,7 @@ from materialist.types import Array
 
 OWN = "The photo's own"
 _BEFORE = 0.75
-"""Where a lamp hangs: this share of the way from the camera to what was clicked."""
+"""A lamp hangs at this share of the way from the camera to the clicked surface."""
 
 
 def layout(context: PageContext) -> None:

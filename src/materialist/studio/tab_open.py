@@ -1,4 +1,4 @@
-"""The tab that opens a photo, a scene, an example, or what was left before."""
+"""The tab that opens a photo, a scene, an example, or an earlier project."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
 
 
 def _facts(context: PageContext, session: Session, path: Path, name: str) -> str:
-    """What a photo is, read in a process of its own: a broken decoder must not take the studio along."""
+    """Size and field of view of a photo as HTML; read in its own process, because decoders may crash."""
     uploads.checked_picture(path, name)
     thumbnail = context.studio.work.cache / f"{secrets.token_hex(8)}.jpg"
     try:
@@ -244,7 +244,7 @@ def _opened(context: PageContext, session: Session, project: Project) -> Iterato
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:
-    """Titles and names for the list of what can be continued."""
+    """Titles and names of the projects that can be continued."""
     found = context.studio.projects(session.person)
     running = {j.folder for j in context.studio.jobs.of(session.person, "invert") if not j.over}
     return [

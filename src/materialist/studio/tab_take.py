@@ -31,7 +31,7 @@ KINDS = {
     "html": ("A page that opens without a server", ".html"),
     "turn": ("A video: the light goes round", ".mp4"),
 }
-"""What can be taken -> its name, and the suffix of the file."""
+"""Kind of result -> its title, and the suffix of the file."""
 SPP, FRAMES, FRAME_SPP = 256, 24, 32
 
 

@@ -1,4 +1,4 @@
-"""What strangers send: checked by size and header before anything is decoded, and stored under names of ours."""
+"""Uploaded files: checked by size and header before anything is decoded, and stored under names of ours."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def checked_mesh(path: Path, name: str) -> str:
 
 
 def shown_name(name: str) -> str:
-    """What the user called a file, fit for a message."""
+    """The user's name of a file, on one line for a message."""
     return " ".join(Path(name).name.split())[:60] or "The file"
 
 
@@ -106,7 +106,7 @@ def without_paths(text: str, path: str | Path, name: str) -> str:
 
 @contextmanager
 def called(path: Path, name: str) -> Iterator[None]:
-    """What goes wrong with a file, told `without_paths`."""
+    """Pass errors about a file on `without_paths`."""
     try:
         yield
     except MaterialistError as error:

@@ -1,4 +1,4 @@
-"""What the tabs of the page share: their components, events that change the session, and the values of the sliders."""
+"""Shared by the tabs of the page: components, events that change the session, and the values of the controls."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class Project:
 
     folder: Path
     title: str
-    """What people read; often the name of the uploaded file. Never part of a path."""
+    """For display; often the name of the uploaded file. Never part of a path."""
     owner: str
     scene: Path
     """The scene package; inside the folder unless the studio was started on a scene elsewhere."""
@@ -183,7 +183,7 @@ def write_mask(workspace: Path, mask: Array) -> str:
 
 
 def _written(file: Path, write: Callable[[Path], Any]) -> str:
-    """The name of a file that is there whole, or is written so."""
+    """Write a file whole unless it exists; returns its name."""
     if not file.is_file():
         temporary = partial(file)
         try:
