@@ -118,7 +118,7 @@ def test_a_pool_replaces_dead_workers_and_keeps_the_others():
     while pool.free() == 0:
         for key, message in pool.wait(5):
             kinds[key] = message.kind
-    assert kinds == {"a": PROGRESS, "b": LOST}
+    assert kinds.pop("b") == LOST and set(kinds.values()) <= {PROGRESS}  # the other works on
     pool.begin("c", answer, {})
     while kinds.get("c") != DONE:
         for key, message in pool.wait(5):

@@ -117,7 +117,7 @@ class Worker:
 
 
 def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
-    """The reason of a process's end, from its exit code and the end of its stderr; the same keys as `worker.failure`."""
+    """The reason of a process's end, from its exit code and its last line of stderr; keys as of `worker.failure`."""
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""
