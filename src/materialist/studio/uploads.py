@@ -61,7 +61,8 @@ def header_size(path: Path, shown: str) -> tuple[int, int]:
             from tifffile import TiffFile
 
             with TiffFile(path) as tiff:
-                return int(tiff.pages[0].imagewidth), int(tiff.pages[0].imagelength)
+                height, width = tiff.pages[0].shape[:2]
+            return int(width), int(height)
         from PIL import Image
         from pillow_heif import register_heif_opener
 
