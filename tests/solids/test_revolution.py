@@ -132,5 +132,5 @@ def test_boxes_and_half_balls_are_none(ball):
 def test_upright_is_across_the_largest_plane_that_faces_up():
     label = np.where(GROUND > 0, 0, -1)
     normal = np.broadcast_to(UP, (*label.shape, 3))
-    assert upright(GROUND, normal, label, CAMERA) @ UP > 0.9999
-    assert upright(GROUND, -normal, label, CAMERA) is None
+    assert upright(normal, label) @ UP > 0.9999
+    assert upright(-normal, label) is None

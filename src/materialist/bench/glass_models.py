@@ -149,7 +149,7 @@ def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> T
     from materialist.predict.refraction.choice import best_thickness
     from materialist.solids.finder import upright
 
-    up = upright(depth, normal, planes_of(scene, depth, normal), scene.camera)
+    up = upright(normal, planes_of(scene, depth, normal))
     front = scene.front
     return best_thickness(
         photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth

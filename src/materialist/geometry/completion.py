@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import cKDTree
+from skimage.morphology import convex_hull_image
 
 from materialist.camera import unproject
 from materialist.geometry.ends import Ends, axes, ends_of
@@ -200,18 +201,9 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
     keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - DEFAULT.behind) * hidden)
     if not sheet.bounding:
-        keep &= _within_hull(sheet.pixels, (xs[:-1] + xs[1:]) / 2, (ys[:-1] + ys[1:]) / 2, width)
+        hull = convex_hull_image(sheet.plane.mask)
+        keep &= hull[np.ix_((ys[:-1] + ys[1:]) // 2, (xs[:-1] + xs[1:]) // 2)]
     return points4[keep]
-
-
-def _within_hull(pixels: Array, xs: Array, ys: Array, width: int) -> Array:
-    """[h, w] bool: screen positions (xs [w], ys [h], in pixels) inside the convex hull of row-major pixels [N]."""
-    try:
-        hull = ConvexHull(np.stack([pixels % width + 0.5, pixels // width + 0.5], -1))
-    except QhullError:  # all in one line
-        return np.zeros((len(ys), len(xs)), bool)
-    grid = np.stack(np.meshgrid(xs, ys), -1)
-    return (grid @ hull.equations[:, :2].T + hull.equations[:, 2] <= 0).all(-1)
 
 
 def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:

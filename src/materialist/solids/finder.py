@@ -66,23 +66,18 @@ def surface_of_revolution(
     return found, found.thickness(np.where(front > 0, front, depth), inside, rays)
 
 
-def upright(depth: Array, normal: Array, plane: Array, camera: Camera) -> Array | None:
-    """[3] unit, camera frame: across the largest plane that faces upwards, or None.
+def upright(normal: Array, plane: Array) -> Array | None:
+    """[3] unit, camera frame: the mean normal of the largest plane that faces upwards, or None.
 
-    depth [H, W] planar, normal [H, W, 3] unit, plane [H, W] int: the plane of a pixel, -1 for none.
+    normal [H, W, 3] unit, plane [H, W] int: the plane of a pixel, -1 for none.
     """
-    points = pixel_rays(camera).astype(np.float64) * np.asarray(depth, np.float64)[..., None]
-    best, most = None, 12
-    for k in np.unique(plane[plane >= 0]):
-        own = (plane == k) & (depth > 0)
-        mean = normal[own].mean(0) if own.any() else np.zeros(3)
-        if own.sum() > most and mean[1] > 0.6 * max(float(np.linalg.norm(mean)), 1e-9):
-            offset = points[own][:: max(1, int(own.sum()) // 4000)]
-            across = np.linalg.svd(offset - offset.mean(0), full_matrices=False)[2][-1]
-            across = across * np.sign(across @ mean or 1.0)
-            if across[1] > 0.6:
-                best, most = across, int(own.sum())
-    return best
+    counts = np.bincount(plane[plane >= 0], minlength=1)
+    for k in np.argsort(-counts)[: np.count_nonzero(counts > 12)]:
+        mean = normal[plane == k].mean(0, dtype=np.float64)
+        length = float(np.linalg.norm(mean))
+        if mean[1] > 0.6 * max(length, 1e-9):
+            return mean / length
+    return None
 
 
 def _by_normals(

@@ -6,7 +6,6 @@ implicit surface of Turk and O'Brien 2002, on a grid): what no point tells goes 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,9 +113,9 @@ def fitted(seen: Array, leaning: Array, passed: Array, cell: float, floor: float
         cell, floor: as of `Profile`.
     """
     first = _fitted(seen, leaning, len(seen), passed, cell, floor)
-    below = _rounded(first, leaning)
+    below = _hidden(first, leaning, -1)
     foot = float(np.concatenate([seen, below[:, :2]])[:, 1].min())
-    hidden = np.concatenate([below, _ring(first, leaning, foot)])
+    hidden = np.concatenate([below, _hidden(first, leaning, 1, foot)])
     if not len(hidden):
         return first
     turning = np.stack([np.cos(hidden[:, 2]), np.sin(hidden[:, 2])], -1)
@@ -126,6 +125,8 @@ def fitted(seen: Array, leaning: Array, passed: Array, cell: float, floor: float
 
 def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: float, floor: float) -> Profile:
     """The profile of points of which the first `count` are seen."""
+    from scipy.ndimage import distance_transform_edt
+    from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
     seen = points[:count]
@@ -136,16 +137,14 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     )
     at = lambda places: (places - [0, low]) / cell  # noqa: E731  (column, row)
     free = _cells(at(passed), shape)
-    told = free & _far(at(seen), shape)
+    told = free & (distance_transform_edt(~_cells(at(seen), shape)) > DEFAULT.clear)
     rows, wanted = _points(at(points), leaning, shape)
     matrix = rows.T @ rows + DEFAULT.bend * _bending(shape)
     right = rows.T @ wanted
     pushed = np.zeros(shape, bool)
     for _ in range(DEFAULT.rounds):
-        values = splu((matrix + _diagonal(DEFAULT.push * pushed)).tocsc()).solve(
-            right + DEFAULT.push * DEFAULT.pushed * pushed.ravel()
-        )
-        values = values.reshape(shape)
+        push = DEFAULT.push * pushed.ravel()
+        values = splu((matrix + diags(push)).tocsc()).solve(right + DEFAULT.pushed * push).reshape(shape)
         before, pushed = pushed, pushed | (told & (values < DEFAULT.pushed / 2))
         if (before == pushed).all():
             break
@@ -154,57 +153,36 @@ def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: floa
     return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
 
 
-def _rounded(profile: Profile, leaning: Array) -> Array:
-    """Where the outside goes on below what is seen of it: places and the angles of normals [K, 3].
+def _hidden(profile: Profile, leaning: Array, way: int, foot: float = 0.0) -> Array:
+    """Where the border goes on below what is seen of it: places and the angles of normals [K, 3].
 
-    From the lowest that is seen, with the curvature of the stretch above, until the ground, or level.
+    way -1: the outside, from the lowest that is seen, with the curvature above it, until the ground, or level. way 1:
+    the inside of a ring, which goes on turning until it meets the `foot` of the outside, at that height and level; the
+    inside of a cup does not, and stays as it is.
     """
-    for line, away, nearest in _borders(profile):
-        known = _known(away, profile)
-        starts = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))
-        if not len(starts) or line[starts[0], 0] < DEFAULT.gap * profile.cell:
-            continue
-        k = starts[0] + int(np.argmax(away[starts[0] :] < profile.cell))  # there is a point right here
-        found = _onward(profile, line[k:], leaning[nearest[k:]], DEFAULT.stretch, -1)
-        if len(found) > 1:
-            return found[1:]
-    return np.zeros((0, 3))
-
-
-def _ring(profile: Profile, leaning: Array, foot: float) -> Array:
-    """Where the inside of a ring goes on below what is seen of it: places and the angles of normals [K, 3].
-
-    A ring's goes on turning until it meets the foot of the outside, at that height and level; a cup's does not.
-    """
-    for line, away, nearest in _borders(profile):
-        known = _known(away, profile)
-        ends = np.flatnonzero(
-            known & ~np.roll(known, -1) & (line[:, 1] > foot + DEFAULT.meeting * np.ptp(profile.seen[:, 1]))
-        )
-        if not len(ends) or line[ends[-1], 0] < DEFAULT.gap * profile.cell:
-            continue
-        k = ends[-1] - int(np.argmax(away[ends[-1] :: -1] < profile.cell))
-        found = _onward(profile, line[k::-1], leaning[nearest[k::-1]], DEFAULT.stretch_inside, 1)
-        met = len(found) > 1 and abs(found[-1, 1] - foot) < DEFAULT.meeting * np.ptp(profile.seen[:, 1])
-        if met and found[-1, 2] > 1.5 * np.pi - DEFAULT.level:
-            return found[1:]
-    return np.zeros((0, 3))
-
-
-def _borders(profile: Profile) -> Iterator[tuple[Array, Array, Array]]:
-    """The border's lines [K, 2], how far their places are from the nearest point that is seen, and which that is."""
+    from scipy.ndimage import maximum_filter1d
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(profile.seen)
+    high, tree = np.ptp(profile.seen[:, 1]), cKDTree(profile.seen)
     for line, _ in profile.lines():
-        yield line, *tree.query(line)
-
-
-def _known(away: Array, profile: Profile) -> Array:
-    """[K] bool: places of a line with points beside them, small gaps too."""
-    from scipy.ndimage import maximum_filter1d
-
-    return maximum_filter1d(away < DEFAULT.beside * profile.cell, DEFAULT.gap, mode="nearest")
+        away, nearest = tree.query(line)
+        # Small gaps do not end what is seen.
+        known = maximum_filter1d(away < DEFAULT.beside * profile.cell, DEFAULT.gap, mode="nearest")
+        if way < 0:
+            ends = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))[:1]
+        else:
+            ends = np.flatnonzero(known & ~np.roll(known, -1) & (line[:, 1] > foot + DEFAULT.meeting * high))[-1:]
+        if not len(ends) or line[ends[0], 0] < DEFAULT.gap * profile.cell:
+            continue
+        # The line from its end into what is seen, from a place with a point right there.
+        back = np.s_[ends[0] :] if way < 0 else np.s_[ends[0] :: -1]
+        start = int(np.argmax(away[back] < profile.cell))
+        stretch = DEFAULT.stretch if way < 0 else DEFAULT.stretch_inside
+        found = _onward(profile, line[back][start:], leaning[nearest[back][start:]], stretch, way)
+        level = way < 0 or (len(found) > 1 and found[-1, 2] > 1.5 * np.pi - DEFAULT.level)
+        if len(found) > 1 and level and (way < 0 or abs(found[-1, 1] - foot) < DEFAULT.meeting * high):
+            return found[1:]
+    return np.zeros((0, 3))
 
 
 def _onward(profile: Profile, line: Array, leaning: Array, stretch: float, way: int) -> Array:
@@ -244,13 +222,6 @@ def _cells(at: Array, shape: tuple[int, int]) -> Array:
     return found
 
 
-def _far(at: Array, shape: tuple[int, int]) -> Array:
-    """[h, w] bool: cells farther than `clear` from the places [M, 2] (column, row)."""
-    from scipy.ndimage import distance_transform_edt
-
-    return distance_transform_edt(~_cells(at, shape)) > DEFAULT.clear
-
-
 def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:
     """Rows of the least squares of places and normals, every cell with points weighing the same."""
     from scipy.sparse import coo_matrix
@@ -287,9 +258,3 @@ def _bending(shape: tuple[int, int]):
     terms = [kron(eye(h), second(w)), kron(second(h), eye(w)), kron(eye(h), axis)]
     cross = kron(first(h), first(w))
     return sum(t.T @ t for t in terms) + 2 * cross.T @ cross
-
-
-def _diagonal(weights: Array):
-    from scipy.sparse import diags
-
-    return diags(weights.ravel().astype(float))
