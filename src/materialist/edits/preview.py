@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from materialist.camera import pixel_rays
+from materialist.edits.composite.into_photo import into_photo, onto_working
 from materialist.edits.composite.layers import Layers, changed_pixels, texture_held
+from materialist.edits.core.emitters import dimmed_emitters
 from materialist.edits.core.renderer import is_relit
+from materialist.envmap import environment
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -16,7 +21,7 @@ if TYPE_CHECKING:
 
 
 LEAST_AMBIENT = 1e-3
-"""Factor on the fitted map below which what is left of it cannot be scaled back."""
+"""Factor on the fitted map below which the map cannot be scaled back."""
 
 
 class Preview:
@@ -76,14 +81,10 @@ class Preview:
         differs = (picture != base).any(-1)
         held = texture_held(self.scene.materials.albedo, edited.materials.albedo)
         changed = changed_pixels(self.scene, edited) & differs
-        return Layers(base, picture, differs, changed, picture, relit, held=held)
+        return Layers(base, picture, differs, changed, relit, held=held)
 
     def picture(self, edited: Scene, *, quick: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""
-        from dataclasses import replace
-
-        from materialist.edits.composite.into_photo import into_photo, onto_working
-
         if quick:
             return onto_working(self.scene.photo, self.layers(edited))
         photo = replace(self.scene.photo, original=self.scene.photo.linear)
@@ -94,12 +95,7 @@ class Preview:
             raise InputError("The preview was built for another geometry; build one for this scene.")
 
     def _seen(self, edited: Scene) -> Scene:
-        """The scene as it is shaded: lights of the photo that were dimmed are not shown, but their share of the light
-        comes from around, as the fit has it."""
-        from dataclasses import replace
-
-        from materialist.edits.core.emitters import dimmed_emitters
-
+        """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""
         found = dimmed_emitters(self.scene, edited)
         if found is None:
             return edited
@@ -157,14 +153,11 @@ class Preview:
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""
-        from materialist.camera import pixel_rays
-        from materialist.transport.light import bilinear
-
         rays = pixel_rays(self.scene.camera).reshape(-1, 3)[self._engine.sky]
         if not len(rays):
             return np.zeros((0, 3), np.float32)
-        index, share = bilinear(rays / np.linalg.norm(rays, axis=-1, keepdims=True), envmap.shape[:2])
-        return (envmap.reshape(-1, 3)[index] * share[..., None]).sum(1).astype(np.float32)
+        rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        return environment(rays, envmap).astype(np.float32)
 
     def _image(self, shaded, sky: Array) -> Array:
         picture = self._engine.cache.image(shaded.numpy())

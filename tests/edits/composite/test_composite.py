@@ -22,7 +22,7 @@ MASK = block_mask(36, 48)
 
 def layers_of(base, edited, changed, relit=False):
     reached = (base != edited).any(-1)
-    return Layers(base, edited, reached, changed & reached, edited, relit)
+    return Layers(base, edited, reached, changed & reached, relit)
 
 
 @pytest.mark.parametrize("native", [1, 2])
@@ -267,7 +267,7 @@ def test_the_rim_of_what_is_brighter_than_white_is_as_soft_as_the_photo_s(hdr):
     changed[:, :8] = True
     edited = np.where(changed[..., None], 20, small).astype(np.float32)
     photo = Photo(small, Camera(15, 15, 40.0), original, hdr=hdr)
-    out = into_photo(photo, Layers(small, edited, changed, changed, edited))
+    out = into_photo(photo, Layers(small, edited, changed, changed))
     rim = np.s_[20:40, 31:34]
     if hdr:
         assert out[rim].min() > 2

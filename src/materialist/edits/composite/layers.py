@@ -11,14 +11,29 @@ from materialist.edits.composite.native_layer import NativeLayer, native_layer
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit
 from materialist.errors import InputError
+from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
-FAR = 1e3
-"""Beyond any logarithm: pixels that are not asked."""
-DARKEST = 0.02
-"""Added to albedo before its logarithm is taken."""
-PATTERNED, AT_RIM = (0.3, 0.8), 2
-"""Contrast of albedo (logarithms) within so many pixels: none of a pattern, and certainly of one."""
+
+@dataclass(frozen=True)
+class LayerSettings:
+    """What counts as a difference, and as a pattern of the albedo."""
+
+    window: int = 9
+    """Pixels across, over which a difference and its noise are measured; larger sees fainter light (tuned by eye)."""
+    sigmas: float = 3.0
+    """Standard errors by which a mean difference must stand out (derived: 1 in 400 by chance)."""
+    least_gain: float = 0.25
+    """Gain below which a difference is none (tuned by eye)."""
+    darkest: float = 0.02
+    """Added to albedo before its logarithm (tuned by eye)."""
+    pattern: tuple[float, float] = (0.3, 0.8)
+    """Contrast of albedo, logarithms: none of a pattern, and certainly of one (tuned by eye)."""
+    rim: int = 2
+    """Pixels within which that contrast is taken (derived: mixed pixels)."""
+
+
+DEFAULT = LayerSettings()
 
 
 @dataclass(frozen=True)
@@ -33,8 +48,6 @@ class Layers:
     """[H, W] bool: pixels that the edit changes by more than the noise."""
     changed: Array
     """[H, W] bool: pixels whose own surface, or what stands there, the edit replaced; part of `reached`."""
-    raw: Array
-    """[H, W, 3] float32 linear: the edited scene as rendered, noise and all (the paper's plain output)."""
     relit: bool = False
     """Whether the light is another one."""
     native: NativeLayer | None = None
@@ -75,38 +88,33 @@ def render_layers(
     return replace(layers, relit=relit, native=alone, covered=covered, held=held)
 
 
-def texture_held(albedo: Array, edited: Array) -> Array:
-    """[H, W] float32 in [0, 1]: the part of the contrast of an albedo [H, W, 3] that is left where an edit changes it.
+def texture_held(albedo: Array, edited: Array, settings: LayerSettings = DEFAULT) -> Array:
+    """[H, W] float32 in [0, 1]: the part of the contrast of an albedo [H, W, 3] that an edit of it leaves.
 
-    What the photo has there beyond the fit is the rim of a pattern, which goes with it. 1 where there was none.
+    The photo's residual at the rim of a pattern goes with the pattern. 1 where there was none.
     """
-    own = (albedo != edited).any(-1)
-    held = np.ones(own.shape, np.float32)
-    if not own.any():
-        return held
-    box = tuple(slice(v.min(), v.max() + 1) for v in (np.flatnonzero(own.any(1)), np.flatnonzero(own.any(0))))
-    albedo, edited, own = albedo[box], edited[box], own[box]
-    level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
-    before, after = (_contrast(np.log(v + DARKEST).mean(-1), own) for v in (albedo, level * edited))
-    patterned = np.clip((before - PATTERNED[0]) / (PATTERNED[1] - PATTERNED[0]), 0, 1)
-    left = np.clip(after / np.maximum(before, 1e-6), 0, 1)
-    held[box] = np.where(own, 1 - patterned * (1 - left), 1)
-    return held
-
-
-def _contrast(values: Array, own: Array) -> Array:
-    """[H, W] largest difference of values [H, W] nearby, among the pixels `own` [H, W] bool."""
     import cv2
 
-    window = np.ones((2 * AT_RIM + 1,) * 2, np.uint8)
-    high, low = (np.where(own, values, far).astype(np.float32) for far in (-FAR, FAR))
-    return np.maximum(np.asarray(cv2.dilate(high, window)) - np.asarray(cv2.erode(low, window)), 0)
+    own = (albedo != edited).any(-1)
+    if not own.any():
+        return np.ones(own.shape, np.float32)
+    kernel = np.ones((2 * settings.rim + 1,) * 2, np.uint8)
+
+    def contrast(values: Array) -> Array:
+        """[H, W] largest difference of logarithms nearby, inside the edit."""
+        log = np.log(values + settings.darkest).mean(-1)
+        high, low = (np.where(own, log, far).astype(np.float32) for far in (-1e3, 1e3))
+        return np.where(own, np.asarray(cv2.dilate(high, kernel)) - np.asarray(cv2.erode(low, kernel)), 0)
+
+    level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
+    before, after = contrast(albedo), contrast(level * edited)
+    low, high = settings.pattern
+    patterned = np.clip((before - low) / (high - low), 0, 1)
+    return (1 - patterned * (1 - np.clip(after / np.maximum(before, 1e-6), 0, 1))).astype(np.float32)
 
 
 def focused(scene: Scene) -> bool:
     """Whether small lights of the scene's own stand beside glass, through which no path can aim at them."""
-    from materialist.render.bodies import is_glowing, is_transparent
-
     lit = bool(scene.lamps) or any(is_glowing(body.surface) for body in scene.bodies)
     return lit and any(is_transparent(body.surface) for body in scene.bodies)
 
@@ -152,19 +160,18 @@ def difference(
     (b0, e0), (b1, e1) = halves
     b, e = (b0 + b1) / 2, (e0 + e1) / 2
     differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
-    raw = e
     if not differs.any():
-        return Layers(b, b, differs, changed & differs, raw)
+        return Layers(b, b, differs, changed & differs)
     gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
     if clean:
         b = denoised(b, guides[0], guides[2])
         e = denoised(without_fireflies(e, changed, spread=focused), guides[1], guides[-1])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
-    return Layers(b, e, reached, changed & reached, raw)
+    return Layers(b, e, reached, changed & reached)
 
 
-def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) -> Array:
+def significance(d0: Array, d1: Array, settings: LayerSettings = DEFAULT) -> Array:
     """[H, W] in [0, 1]: how far the mean of a difference over a window stands out from its noise.
 
     d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
@@ -174,12 +181,13 @@ def significance(d0: Array, d1: Array, *, window: int = 9, sigmas: float = 3.0) 
     """
     import cv2
 
-    box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), (window, window), borderType=cv2.BORDER_REFLECT)  # noqa: E731
+    size = (settings.window, settings.window)
+    box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), size, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     gain = np.zeros(d0.shape[:2])
     for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
         m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
         for k in range(first.shape[-1]):
             m2 += box((first[..., k] + second[..., k]) / 2) ** 2
-            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / window**2
-        gain = np.maximum(gain, 1 - sigmas**2 * variance / np.maximum(m2, 1e-30))
-    return np.where(gain > 0.25, np.clip(gain, 0, 1), 0).astype(np.float32)
+            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / settings.window**2
+        gain = np.maximum(gain, 1 - settings.sigmas**2 * variance / np.maximum(m2, 1e-30))
+    return np.where(gain > settings.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)

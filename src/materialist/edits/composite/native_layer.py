@@ -14,18 +14,26 @@ from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_su
 from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
 
-MOST = 1_500_000
-"""Pixels of a portrait that are traced; a larger one is traced smaller and enlarged."""
-FEWEST_PATHS = 32
-"""Paths a native pixel, whatever else: the denoiser needs as many."""
-MOST_PATHS = 4
-"""Most paths a native pixel, in multiples of those of the picture: bodies are small, and seen by all."""
-MARGIN = 4
-"""Native pixels around the bodies that the denoiser sees."""
-CONTACT = 0.05
-"""What hides a body from nearer than this share of its extent is the ground it stands on, not a thing before it."""
+
+@dataclass(frozen=True)
+class NativeSettings:
+    """Resolution and paths of the native-resolution layer."""
+
+    pixels: int = 1_500_000
+    """Largest number of pixels that are traced; a larger layer is traced smaller and enlarged (derived: time)."""
+    fewest_paths: int = 32
+    """Paths a native pixel, at least, as the denoiser needs (tuned by eye)."""
+    most_paths: int = 4
+    """Paths a native pixel, at most, in multiples of those of the picture (derived: time)."""
+    margin: int = 4
+    """Native pixels around the bodies that the denoiser sees (tuned by eye)."""
+    contact: float = 0.05
+    """Share of a body's extent up to which a surface before it is the ground it stands on (tuned by eye)."""
+    lamp_contact: float = 2.0
+    """The same of lamps, which a surface cuts (tuned by eye)."""
 
 
+SETTINGS = NativeSettings()
 NOWHERE = np.zeros((0, 3), np.float32)
 LAMP = Body(NOWHERE, NOWHERE.astype(np.int32), NOWHERE, NOWHERE[:, :2], uniform_surface(1.0, 1.0, 0.0), "lamp")
 """What stands for a lamp where its albedo is asked for."""
@@ -84,14 +92,14 @@ def _traced(
     box = _box(small.share, native)
     sight = trace.look(target.mi_scene, camera, chosen, native, box)
     alone = trace.look(trace.only(target.mi_scene, names), camera, chosen, native, box)
-    factor = min(1.0, np.sqrt(MOST / ((box[1] - box[0]) * (box[3] - box[2]))))
+    factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
     size = (max(2, round(native[0] * factor)), max(2, round(native[1] * factor)))
     part = _scaled(box, native, size)
     # As many paths as a picture of working size has, on the part that the bodies take.
     pixels = (part[1] - part[0]) * (part[3] - part[2])
-    paths = max(FEWEST_PATHS, min(MOST_PATHS * spp, spp * working[0] * working[1] // pixels))
+    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * working[0] * working[1] // pixels))
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
-    contact = 2.0 if all(name.startswith("lamp") for name in names) else CONTACT
+    contact = SETTINGS.lamp_contact if all(name.startswith("lamp") for name in names) else SETTINGS.contact
     gap = contact * _extent(alone)
     depth = path_depth(edited) or MAX_DEPTH
     options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
@@ -126,8 +134,8 @@ def _box(share: Array, native: tuple[int, int]) -> tuple[int, int, int, int]:
         places = np.flatnonzero(share.any(1 - axis))
         scale = native[axis] / share.shape[axis]
         edges += [
-            max(0, int(np.floor((places[0] - 1) * scale)) - MARGIN),
-            min(native[axis], int(np.ceil((places[-1] + 2) * scale)) + MARGIN),
+            max(0, int(np.floor((places[0] - 1) * scale)) - SETTINGS.margin),
+            min(native[axis], int(np.ceil((places[-1] + 2) * scale)) + SETTINGS.margin),
         ]
     return edges[0], edges[1], edges[2], edges[3]
 

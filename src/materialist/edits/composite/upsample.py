@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,25 +12,42 @@ from materialist.types import Array
 
 STRIP = 128
 """Native rows handled at a time: bounds the memory."""
-TILE, BORDER = 32, 4
-"""Working pixels: sides of the parts in which a matte is made, and how far from the mask's border one may reach."""
-MOST = 0.4
-"""Part of a picture near the border from which it is made at once: parts overlap."""
-NEARBY, COARSE = 2.5, 0.2
-"""Working pixels over which a matte takes means of colours (standard deviation), and the grid of these in its units."""
-_RANGE = 0.06
-"""Standard deviation of the colour weight, sRGB-encoded values: about a just visible step in a picture."""
-GRAIN = 0.03
-"""Standard deviation of the colour of an even surface, sRGB-encoded values, channels added."""
-PATTERN = (0.2, 0.5)
-"""Standard deviation of the colour of one side, in units of the distance between the two: none from the first is a
-pattern, and from the second on nothing else."""
-BESIDE, BEYOND = (0.3, 0.6), 0.75
-"""Distance of a colour from the line between those of both sides, in units of its length (grain comes on top): up to
-the first it may be a mixture of the two, from the second on it is none: a bright rim, a highlight, a shadow's edge. The
-line goes on beyond its ends by so much of its length, as the halos of sharpened edges do."""
-_RADIUS = 0.8
-"""Standard deviation of the spatial weight, pixels of working size, over 4 x 4 of them."""
+
+
+@dataclass(frozen=True)
+class MatteSettings:
+    """Shares of a surface in the photo's pixels along its outline."""
+
+    tile: int = 32
+    """Working pixels: side of the parts in which a matte is made (derived: memory)."""
+    border: int = 4
+    """Working pixels from the mask's border up to which a matte may reach (derived: `near` and the mask's error)."""
+    near: float = 2.5
+    """Standard deviation of the windows of mean colours, working pixels; larger averages texture (tuned by eye)."""
+    coarse: float = 0.2
+    """Pixel of the grid of mean colours, in units of `near` (derived: a Gaussian is smooth over it)."""
+    grain: float = 0.03
+    """Standard deviation of an even surface's colour, sRGB-encoded, channels added (tuned by eye)."""
+    apart: tuple[float, float] = (2.0, 5.0)
+    """Distance of both mean colours, standard deviations of a side: not told apart, and clearly so (tuned by eye)."""
+    beside: tuple[float, float] = (0.3, 0.6)
+    """Distance of a colour from the line between both, share of its length: a mixture, and none (tuned by eye)."""
+    beyond: float = 0.75
+    """Continuation of that line beyond its ends, as the halos of sharpened edges need (tuned by eye)."""
+
+
+@dataclass(frozen=True)
+class UpsampleSettings:
+    """Joint bilateral upsampling."""
+
+    colour: float = 0.06
+    """Standard deviation of the colour weight, sRGB-encoded: about a just visible step (tuned by eye)."""
+    radius: float = 0.8
+    """Standard deviation of the spatial weight, working pixels, over 4 x 4 of them (tuned by eye)."""
+
+
+MATTE = MatteSettings()
+UPSAMPLE = UpsampleSettings()
 
 
 def strips(height: int, size: int = STRIP, start: int = 0) -> Iterator[slice]:
@@ -58,8 +76,8 @@ class GuidedUpsample:
         large: [H0, W0, 3] the same at native size.
     """
 
-    def __init__(self, small: Array, large: Array):
-        self.guide, self.large = linear_to_srgb(small), large
+    def __init__(self, small: Array, large: Array, settings: UpsampleSettings = UPSAMPLE):
+        self.guide, self.large, self.settings = linear_to_srgb(small), large, settings
         self.same = small.shape == large.shape
 
     def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
@@ -75,8 +93,8 @@ class GuidedUpsample:
             return np.where(members[rows, columns][..., None], layer[rows, columns], near).astype(np.float32)
         here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
         native, working = self.large.shape[:2], members.shape
-        y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0])
-        x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1])
+        y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], self.settings.radius)
+        x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1], self.settings.radius)
         total = np.zeros((*here.shape[:2], layer.shape[2]), np.float32)
         if not members[y0.min() : y0.max() + 1].any():
             return total
@@ -88,7 +106,7 @@ class GuidedUpsample:
                     away = here[band] - self.guide[row, x0[j]]
                     away = np.einsum("ijk,ijk->ij", away, away)
                     # The small constant keeps a mean of the neighbourhood where nothing there looks alike.
-                    weight = np.exp(-0.5 / _RANGE**2 * away) + 1e-4
+                    weight = np.exp(-0.5 / self.settings.colour**2 * away) + 1e-4
                     weight *= ys[i][band, None] * (xs[j] * members[row, x0[j]])
                     total[band] += weight[..., None] * layer[row, x0[j]]
                     norm[band] += weight
@@ -96,13 +114,12 @@ class GuidedUpsample:
         return total.astype(np.float32)
 
 
-def matte(mask: Array, large: Array) -> Array:
+def matte(mask: Array, large: Array, settings: MatteSettings = MATTE) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
-    Within about two working pixels of the mask's border a native pixel lies somewhere between the colour of what is
-    well inside and well outside nearby; its place on the line between them is its share. Where both look the same, and
-    where it is no mixture of the two, the enlarged mask decides, and where one has a pattern, whether the pixel can be
-    of the other. Exactly 0 and 1 further away.
+    Within about two working pixels of the mask's border a native pixel lies somewhere between the mean colours well
+    inside and well outside nearby; its place on the line between them is its share. Where both sides look alike, and
+    where the pixel is no mixture of the two, the enlarged mask decides. Exactly 0 and 1 further away.
     """
     import cv2
 
@@ -111,77 +128,66 @@ def matte(mask: Array, large: Array) -> Array:
     soft = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     if mask.all() or not mask.any():
         return soft
-    wide = np.ones((2 * BORDER + 1,) * 2, np.uint8)
+    wide = np.ones((2 * settings.border + 1,) * 2, np.uint8)
     border = np.asarray(cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide))
-    if border.mean() > MOST:
-        return _shares(soft, large, scale)
     alpha = (soft >= 0.5).astype(np.float32)
-    margin = int(np.ceil((3 * NEARBY + 4) * scale))
-    for tile in strips(mask.shape[0], TILE):
-        for part in strips(mask.shape[1], TILE):
+    margin = int(np.ceil((3 * settings.near + 4) * scale))
+    for tile in strips(mask.shape[0], settings.tile):
+        for part in strips(mask.shape[1], settings.tile):
             if not border[tile, part].any():
                 continue
             own = np.zeros_like(border)
             own[tile, part] = True
             rows, columns = window(own, (height, width))
             around = tuple(slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns))
-            found = _shares(soft[around], large[around], scale)
+            found = _shares(soft[around], large[around], scale, settings)
             top, left = rows.start - around[0].start, columns.start - around[1].start
             alpha[rows, columns] = found[top:, left:][: rows.stop - rows.start, : columns.stop - columns.start]
     return alpha
 
 
-def _shares(soft: Array, large: Array, scale: float) -> Array:
+def _shares(soft: Array, large: Array, scale: float, settings: MatteSettings = MATTE) -> Array:
     """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
     import cv2
 
     reach = 2 * int(np.ceil(1.5 * scale)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    inner, outer = cv2.erode(soft, kernel), cv2.dilate(soft, kernel)
-    sure_in, sure_out = (inner >= 0.999), (outer <= 0.001)
+    sure_in, sure_out = cv2.erode(soft, kernel) >= 0.999, cv2.dilate(soft, kernel) <= 0.001
     encoded = linear_to_srgb(large)
-    front, front_spread, known_front = _mean_of(encoded, sure_in, NEARBY * scale)
-    back, back_spread, known_back = _mean_of(encoded, sure_out, NEARBY * scale)
+    front, front_variance, known_front = _mean_of(encoded, sure_in, settings.near * scale, settings.coarse)
+    back, back_variance, known_back = _mean_of(encoded, sure_out, settings.near * scale, settings.coarse)
     line = front - back
-    length = (line**2).sum(-1)
-    place = ((encoded - back) * line).sum(-1) / np.maximum(length, 1e-6)  # on the line: 0 is back, 1 front
-    share = np.clip(place, 0, 1)
-    # Two colours a tenth apart (sRGB) tell surfaces apart; below, fade to the enlarged mask.
-    spread = np.sqrt(np.maximum(front_spread, back_spread) / np.maximum(length, 1e-6))
-    plain = np.clip((PATTERN[1] - spread) / (PATTERN[1] - PATTERN[0]), 0, 1)
-    known = known_front * known_back
-    nearest = np.clip(place, -BEYOND, 1 + BEYOND)[..., None]
+    length = np.sqrt(np.maximum((line**2).sum(-1), 1e-6))
+    place = ((encoded - back) * line).sum(-1) / length**2  # on the line: 0 is back, 1 front
+    deviation = np.sqrt(np.maximum(front_variance, back_variance) + settings.grain**2)
+    nearest = np.clip(place, -settings.beyond, 1 + settings.beyond)[..., None]
     away = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
-    beside = np.maximum(away - 2 * GRAIN, 0) / np.sqrt(np.maximum(length, 1e-6))
-    mixture = np.clip((BESIDE[1] - beside) / (BESIDE[1] - BESIDE[0]), 0, 1)
-    trust = np.clip(length / 0.1**2, 0, 1) * plain * mixture * known
-    no_back, no_front = (_unlike(encoded, *side) for side in ((back, back_spread), (front, front_spread)))
-    guess = soft + known * ((1 - soft) * no_back * (1 - no_front) - soft * no_front * (1 - no_back))
-    alpha = guess + trust * (share - guess)
+    off = np.maximum(away - 2 * settings.grain, 0) / length
+    told = _ramp(length / deviation, *settings.apart) * (1 - _ramp(off, *settings.beside)) * known_front * known_back
+    alpha = soft + told * (np.clip(place, 0, 1) - soft)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)
 
 
-def _unlike(picture: Array, mean: Array, variance: Array) -> Array:
-    """[H0, W0] how certainly pixels are none of a side: from 2 to 4 standard deviations away, grain included."""
-    away = np.sqrt(((picture - mean) ** 2).sum(-1) / (variance + GRAIN**2))
-    return np.clip(away / 2 - 1, 0, 1)
+def _ramp(values: Array, low: float, high: float) -> Array:
+    """0 up to `low`, 1 from `high` on, linear between."""
+    return np.clip((values - low) / (high - low), 0, 1)
 
 
-def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
+def _mean_of(picture: Array, members: Array, sigma: float, coarse: float) -> tuple[Array, Array, Array]:
     """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
     import cv2
 
     height, width = members.shape
     # Means so wide are as good on a coarser grid, of pixels a fifth of sigma wide.
-    small = tuple(max(1, round(v / max(1.0, COARSE * sigma))) for v in (width, height))
+    small = tuple(max(1, round(v / max(1.0, coarse * sigma))) for v in (width, height))
     sigmas = [float(np.sqrt(max(sigma**2 / (v / s) ** 2 - (v > s) / 12, 0.1))) for v, s in zip((width, height), small)]
     sizes = [2 * int(np.ceil(3 * v)) + 1 for v in sigmas]
 
     def blurred(values: Array) -> Array:
-        coarse = cv2.resize(values, small, interpolation=cv2.INTER_AREA)
-        coarse = cv2.GaussianBlur(coarse, sizes, sigmas[0], sigmaY=sigmas[1], borderType=cv2.BORDER_REFLECT)
-        return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR))
+        shrunk = cv2.resize(values, small, interpolation=cv2.INTER_AREA)
+        shrunk = cv2.GaussianBlur(shrunk, sizes, sigmas[0], sigmaY=sigmas[1], borderType=cv2.BORDER_REFLECT)
+        return np.asarray(cv2.resize(shrunk, (width, height), interpolation=cv2.INTER_LINEAR))
 
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)
@@ -201,10 +207,10 @@ def _blurred(layer: Array, members: Array) -> Array:
     return np.stack(parts, -1) / np.maximum(cv2.GaussianBlur(weight, (5, 5), 1.0), 1e-6)[..., None]
 
 
-def _taps(index: Array, native: int, working: int) -> tuple[Array, Array]:
+def _taps(index: Array, native: int, working: int, radius: float) -> tuple[Array, Array]:
     """The four working positions [4, n] around native positions [n] of one axis, and their spatial weights [4, n]."""
     place = (index + 0.5) * working / native - 0.5
     base = np.floor(place).astype(np.int64)
     taps = base[None] + np.arange(-1, 3)[:, None]
-    weights = np.exp(-0.5 * ((taps - place[None]) / _RADIUS) ** 2).astype(np.float32)
+    weights = np.exp(-0.5 * ((taps - place[None]) / radius) ** 2).astype(np.float32)
     return np.clip(taps, 0, working - 1), weights

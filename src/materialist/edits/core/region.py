@@ -11,7 +11,7 @@ from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 HIDDEN = 0.5
-"""Share of a mask that may be hidden by things that were put into the scene."""
+"""Share of a mask, or of a pixel, from which it is hidden by a body (a definition)."""
 PLACED = (
     "a thing that was put into the scene, or made glass, and edits reach only what the photo shows: put it there "
     "again as you want it"

@@ -1,8 +1,8 @@
 """The photo's sky as new glass shows it.
 
-Surfaces carry the photo's colours in their albedo; before the sky a path meets the fitted light, which has neither the
-photo's detail nor what was filled or given behind an object. Light is linear: the photo's sky less the fitted light,
-each rendered alone with surfaces that reflect nothing, is what is missing in the picture of the glass.
+Surfaces carry the photo's colours in their albedo. Where a path through glass leaves the scene it meets the fitted
+light, which has neither the photo's detail nor the filled background of a removed object. Light is linear: the
+photo's sky less the fitted light, each rendered alone with black surfaces, is added to the picture of the glass.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from materialist.types import Array, Materials, Scene
 ROWS = 768
 """Most rows of the maps that stand for the photo's sky; a texel is about a pixel otherwise."""
 LEAST = 1e-6
-"""Added to both, for no light at all cannot be sampled; their difference does not know it."""
+"""Added to both maps, since no light at all cannot be sampled; it cancels in their difference."""
 CLIPPED = 0.98
 """From here on a channel of an ordinary photo is a lower bound."""
 
@@ -58,10 +58,12 @@ def only_lit_by(scene: Scene, envmap: Array) -> Scene:
 def traced(
     trace: Callable[[float], Array], target: Any, scene: Scene, maps: tuple[Array, Array] | None, *, share: float = 1.0
 ) -> Array:
-    """[h, w, 3] what `trace` gives of a `RenderScene` dressed as the scene, with the sky of `sky_maps` in its glass.
+    """[h, w, 3] a picture of a `RenderScene` with the scene's materials and light, and the photo's sky in its glass.
 
-    trace: picture by a share of its paths. share: that of each of both maps; they follow the same paths, so that fewer
-    do: their difference has little noise.
+    Args:
+        trace: picture by a share of its paths.
+        maps: of `sky_maps`. share: share of the paths for each of them; both follow the same paths, so that their
+            difference has little noise.
     """
     picture = trace(1.0)
     if maps is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,26 @@ from materialist.errors import InputError
 from materialist.options import Insertion
 from materialist.types import Array, Body, Scene
 
-SHARE = 1 / 6
-"""Longest side of a mesh at scale 1, as a share of the width that the picture shows at its depth."""
-CLOSEST = 0.02
-"""Depth before which nothing may reach, as a share of the depth of its place."""
-SAMPLES = 6000
-"""Points of its surface that are looked at for intersections."""
+
+@dataclass(frozen=True)
+class InsertSettings:
+    """Size of an inserted mesh, and its check for intersections."""
+
+    width: float = 1 / 6
+    """Longest side at scale 1, share of the width that the picture shows at its depth (tuned by eye)."""
+    nearest: float = 0.02
+    """Depth that nothing may come nearer than, share of the depth of its place (tuned by eye)."""
+    samples: int = 6000
+    """Points of its surface that are looked at for intersections (tuned by eye)."""
+    foot: float = 0.12
+    """Share of its height that may run into the surface it stands on (tuned by eye)."""
+    band: float = 0.03
+    """Distance from the visible surface, share of its size, at which both sides mean an intersection (by eye)."""
+    share: float = 0.003
+    """Share of the points on both sides that makes an intersection (tuned by eye)."""
+
+
+SETTINGS = InsertSettings()
 
 
 def insert(
@@ -69,14 +83,14 @@ def put(
     low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
-    unit = scale * (size if size is not None else SHARE * picture_width(scene, first.depth)) / longest
+    unit = scale * (size if size is not None else SETTINGS.width * picture_width(scene, first.depth)) / longest
     footprint = unit * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     support = support_at(scene, at, footprint)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     turned = frame(support) @ about_up(turn)
     bodies = tuple(moved(part, turned * unit, support.point - (turned * unit) @ base) for part in model.parts)
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
-    if nearest < CLOSEST * support.depth:
+    if nearest < SETTINGS.nearest * support.depth:
         raise InputError(
             f"{model.name} would reach behind the camera at scale {scale:g}; choose a smaller scale, or a place "
             "further away."
@@ -129,14 +143,14 @@ def _crosses(scene: Scene, bodies: tuple[Body, ...], support: Support) -> bool:
     """
     points = np.concatenate([surface_points(body) for body in bodies])  # [n, 3]
     above = (points - support.point) @ support.normal
-    points = points[above > 0.12 * max(float(above.max()), 1e-12)]
+    points = points[above > SETTINGS.foot * max(float(above.max()), 1e-12)]
     place, depth = project(points, scene.camera)
     column, row = np.floor(place[:, 0]).astype(int), np.floor(place[:, 1]).astype(int)
     seen = (depth > 0) & (column >= 0) & (column < scene.camera.width) & (row >= 0) & (row < scene.camera.height)
     surface = scene.depth[row[seen], column[seen]]
     before = np.where(surface > 0, surface - depth[seen], np.inf)  # > 0: the point is before the surface
-    band = 0.03 * extent(bodies)
-    least = 0.003 * max(len(points), 1)
+    band = SETTINGS.band * extent(bodies)
+    least = SETTINGS.share * max(len(points), 1)
     return bool(((before > 0) & (before < band)).sum() > least and ((before < 0) & (before > -band)).sum() > least)
 
 
@@ -147,7 +161,7 @@ def surface_points(body: Body) -> Array:
     if not area.sum() > 0:
         return corners[:, 0]
     rng = np.random.default_rng(0)
-    face = rng.choice(len(area), SAMPLES, p=area / area.sum())
-    u, v = np.sqrt(rng.random(SAMPLES)), rng.random(SAMPLES)
+    face = rng.choice(len(area), SETTINGS.samples, p=area / area.sum())
+    u, v = np.sqrt(rng.random(SETTINGS.samples)), rng.random(SETTINGS.samples)
     weights = np.stack([1 - u, u * (1 - v), u * v], -1)
     return (corners[face] * weights[..., None]).sum(1)

@@ -11,10 +11,22 @@ from materialist.edits.core.region import checked_pixel
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
-LIKE = 0.7
-"""Cosine from which a neighbour's normal counts as that of the same surface."""
-FEWEST = 12
-"""Pixels that a plane is fitted to; with fewer the predicted normal decides."""
+
+@dataclass(frozen=True)
+class SupportSettings:
+    """Which pixels tell the plane that a thing stands on."""
+
+    alike: float = 0.7
+    """Cosine from which a neighbour's normal counts as that of the same surface (tuned by eye)."""
+    fewest: int = 12
+    """Pixels that a plane is fitted to, at least; with fewer the predicted normal decides (derived)."""
+    nearby: float = 1 / 24
+    """Radius around the place, share of the picture's width, where no radius is given (tuned by eye)."""
+    spread: float = 1 / 6
+    """Standard deviation of the weight of a dominant plane's pixels, share of the longer side (tuned by eye)."""
+
+
+DEFAULT = SupportSettings()
 
 
 @dataclass(frozen=True)
@@ -47,15 +59,15 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
         [(at[0] - camera.width / 2) / camera.focal, (camera.height / 2 - at[1]) / camera.focal, -1.0], np.float64
     )
     point = ray * depth
-    reach = radius if radius else picture_width(scene, depth) / 24
+    reach = radius if radius else picture_width(scene, depth) * DEFAULT.nearby
     near = _near(scene, point, reach, row, column)
     label = scene.geometry.plane_label[row, column]
     members = (scene.geometry.plane_label == label) & (scene.depth > 0) if label >= 0 else near
     normal = scene.normal[row, column].astype(np.float64)
-    if members.sum() >= FEWEST:
-        spread = max(camera.width, camera.height) / 6 if label >= 0 else np.inf
+    if members.sum() >= DEFAULT.fewest:
+        spread = max(camera.width, camera.height) * DEFAULT.spread if label >= 0 else np.inf
         normal = _fitted(scene, members, (row, column), spread)
-    if near.sum() >= FEWEST:
+    if near.sum() >= DEFAULT.fewest:
         points = unproject(scene.depth, camera)[near].astype(np.float64)
         offset = np.median(points @ normal)
         along = float(ray @ normal)
@@ -75,7 +87,9 @@ def _near(scene: Scene, point: Array, reach: float, row: int, column: int) -> Ar
     close = ((points - point) ** 2).sum(-1) < reach**2
     window = np.s_[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
     facing = np.median(scene.normal[window].reshape(-1, 3), axis=0)
-    return close & (scene.depth > 0) & (scene.normal @ facing > LIKE * max(float(np.linalg.norm(facing)), 1e-6))
+    return (
+        close & (scene.depth > 0) & (scene.normal @ facing > DEFAULT.alike * max(float(np.linalg.norm(facing)), 1e-6))
+    )
 
 
 def _fitted(scene: Scene, members: Array, pixel: tuple[int, int], spread: float) -> Array:

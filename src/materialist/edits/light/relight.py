@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,20 @@ from materialist.errors import InputError
 from materialist.options import Relight
 from materialist.types import Array, Lamp, Scene
 
-SUN_RADIUS = 1.5
-"""Angular radius of an added sun, degrees: six times the real one, so that a map of 512 x 256 can hold it."""
-LAMP_UNIT = 0.25
-"""A lamp of power 1 shows a white wall that faces it as white in the photo from this share of the median depth."""
-LAMP_RADIUS = 0.015
-"""Radius of a lamp as a share of the scene's median depth."""
+
+@dataclass(frozen=True)
+class LightSettings:
+    """Sizes of added lights."""
+
+    sun_radius: float = 1.5
+    """Angular radius of an added sun, degrees: six real ones, as a map of 512 x 256 needs (derived)."""
+    lamp_unit: float = 0.25
+    """A lamp of power 1 shows a white wall as white from this share of the median depth (a definition)."""
+    lamp_radius: float = 0.015
+    """Radius of a lamp, share of the median depth (tuned by eye)."""
+
+
+SETTINGS = LightSettings()
 
 
 def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Any) -> Scene:
@@ -90,9 +98,9 @@ def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: f
     column, row = checked_pixel(scene, (x, y), "lamp")
     middle = float(np.median(scene.depth[scene.depth > 0]))
     position = pixel_rays(scene.camera)[row, column].astype(np.float64) * depth
-    # White wall: radiance = albedo / pi * I / d^2 = power at d = LAMP_UNIT * middle, with flux 4 pi I.
-    flux = 4 * np.pi * np.pi * power * (LAMP_UNIT * middle) ** 2 * kelvin_colour(kelvin)
-    return Lamp(triple(position), triple(flux), LAMP_RADIUS * middle)
+    # White wall: radiance = albedo / pi * I / d^2 = power at d = SETTINGS.lamp_unit * middle, with flux 4 pi I.
+    flux = 4 * np.pi * np.pi * power * (SETTINGS.lamp_unit * middle) ** 2 * kelvin_colour(kelvin)
+    return Lamp(triple(position), triple(flux), SETTINGS.lamp_radius * middle)
 
 
 def kelvin_colour(kelvin: float) -> Array:
@@ -175,7 +183,7 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
     angle = _angle_to(envmap.shape[0], azimuth, elevation)  # [h, 2h] degrees
     solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
     texel = 180 / envmap.shape[0]
-    disc = np.clip((max(SUN_RADIUS, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
+    disc = np.clip((max(SETTINGS.sun_radius, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
     mean = luminance((envmap * solid[..., None]).sum((0, 1)) / (4 * np.pi))
     radiance = power * np.pi * mean / (disc * solid).sum()
     bright = luminance(envmap)
