@@ -39,30 +39,6 @@ def test_light_change_agrees_with_the_path_tracer(preview):
     assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
 
 
-def test_a_light_is_filtered_for_its_roughness_and_for_another_only_when_that_is_asked_for(preview):
-    from materialist.transport.filter import filter_tables
-    from materialist.transport.shading import shade
-
-    sky = np.random.default_rng(2).uniform(0.2, 2, (8, 16, 3)).astype(np.float32)
-    turned = relight(preview.scene, envmap=sky)
-    first = preview.render(turned)
-    light = preview._other[1]
-    assert light._tables is None
-    engine = preview._engine
-    tables = filter_tables(engine.cache, light._raw, engine.guide)
-    slow = preview._image(shade(tables, *preview._maps(turned.materials)), preview._sky(turned.envmap))
-    # With one roughness everywhere it does not matter what comes first, filter or shading.
-    np.testing.assert_allclose(first, slow, atol=2e-4, rtol=1e-3)
-    red = relight(edit(preview.scene, MASK, albedo=(0.5, 0.1, 0.1)), envmap=sky)
-    slow = preview._image(shade(tables, *preview._maps(red.materials)), preview._sky(red.envmap))
-    np.testing.assert_allclose(preview.render(red), slow, atol=2e-4, rtol=1e-3)
-    assert light._tables is None
-    smooth = relight(edit(preview.scene, MASK, roughness=0.1), envmap=sky)
-    slow = preview._image(shade(tables, *preview._maps(smooth.materials)), preview._sky(smooth.envmap))
-    np.testing.assert_array_equal(preview.render(smooth), slow)
-    assert light._tables is not None and preview._other[1] is light
-
-
 def test_nothing_changed_is_the_photo(preview):
     same = edit(preview.scene, MASK, hue=0.0)
     np.testing.assert_array_equal(preview.picture(same), preview.scene.photo.linear)

@@ -1,17 +1,13 @@
 """Files of composites: the photo's own bits come back."""
 
-import io
 from dataclasses import replace
 
 import cv2
 import numpy as np
-import pytest
 from edit_scenes import flat_scene
 from PIL import Image
 
-from materialist.color import srgb_to_linear
 from materialist.edits.composite.output import is_deep, write_composite
-from materialist.errors import OutputError
 from materialist.io.decode import decode
 from materialist.io.exr import read_exr
 
@@ -46,20 +42,6 @@ def test_exr_keeps_hdr(tmp_path):
     bright = SCENE.photo.original * 50
     write_composite(tmp_path / "b.exr", bright, SCENE.photo)
     np.testing.assert_array_equal(read_exr(tmp_path / "b.exr"), bright)
-
-
-def test_existing_files_need_force(tmp_path):
-    write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo)
-    with pytest.raises(OutputError, match="force"):
-        write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo)
-    write_composite(tmp_path / "b.png", SCENE.photo.original, SCENE.photo, force=True)
-
-
-def test_photos_from_memory_are_not_deep():
-    buffer = io.BytesIO()
-    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(buffer, "JPEG")
-    assert not is_deep(SCENE.photo) and not is_deep(replace(SCENE.photo, source=buffer.getvalue()))
-    assert srgb_to_linear(np.array([1.0]))[0] == 1
 
 
 def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):

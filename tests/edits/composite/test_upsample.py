@@ -5,17 +5,11 @@ import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.composite import upsample
-from materialist.edits.composite.upsample import GuidedUpsample, matte, strips, window
+from materialist.edits.composite.upsample import GuidedUpsample, matte, window
 
 
 def photo_of(mask, inside, outside):
     return np.where(mask[..., None], inside, outside).astype(np.float32)
-
-
-def test_equal_sizes_change_nothing():
-    layer = np.random.default_rng(0).random((7, 9, 2), np.float32)
-    photo = np.random.default_rng(1).random((7, 9, 3), np.float32)
-    np.testing.assert_array_equal(GuidedUpsample(photo, photo)(layer, np.ones((7, 9), bool), slice(0, 7)), layer)
 
 
 def test_constant_layers_stay_constant():
@@ -113,10 +107,6 @@ def test_without_a_colour_edge_the_mask_decides():
     assert np.all(np.diff(alpha[30]) <= 0)
 
 
-def test_strips_cover_every_row_once():
-    assert np.concatenate([np.arange(1000)[rows] for rows in strips(1000)]).tolist() == list(range(1000))
-
-
 def disc(height, width, radius=15):
     rows, columns = np.mgrid[:height, :width]
     return np.hypot(rows - height / 2, columns - 1.5 * radius) < radius
@@ -131,17 +121,6 @@ def test_a_matte_made_in_parts_is_the_matte_made_at_once():
     assert ((whole > 0.05) & (whole < 0.95)).sum() > 100
     np.testing.assert_allclose(matte(small, large), whole, atol=0.05)
     assert np.abs(matte(small, large) - whole).mean() < 1e-4
-
-
-def test_coarse_means_are_the_fine_ones():
-    rng = np.random.default_rng(1)
-    picture = np.kron(rng.random((12, 16, 3)), np.ones((20, 20, 1))).astype(np.float32)
-    members = np.kron(rng.random((6, 8)) > 0.4, np.ones((40, 40))) > 0
-    coarse, fine = (upsample._mean_of(picture, members, 25.0, grid) for grid in (0.2, 0))
-    near = fine[2] & coarse[2]
-    assert (fine[2] == coarse[2]).mean() > 0.99 and near.mean() > 0.5
-    assert np.abs(fine[0] - coarse[0])[near].max() < 0.02
-    assert np.abs(fine[1] - coarse[1])[near].max() < 0.01
 
 
 @pytest.mark.parametrize("factor", [1, 3])

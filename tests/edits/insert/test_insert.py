@@ -72,13 +72,6 @@ def test_on_a_wall_it_stands_out_of_the_wall(box):
     assert np.ptp(body.vertices[:, 2]) > np.ptp(body.vertices[:, 0])  # its longest side points to the camera
 
 
-def test_several_stack_and_each_is_noted(box):
-    scene = floor_scene(96, 72)
-    edited = insert(insert(scene, box, (30.0, 50.0)), box, (60.0, 55.0), material="glass")
-    assert len(edited.bodies) == 2 and len(edited.provenance["edits"]) == 2
-    assert edited.bodies[1].surface.transmission == 1
-
-
 def test_bad_places_and_numbers(box):
     scene = floor_scene(96, 72)
     scene = replace(scene, depth=np.where(np.arange(72)[:, None] < 10, 0, scene.depth))
@@ -145,14 +138,6 @@ def test_nothing_of_the_background_is_in_a_body(box):
     body = native_layer(EditRenderer(scene), edited, spp=16, seed=0, clean=False)
     rim = (body.share > 0.05) & (body.share < 0.95)
     assert rim.any() and np.median(body.picture[rim]) < 0.2  # black but for its gloss; the floor is 1
-
-
-def test_a_native_picture_of_another_shape_is_no_obstacle(box):
-    scene = floor_scene()
-    wide = replace(scene, photo=replace(scene.photo, original=np.full((71, 96, 3), 0.5, np.float32)))
-    edited = insert(wide, box, (24.0, 26.0))
-    body = native_layer(EditRenderer(wide), edited, spp=4, seed=0, clean=False)
-    assert body.share.shape == (71, 96) and body.picture[body.share > 0.99].min() > 0
 
 
 def test_a_body_looks_as_in_the_plain_rendering(box):
