@@ -107,7 +107,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Edit |
     import cv2
 
     from materialist.edits.insert.insert import insert
-    from materialist.edits.insert.meshes import Model
+    from materialist.edits.insert.meshes import MeshModel
 
     floor = np.pad((item == 0).astype(np.uint8), 1)
     free = cv2.distanceTransform(floor, cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -117,7 +117,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Edit |
     at = (float(column) + 0.5, float(row) + 0.5)
     control = np.array([(0.35, 0), (0.45, 0.3), (0.5, 0.8), (0.48, 1.0)])
     solid = shapes.vessel(control, thickness=0.08)
-    model = Model((_body(solid),), "cup")
+    model = MeshModel((_body(solid),), "cup")
     base = true_scene(sample)
     (body,) = insert(base, model, at).bodies
     rows = lambda v: v.astype(np.float64)  # noqa: E731

@@ -9,7 +9,7 @@ import pytest
 from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite, pictures
-from materialist.edits.composite.emitters import WHITE, in_photo
+from materialist.edits.composite.emitters import DEFAULT, in_photo
 from materialist.edits.core.emitters import KEY, base_of, emitting
 from materialist.edits.light import emitters
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
@@ -273,7 +273,7 @@ def test_dimming_by_one_is_none_and_dimming_brightens_nothing():
     np.testing.assert_array_equal(same, picture)
     half = in_photo(picture, photo, LIGHT, {"radiance": 8.0, "dim": 0.5})
     np.testing.assert_allclose(half[6, 14], 0.375, rtol=1e-5)
-    unclipped = LIGHT & (original.min(-1) < WHITE)
+    unclipped = LIGHT & (original.min(-1) < DEFAULT.clipped)
     assert (half <= np.maximum(original, picture) + 1e-6)[unclipped].all()
 
 

@@ -8,7 +8,7 @@ photo's sky less the fitted light, each rendered alone with black surfaces, is a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,20 @@ from materialist.camera import project
 from materialist.envmap import environment, texel_directions
 from materialist.types import Array, Materials, Scene
 
-ROWS = 768
-"""Most rows of the maps that stand for the photo's sky; a texel is about a pixel otherwise."""
+
+@dataclass(frozen=True)
+class SkySettings:
+    """Maps that stand for the photo's sky."""
+
+    rows: int = 768
+    """Most rows; a texel is about a pixel otherwise (derived: memory)."""
+    clipped: float = 0.98
+    """Channel of an ordinary photo from which it is a lower bound (derived: 8 bits)."""
+
+
+DEFAULT = SkySettings()
 LEAST = 1e-6
 """Added to both maps, since no light at all cannot be sampled; it cancels in their difference."""
-CLIPPED = 0.98
-"""From here on a channel of an ordinary photo is a lower bound."""
 
 
 def sky_maps(scene: Scene) -> tuple[Array, Array] | None:
@@ -33,7 +41,7 @@ def sky_maps(scene: Scene) -> tuple[Array, Array] | None:
     camera = scene.camera
     if (scene.depth > 0).all():
         return None
-    rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), ROWS))
+    rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), DEFAULT.rows))
     directions = texel_directions(rows, 2 * rows).reshape(-1, 3)
     place, ahead = project(directions, camera)
     column, row = np.floor(place).astype(int).T
@@ -43,7 +51,7 @@ def sky_maps(scene: Scene) -> tuple[Array, Array] | None:
     photo[seen] = scene.photo.linear[row[seen], column[seen]]
     fitted[seen] = environment(directions[seen], scene.envmap)
     if not scene.photo.hdr:
-        photo = np.where((photo >= CLIPPED) & (fitted > photo), fitted, photo)
+        photo = np.where((photo >= DEFAULT.clipped) & (fitted > photo), fitted, photo)
     shape = (rows, 2 * rows, 3)
     return photo.reshape(shape) + LEAST, fitted.reshape(shape) + LEAST
 

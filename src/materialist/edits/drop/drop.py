@@ -14,7 +14,7 @@ from materialist.edits.drop.convex import convex_pieces, hull
 from materialist.edits.drop.drop_ground import Surroundings, blocks_of, middle
 from materialist.edits.drop.physics import Pose, Thing, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
-from materialist.edits.insert.meshes import Model, read_model, repainted
+from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support
 from materialist.errors import InputError
 from materialist.io.video import MAX_FRAMES
@@ -26,7 +26,7 @@ UPRIGHT = 0.5
 
 
 def drop(
-    scene: Scene, meshes: str | Path | Model | Sequence[str | Path | Model],
+    scene: Scene, meshes: str | Path | MeshModel | Sequence[str | Path | MeshModel],
     at: tuple[float, float] | Sequence[tuple[float, float]], options: Drop | None = None, *, frames: int = 48,
     fps: float = 24.0, **values: Any,
 ) -> list[Scene]:  # fmt: skip
@@ -94,14 +94,16 @@ class Falling:
 
 def prepared(
     scene: Scene,
-    meshes: str | Path | Model | Sequence[str | Path | Model],
+    meshes: str | Path | MeshModel | Sequence[str | Path | MeshModel],
     at: tuple[float, float] | Sequence[tuple[float, float]],
     wanted: Drop,
 ) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
     load()
-    meshes = [meshes] if isinstance(meshes, str | Path | Model) else meshes
-    models = [repainted(m if isinstance(m, Model) else read_model(m, up=wanted.up), wanted.material) for m in meshes]
+    meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
+    models = [
+        repainted(m if isinstance(m, MeshModel) else read_model(m, up=wanted.up), wanted.material) for m in meshes
+    ]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")
     places = _places(at, len(models))

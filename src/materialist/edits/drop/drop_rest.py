@@ -12,7 +12,7 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.drop.drop import Falling, moves, prepared
 from materialist.edits.drop.physics import Pose, fall
-from materialist.edits.insert.meshes import Model
+from materialist.edits.insert.meshes import MeshModel
 from materialist.errors import InputError
 from materialist.options import Drop
 from materialist.types import Body, Scene
@@ -26,7 +26,7 @@ STILL = 12
 
 
 def settle(
-    scene: Scene, meshes: Sequence[str | Path | Model], at: tuple[float, float] | Sequence[tuple[float, float]],
+    scene: Scene, meshes: Sequence[str | Path | MeshModel], at: tuple[float, float] | Sequence[tuple[float, float]],
     options: Drop | None = None, **values: Any,
 ) -> Scene:  # fmt: skip
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.

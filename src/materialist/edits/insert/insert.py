@@ -10,7 +10,7 @@ import numpy as np
 
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
-from materialist.edits.insert.meshes import Model, read_model, repainted
+from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support, picture_width, support_at
 from materialist.errors import InputError
 from materialist.options import Insertion
@@ -39,7 +39,7 @@ SETTINGS = InsertSettings()
 
 
 def insert(
-    scene: Scene, mesh: str | Path | Model, at: tuple[float, float], options: Insertion | None = None, **values: Any
+    scene: Scene, mesh: str | Path | MeshModel, at: tuple[float, float], options: Insertion | None = None, **values: Any
 ) -> Scene:
     """The scene with a mesh standing on the surface under a pixel; photo, maps and light are shared.
 
@@ -58,7 +58,7 @@ def insert(
             mesh that cannot be used; a number out of its range.
     """
     wanted = Insertion.given(options, **values)
-    model = repainted(mesh if isinstance(mesh, Model) else read_model(mesh, up=wanted.up), wanted.material)
+    model = repainted(mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material)
     placed, support, longest = put(scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size)
     warnings = [*model.warnings]
     if _crosses(scene, placed, support):
@@ -73,7 +73,7 @@ def insert(
 
 
 def put(
-    scene: Scene, model: Model, at: tuple[float, float], *, scale: float = 1.0, turn: float = 0.0,
+    scene: Scene, model: MeshModel, at: tuple[float, float], *, scale: float = 1.0, turn: float = 0.0,
     size: float | None = None,
 ) -> tuple[tuple[Body, ...], Support, float]:  # fmt: skip
     """The model's parts as they stand in the camera frame, the plane they stand on, and their longest side.

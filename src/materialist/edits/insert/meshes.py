@@ -53,7 +53,7 @@ LIMITS = MeshLimits()
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class MeshModel:
     """A thing to be put into a scene: its parts in one frame, +Y up, front to +Z, in the units of its file."""
 
     parts: tuple[Body, ...]
@@ -69,7 +69,7 @@ class Model:
         return np.concatenate([part.vertices for part in self.parts])
 
 
-def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMITS) -> Model:
+def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMITS) -> MeshModel:
     """Read a mesh file; the middle of its base becomes the origin.
 
     Nothing outside of the file's own folder is opened, whatever it refers to. Normals that are missing are computed,
@@ -118,7 +118,7 @@ def files_beside(path: Path) -> list[Path]:
     return list(dict.fromkeys(folder.opened))
 
 
-def repainted(model: Model, material: str) -> Model:
+def repainted(model: MeshModel, material: str) -> MeshModel:
     """The model in another material: `as-is`, `glass`, `mirror`, a linear "R,G,B" or "#rrggbb". Raises InputError.
 
     Glass is smooth with an index of 1.5; the mirror's albedo is 0.95; a colour is dielectric with roughness 0.5.
@@ -308,7 +308,7 @@ def _file_notes(path: Path, folder: MeshFolder, reader: _Reader) -> list[str]:
     return notes + [f"{path.name}: a texture cannot be read; a constant takes its place."] * reader.textures.damaged
 
 
-def _checked(parts: list[Body], path: Path, notes: list[str]) -> Model:
+def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
     """The model with its base at the origin, its faces to the outside, and warnings of what is wrong with it."""
     corners = np.cumsum([0, *(len(part.vertices) for part in parts)])
     vertices = np.concatenate([part.vertices for part in parts])
@@ -322,7 +322,7 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> Model:
         parts = [
             replace(part, faces=np.ascontiguousarray(part.faces[:, ::-1]), normals=-part.normals) for part in parts
         ]
-    return Model(tuple(parts), path.stem, tuple(dict.fromkeys(notes)), open_edges == 0)
+    return MeshModel(tuple(parts), path.stem, tuple(dict.fromkeys(notes)), open_edges == 0)
 
 
 def _unit(vectors: Array) -> Array:

@@ -19,7 +19,7 @@ from materialist.types import Array, Lamp, Scene
 
 
 @dataclass(frozen=True)
-class LightSettings:
+class AddedLightSettings:
     """Sizes of added lights."""
 
     sun_radius: float = 1.5
@@ -30,7 +30,7 @@ class LightSettings:
     """Radius of a lamp, share of the median depth (tuned by eye)."""
 
 
-SETTINGS = LightSettings()
+SETTINGS = AddedLightSettings()
 
 
 def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Any) -> Scene:
