@@ -66,7 +66,7 @@ def short():
     stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=4)) for s in DEFAULT.materials.stages)
     light = replace(DEFAULT.light, schedule=replace(DEFAULT.light.schedule, max_steps=10), refit_steps=4)
     materials = replace(DEFAULT.materials, stages=stages)
-    return replace(DEFAULT, light=light, materials=materials, rounds=2, corrections=1, correction_spp=4, trust=None)
+    return replace(DEFAULT, light=light, materials=materials, rounds=2, corrections=1, correction_spp=4, explained=None)
 
 
 def short_paper():
@@ -225,11 +225,11 @@ def test_misspelt_options_are_refused(call, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
-def attempt(materials, envmap, rerender, trust=3.0):
+def result(materials, envmap, rerender, confidence=3.0):
     """A finished fit, with what the report reads of it."""
-    from materialist.fit.attempt import Attempt
+    from materialist.fit.invert import FitResult
 
-    return Attempt("none", (), None, materials, envmap, rerender, ({"prior_trust": trust},))
+    return FitResult(None, materials, envmap, (rerender, rerender), 8, ({"prior_confidence": confidence},))
 
 
 def test_only_a_clipped_photo_is_said_to_be_clipped():
@@ -243,27 +243,11 @@ def test_only_a_clipped_photo_is_said_to_be_clipped():
         linear = np.full((8, 8, 3), 0.9, np.float32)
         linear[0, 0] = value
         prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
-        found = attempt(prior.materials, even, linear)
+        found = result(prior.materials, even, linear)
         photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
         return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
 
     assert [notes(1.0, False), notes(9.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
-
-
-def test_colours_that_no_surface_has_are_told():
-    from materialist.pipeline import _report
-    from materialist.types import Camera, Materials, Photo, Prediction
-
-    flat, even = np.ones((8, 8), np.float32), np.ones((8, 16, 3), np.float32)
-
-    def told(blue, hdr=False):
-        linear = np.tile(np.float32([0.7, 0.06, blue]), (8, 8, 1))
-        prior = Prediction(Materials(linear, flat, flat), linear, flat)
-        photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
-        notes = _report(photo, prior, attempt(prior.materials, even, linear), (), (), 0.0).warnings
-        return any("channel at 0" in note for note in notes)
-
-    assert told(0.0) and not told(0.01) and not told(0.0, hdr=True)
 
 
 def test_what_may_be_baked_into_the_albedo_is_said():
@@ -276,8 +260,8 @@ def test_what_may_be_baked_into_the_albedo_is_said():
     sunny[1, 3] = 500
     prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
 
-    def notes(envmap, trust):
-        found = attempt(prior.materials, envmap, linear, trust)
+    def notes(envmap, confidence):
+        found = result(prior.materials, envmap, linear, confidence)
         photo = Photo(linear, Camera(8, 8, 40.0), linear, False)
         return " ".join(_report(photo, prior, found, found.stages, (), 0.0).warnings)
 

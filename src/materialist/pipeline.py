@@ -20,7 +20,7 @@ from materialist.render.envmap import is_peaked
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
-    from materialist.fit.attempt import Attempt
+    from materialist.fit.invert import FitResult
 
 STRATEGIES = ("default", "white-light-first")
 ENGINES = ("transport", "path")
@@ -65,8 +65,7 @@ def invert(
         envmap_size: (width, height) of the environment map; width = 2 * height.
         completion: `planes` continues dominant planes beyond what the photo shows, `floors` ends walls at the frame,
             `none` adds nothing; `planes,backs` and `floors,backs` are accepted for `planes` and `floors`. `auto` is
-            `planes` with walls that end where light explains the photo best, or `none` where that shuts out light
-            that the photo shows; the report then says so.
+            `planes` with walls that end where light explains the photo best.
         tau: grazing angle of the boundary duplication, degrees.
         mask: [H, W] bool at working size: roughness and metallic take one value inside.
         strategy: `default`, or `white-light-first` (paper, Material Editing Settings).
@@ -105,28 +104,30 @@ def invert(
     from materialist.render.variant import setup
 
     setup(device)
-    from materialist.fit.attempt import AUTO, FULL, Job
+    from materialist.fit.invert import AUTO, FULL, FitSetup, Inversion
     from materialist.fit.settings import preset as named
     from materialist.geometry.build import SYNONYMS
 
     settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
-    if engine == "path" and (settings.corrections or settings.materials.other_metallic is not None):
+    if engine == "path" and (settings.corrections or settings.materials.second_metallic is not None):
         raise InputError(
-            "The path engine fits as the paper does; give it settings with corrections=0 and other_metallic=None."
+            "The path engine fits as the paper does; give it settings with corrections=0 and second_metallic=None."
         )
-    job = Job(
-        picture, prior, settings, engine, envmap_size[1], tau, mask,
-        strategy, seed, device, overrides.get("spp"), progress, found,
+    chosen = FULL if completion == AUTO and preset == "paper" else SYNONYMS.get(completion, completion)
+    fit_setup = FitSetup(
+        picture, prior, settings, chosen, engine, envmap_height=envmap_size[1], tau=tau, mask=mask, strategy=strategy,
+        seed=seed, device=device, spp=overrides.get("spp"),
     )  # fmt: skip
-    # The paper's schedule is followed once, however well it does.
-    best, notes = job.best(FULL if completion == AUTO and preset == "paper" else SYNONYMS.get(completion, completion))
-    report = _report(picture, prior, best, (*stages, *best.stages), notes, start)
+    best = Inversion(fit_setup, progress=progress, found=found).run()
+    prepared = best.prepared
+    report = _report(picture, prior, best, (*stages, *best.stages), prepared.notes, start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
-        depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
+        depth=prior.depth, geometry=prepared.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": best.completion, "completion_asked": completion, "ends": [asdict(e) for e in best.ends],
+            "completion": prepared.completion, "completion_asked": completion,
+            "ends": [asdict(e) for e in prepared.ends],
             "tau": tau, "strategy": strategy, "mask": _named(mask),
             "settings": asdict(settings) if overrides.get("settings") else None,
             "seed": seed, "spp": best.spp, "size": size,
@@ -161,19 +162,11 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return rendered(scene, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
-def _too_pure(linear: Array) -> float:
-    """Share of the pixels that are `fit.losses.too_pure` in some channel."""
-    import torch
-
-    from materialist.fit.losses import too_pure
-
-    return float(too_pure(torch.from_numpy(np.ascontiguousarray(linear))).any(-1).float().mean())
-
-
 def _report(
-    picture: Photo, prior: Prediction, found: Attempt, stages: tuple[dict, ...], told: tuple[str, ...], start: float
+    picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], told: tuple[str, ...], start: float
 ) -> FitReport:
-    materials, rerender = found.materials, np.nan_to_num(found.rerender, posinf=0)
+    materials, halves = found.materials, [np.nan_to_num(half, posinf=0) for half in found.halves]
+    rerender = (halves[0] + halves[1]) / 2
     surface = prior.depth > 0
     distance = {
         f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
@@ -189,12 +182,7 @@ def _report(
         )
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
-    if not picture.hdr and (pure := _too_pure(picture.linear)) > 0.01:
-        notes.append(
-            f"{pure:.0%} of the photo's pixels have a channel at 0 beside a bright one, purer than any surface with a "
-            "white reflection: there the re-rendering is paler, or the surface became a metal."
-        )
-    if found.doubted:
+    if found.prior_confidence == 1.0:
         notes.append(
             "No light explains the photo with the predicted materials; they were changed to match it, and shadows or "
             "shading may be baked into the albedo."
@@ -207,7 +195,7 @@ def _report(
     return FitReport(
         stages=stages,
         metrics={
-            "rerender_psnr_path": metrics.psnr(rerender, picture.linear),
+            "rerender_psnr_path": metrics.psnr_without_noise(*halves, picture.linear),
             "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
             **distance,
             "clipped_fraction": clipped,

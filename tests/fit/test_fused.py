@@ -8,8 +8,8 @@ import torch
 
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.materials import material_objective
-from materialist.fit.neighbours import neighbours
 from materialist.fit.settings import DEFAULT
+from materialist.fit.variation import edge_weights
 from materialist.render.variant import setup
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 from materialist.transport.shading import shade
@@ -27,16 +27,15 @@ def problem(seed: int = 0, holes: bool = True):
     tables = Tables(draw(count, 9), draw(len(ROUGHNESS_LEVELS), count, 6))
     photo = draw(count, 3)
     photo[::4, 1] = 1.0
-    photo[1::5, 2] = 0.0  # some too pure
-    pairs = neighbours(pixels, rng.random((HEIGHT, WIDTH, 3)).astype(np.float32))
-    return tables, photo, draw(count, 5), pairs, 0.5 + draw(count, 3)
+    edges = edge_weights(pixels, rng.random((HEIGHT, WIDTH, 3)).astype(np.float32))
+    return tables, photo, draw(count, 5), edges, 0.5 + draw(count, 3)
 
 
-def both(tables, photo, prior, pairs, factor, settings):
+def both(tables, photo, prior, edges, factor, settings):
     """The fused objective and its twin in torch."""
     cached = MaterialProblem(lambda m: shade(tables, m[:, :3], m[:, 3], m[:, 4]), tables)
     twin = replace(cached, tables=None)
-    return [material_objective(p, photo, prior, settings, pairs, factor) for p in (cached, twin)]
+    return [material_objective(p, photo, prior, settings, edges, factor) for p in (cached, twin)]
 
 
 def value_and_gradient(objective, maps):
@@ -51,49 +50,36 @@ def value_and_gradient(objective, maps):
 @pytest.mark.parametrize("holes", [False, True])
 def test_equals_the_terms_in_torch(encoding, clipped, holes):
     settings = replace(DEFAULT.materials, encoding=encoding, clipped=clipped, delta=0.7)
-    tables, photo, prior, pairs, factor = problem(1, holes)
+    tables, photo, prior, edges, factor = problem(1, holes)
     rng = np.random.default_rng(2)
     maps = torch.from_numpy(rng.random(prior.shape).astype(np.float32))
-    fused, twin = both(tables, photo, prior, pairs, factor, settings)
+    fused, twin = both(tables, photo, prior, edges, factor, settings)
     value, gradient = value_and_gradient(fused, maps)
     expected, slope = value_and_gradient(twin, maps)
     assert value == pytest.approx(expected, rel=1e-5)
     assert gradient == pytest.approx(slope, rel=1e-3, abs=1e-5 * float(np.abs(slope).max()))
 
 
-def test_what_is_too_pure_tells_of_the_albedo_alone():
-    """A channel at black moves neither roughness nor metallic of a dielectric, and its albedo down."""
-    tables, photo, prior, pairs, _ = problem(4)
-    photo[:, 0], photo[:, 1:], prior[:, 4] = 0.5, 0.0, 0.1
-    red = torch.tensor([[1.0, 0.0, 0.0]])
-    settings = replace(DEFAULT.materials, clipped=True, weights=(0, 0, 0), smooth=(0, 0, 0))
-    for objective in both(tables, photo, prior, pairs, torch.ones(1), settings):
-        _, all_channels = value_and_gradient(objective, prior)
-        assert (all_channels[:, 1:3] > 0).all()
-    for objective in both(tables, photo, prior, pairs, red, settings):  # nothing is rendered but red
-        np.testing.assert_allclose(value_and_gradient(objective, prior)[1][:, 3:], all_channels[:, 3:], atol=1e-7)
-
-
 @pytest.mark.parametrize("term", ["weights", "smooth"])
 def test_each_regulariser_is_there(term):
-    tables, photo, prior, pairs, factor = problem(3)
+    tables, photo, prior, edges, factor = problem(3)
     maps = 1 - prior
     bare = replace(DEFAULT.materials, weights=(0, 0, 0), smooth=(0, 0, 0))
     for k in range(3):
         weights = tuple(0.5 if i == k else 0.0 for i in range(3))
-        fused, twin = both(tables, photo, prior, pairs, factor, replace(bare, **{term: weights}))
-        alone, _ = both(tables, photo, prior, pairs, factor, bare)
+        fused, twin = both(tables, photo, prior, edges, factor, replace(bare, **{term: weights}))
+        alone, _ = both(tables, photo, prior, edges, factor, bare)
         added = value_and_gradient(fused, maps)[0] - value_and_gradient(alone, maps)[0]
         assert added > 1e-3
         assert value_and_gradient(fused, maps)[0] == pytest.approx(value_and_gradient(twin, maps)[0], rel=1e-5)
 
 
 def test_dark_and_out_of_range_materials_stay_finite():
-    tables, photo, prior, pairs, factor = problem(5)
+    tables, photo, prior, edges, factor = problem(5)
     black = Tables(0 * tables.diffuse, 0 * tables.specular)
     for maps in (torch.zeros_like(prior), torch.ones_like(prior)):
         for given in (tables, black):
-            fused, twin = both(given, photo, prior, pairs, factor, DEFAULT.materials)
+            fused, twin = both(given, photo, prior, edges, factor, DEFAULT.materials)
             value, gradient = value_and_gradient(fused, maps)
             assert np.isfinite(value) and np.isfinite(gradient).all()
             assert value == pytest.approx(value_and_gradient(twin, maps)[0], rel=1e-5)
@@ -101,8 +87,8 @@ def test_dark_and_out_of_range_materials_stay_finite():
 
 def test_gradient_is_the_finite_difference():
     settings = replace(DEFAULT.materials, clipped=False)
-    tables, photo, prior, pairs, factor = problem(7)
-    fused, _ = both(tables, photo, prior, pairs, factor, settings)
+    tables, photo, prior, edges, factor = problem(7)
+    fused, _ = both(tables, photo, prior, edges, factor, settings)
     maps = prior + 0.03
     _, gradient = value_and_gradient(fused, maps)
     rng, step = np.random.default_rng(8), 1e-3
@@ -112,3 +98,19 @@ def test_gradient_is_the_finite_difference():
         ends = [fused(maps + s * direction).item() for s in (step, -step)]
         expected = float((torch.from_numpy(gradient) * direction).sum())
         assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(expected, rel=0.1, abs=2e-4)
+
+
+def test_total_variation_equals_a_loop():
+    rng = np.random.default_rng(0)
+    guide = rng.random((HEIGHT, WIDTH, 3)).astype(np.float32) * 0.3
+    pixels = np.sort(rng.permutation(HEIGHT * WIDTH)[:40])
+    values = rng.random((40, 2)).astype(np.float32)
+    row_of, total = {int(p): k for k, p in enumerate(pixels)}, np.zeros(2)
+    for p in pixels:
+        i, j = divmod(int(p), WIDTH)
+        for a, b in ((i + 1, j), (i, j + 1)):
+            if a < HEIGHT and b < WIDTH and (q := a * WIDTH + b) in row_of:
+                weight = np.exp(-np.abs(guide[a, b] - guide[i, j]).max() / 0.1)
+                total += weight * np.abs(values[row_of[q]] - values[row_of[int(p)]])
+    measured = edge_weights(pixels, guide).total_variation(torch.from_numpy(values))
+    np.testing.assert_allclose(measured, total / 40, rtol=1e-5)

@@ -1,5 +1,7 @@
 """Losses against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -12,9 +14,10 @@ from materialist.fit.losses import (
     l1_l2,
     log_chroma,
     log_total_variation,
+    loss_weights,
     residual,
-    too_pure,
 )
+from materialist.fit.settings import DEFAULT, PAPER
 
 
 def test_srgb_encoding_is_the_packages():
@@ -52,25 +55,32 @@ def test_clipped_channels_are_wrong_on_one_side_only():
     torch.testing.assert_close(residual(brighter, photo, "linear", clipped=False), torch.full((1, 3), 0.4))
 
 
-def test_colours_that_are_too_pure_are_no_error_of_light():
-    """Orange without any blue; a shadow is dark in all channels, and known."""
-    photo = torch.tensor([[0.7, 0.06, 0.0], [0.01, 0.001, 0.0], [0.7, 0.06, 0.01]])
-    assert too_pure(photo).tolist() == [[False, False, True], [False] * 3, [False] * 3]
-    error = residual(photo + 0.04, photo, "linear", clipped=True, pure=too_pure(photo))
-    torch.testing.assert_close(error, torch.tensor([[0.04, 0.04, 0], [0.04] * 3, [0.04] * 3]))
-    for options in ({"clipped": True}, {"clipped": False, "pure": too_pure(photo)}):
-        torch.testing.assert_close(residual(photo + 0.04, photo, "linear", **options), torch.full((3, 3), 0.04))
-
-
 def test_l1_plus_l2():
     assert float(l1_l2(torch.tensor([1.0, -3.0]))) == pytest.approx(2 + 5)
 
 
+def maps_of(metallic):
+    """[P, 5], all else 0.4."""
+    maps = torch.full((len(metallic), 5), 0.4)
+    maps[:, 4] = torch.tensor(metallic)
+    return maps
+
+
 def test_consistency_is_the_papers_weighted_sum():
-    maps = [torch.zeros(4, 3), torch.zeros(4, 1), torch.zeros(4, 1)]
-    prior = [torch.full((4, 3), -0.3), torch.full((4, 1), 0.5), torch.full((4, 1), 0.2)]
-    assert float(consistency(maps, prior)) == pytest.approx(1.0)
-    assert float(consistency(maps, prior, (2.0, 0.0, 10.0))) == pytest.approx(0.6 + 2.0)
+    """delta times the sum of mean L1 distances of albedo, roughness and metallic."""
+    prior = maps_of([0.5] * 4)
+    maps = prior + torch.tensor([0.3, 0.3, 0.3, 0.5, 0.2])
+    assert float(consistency(maps, prior, loss_weights(prior, PAPER.materials))) == pytest.approx(0.5 * 1.0)
+    weighed = replace(PAPER.materials, delta=1.0, weights=(2.0, 0.0, 10.0))
+    assert float(consistency(maps, prior, loss_weights(prior, weighed))) == pytest.approx(0.6 + 2.0)
+
+
+def test_metallic_weighs_more_where_the_prior_is_sure_of_a_dielectric():
+    settings = DEFAULT.materials
+    found = loss_weights(maps_of([0.0, settings.surely_below / 2, settings.surely_below, 0.7]), settings)
+    most, metal = settings.metal_factor, settings.weights[2]
+    assert found[:, 4].tolist() == pytest.approx([metal * most, metal * (1 + most) / 2, metal, metal])
+    assert found[:, 3].tolist() == pytest.approx([settings.weights[1]] * 4)
 
 
 def test_log_total_variation_equals_a_loop():
@@ -80,19 +90,6 @@ def test_log_total_variation_equals_a_loop():
         abs(float(log_map[i, (j + 1) % 8, c] - log_map[i, j, c])) for i in range(4) for j in range(8) for c in range(3)
     ]
     assert float(log_total_variation(log_map)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
-
-
-def test_weighted_variation_takes_the_heavier_texel_of_each_pair():
-    log_map = torch.randn(3, 6, 3, generator=torch.Generator().manual_seed(2))
-    weight = 1 + torch.rand(3, 6, generator=torch.Generator().manual_seed(3))
-
-    def price(a: tuple[int, int], b: tuple[int, int]) -> float:
-        return float((log_map[a] - log_map[b]).abs().mean() * max(weight[a], weight[b]))
-
-    down = [price((i + 1, j), (i, j)) for i in range(2) for j in range(6)]
-    right = [price((i, (j + 1) % 6), (i, j)) for i in range(3) for j in range(6)]
-    assert float(log_total_variation(log_map, weight)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
-    assert float(log_total_variation(log_map, torch.ones(3, 6))) == pytest.approx(float(log_total_variation(log_map)))
 
 
 def test_grey_has_no_chroma():

@@ -1,33 +1,20 @@
-"""Prices of leaving the prior, and the second start for metallic."""
+"""The second start for metallic."""
 
 from dataclasses import replace
 
-import pytest
 import torch
 
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.materials import DIELECTRIC, better_start, prices
-from materialist.fit.settings import DEFAULT, PAPER
+from materialist.fit.materials import better_start
+from materialist.fit.settings import DEFAULT
 
-SETTINGS = replace(DEFAULT.materials, clipped=False)
+SETTINGS = replace(DEFAULT.materials, clipped=False, second_steps=1)
 
 
 def priors(metallic):
     maps = torch.full((len(metallic), 5), 0.4)
     maps[:, 4] = torch.tensor(metallic)
     return maps
-
-
-def test_metal_is_dearer_where_the_prior_says_dielectric():
-    found = prices(priors([0.0, DIELECTRIC[1] / 2, DIELECTRIC[1], 0.7]), SETTINGS)
-    albedo, rough, metal = SETTINGS.weights
-    assert found[:, 0].tolist() == pytest.approx([albedo] * 4) and found[:, 1].tolist() == pytest.approx([rough] * 4)
-    most = SETTINGS.dielectric
-    assert found[:, 2].tolist() == pytest.approx([metal * most, metal * (1 + most) / 2, metal, metal])
-
-
-def test_the_papers_prices_are_the_same_everywhere():
-    assert prices(priors([0.0, 0.5]), PAPER.materials).tolist() == [[1, 1, 1], [1, 1, 1]]
 
 
 def start_of(metallic, gain, **changes):
@@ -37,22 +24,22 @@ def start_of(metallic, gain, **changes):
     # Rendering errs by `gain` for a dielectric, and not at all for a metal; nothing else matters.
     problem = MaterialProblem(lambda m: photo + gain * (m[:, 4:].detach() < 0.5) + 0 * m[:, :3], None)
     settings = replace(SETTINGS, encoding="linear", **changes)
-    return better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost, steps=1)[:, 4].mean().item()
+    return better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost)[:, 4].mean().item()
 
 
 def test_a_surface_becomes_a_metal_only_where_it_gains_more_than_its_price():
-    cheap, dear = (SETTINGS.weights[2] * factor for factor in (1, SETTINGS.dielectric))
+    cheap, dear = (SETTINGS.weights[2] * factor for factor in (1, SETTINGS.metal_factor))
     assert start_of(0.3, 1.5 * cheap) > 0.9  # the prior is not sure
     assert start_of(0.0, 1.5 * cheap) < 0.1
     assert start_of(0.0, 2.5 * dear) > 0.9
-    assert start_of(0.0, 1.5 * cheap, dielectric=1.0) > 0.9
+    assert start_of(0.0, 1.5 * cheap, metal_factor=1.0) > 0.9
 
 
 def test_where_the_prior_says_dielectric_metal_must_win_clearly():
     price = SETTINGS.weights[2] * 0.95
-    between = price + SETTINGS.doubt / 2
-    assert start_of(0.0, between, dielectric=1.0) < 0.1
-    assert start_of(0.0, between, dielectric=1.0, doubt=0.0) > 0.9
+    between = price + SETTINGS.metal_margin / 2
+    assert start_of(0.0, between, metal_factor=1.0) < 0.1
+    assert start_of(0.0, between, metal_factor=1.0, metal_margin=0.0) > 0.9
 
 
 def test_a_region_of_one_metallic_decides_as_one():
@@ -66,7 +53,7 @@ def test_a_region_of_one_metallic_decides_as_one():
     settings = replace(SETTINGS, encoding="linear")
 
     def found(inside):
-        start = better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost, inside=inside, steps=1)
+        start = better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost, inside=inside)
         return (start[:, 4] > 0.5).tolist()
 
     assert found(None) == [True, True, False, False]

@@ -14,13 +14,12 @@ from materialist import metrics
 from materialist.bench.benchmark import Benchmark
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
-from materialist.fit.attempt import FULL, Job
 from materialist.fit.engine import prepared_envmap
+from materialist.fit.invert import FULL, FitSetup, Inversion
 from materialist.fit.light import envmap_field, fit_light
-from materialist.fit.loop import Schedule
 from materialist.fit.losses import l1_l2, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
-from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage
+from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials, Prediction
 
@@ -119,23 +118,23 @@ class _Photo:
 
         return opened(self.predictor, self.device).predict(self.sample.photo, seed=self.seed)
 
-    def begun(self, prior: Prediction) -> Any:
+    def prepared(self, prior: Prediction) -> Any:
         """Mesh, path tracer and traced transport of a prior."""
-        job = Job(
-            self.sample.photo, prior, PAPER, "transport", self.sample.envmap.shape[0], 6.0, None, "default", self.seed,
-            self.device, self.spp, None, lambda *_: None,
+        height = self.sample.envmap.shape[0]
+        setup = FitSetup(
+            self.sample.photo, prior, PAPER, FULL, envmap_height=height, seed=self.seed, device=self.device
         )  # fmt: skip
-        begun: Any = job.begin(FULL)
-        begun.fit.engine.cache.trace()
-        return begun
+        prepared: Any = Inversion(setup).prepare()
+        prepared.fit.engine.cache.trace()
+        return prepared
 
     @cached_property
     def fitted(self) -> tuple[Any, Array]:
         """The engine of the prior, and the light that the paper's fit finds for it."""
-        begun = self.begun(self.prior)
-        engine, light = begun.fit.engine, envmap_field(PAPER.light, seed=self.seed)
+        prepared = self.prepared(self.prior)
+        engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=self.seed)
         fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=self.seed)
-        return begun, prepared_envmap(light(PAPER.light.height), self.sample.envmap.shape[0])
+        return prepared, prepared_envmap(light(PAPER.light.height), self.sample.envmap.shape[0])
 
     def materials(
         self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False
@@ -143,8 +142,8 @@ class _Photo:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
         import torch
 
-        begun, envmap = self.fitted
-        engine: Any = begun.fit.engine
+        prepared, envmap = self.fitted
+        engine: Any = prepared.fit.engine
         prior = _maps(self.prior.materials, engine.pixels)
         if blind:
             prior[:, 3:] = 0.5
@@ -164,7 +163,7 @@ class _Photo:
         with torch.no_grad():
             maps = model()
             render(maps)
-        picture = begun.judge(_materials(maps, engine.pixels, self.prior), envmap, self.spp, self.seed + 1)
+        picture = prepared.fit.reference(_materials(maps, engine.pixels, self.prior), envmap, self.spp, self.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
 
@@ -238,7 +237,7 @@ def _fov(photo: _Photo) -> Iterator[dict[str, Any]]:
 
 def _light(photo: _Photo) -> Iterator[dict[str, Any]]:
     """Table sh: how fast the light explains the photo, true materials given."""
-    engine = photo.begun(photo.sample.truth).fit.engine
+    engine = photo.prepared(photo.sample.truth).fit.engine
     problem = engine.light_problem(photo.sample.truth.materials)
     schedule = Schedule(max_steps=max(photo.bench.short, photo.longest), patience=0)
     for field, name in LIGHTS.items():

@@ -7,7 +7,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from materialist.bench.benchmark import Benchmark
 from materialist.bench.invert import Case, inversion, photo_case
@@ -26,6 +26,8 @@ COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class BesideBench(Benchmark):
+    least: ClassVar[dict[str, int]] = {"size": 16, "runs": 1}
+
     """Invert one photo alone and twice at once, `runs` times; `data`, `photo` and `size` as in `bench invert`."""
 
     size: int = 256

@@ -41,7 +41,7 @@ class Background:
 
 def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
     """Where walls end as `invert` finds it from the exposed photo [H, W, 3] linear in [0, 1] and the true maps."""
-    from materialist.fit.ends import find_ends
+    from materialist.fit.plane_extents import find_extents
     from materialist.fit.settings import preset
     from materialist.types import Materials, Prediction
 
@@ -54,7 +54,7 @@ def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
     )
     if not (truth.depth > 0).any():
         return ()
-    found = find_ends(photo, truth, scene.camera, preset("default"))
+    found = find_extents(photo, truth, scene.camera, preset("default"))
     return found.ends if found else ()
 
 

@@ -218,9 +218,8 @@ def _stages(report: dict[str, Any], seconds: float) -> dict[str, float]:
     """Seconds by stage, repeated stages added up; `other` is what no stage claims, start and writing among it."""
     spent: Counter[str] = Counter()
     for stage in report["stages"]:
-        # The light that tests the prior, and the look at the first one, count as light; stages named by what they
-        # move, as the paper's, as materials.
-        name = {"trust": "light", "glance": "light", "trace": "engine"}.get(stage["name"], stage["name"])
+        # Stages named by what they move, as the paper's, count as materials.
+        name = {"prior light": "light", "trace": "engine"}.get(stage["name"], stage["name"])
         name = name if name in STAGES else "materials"
         spent[name] += stage["seconds"]
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}

@@ -243,17 +243,15 @@ def fit(
     steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
     import torch
 
-    from materialist.fit.attempt import Job
+    from materialist.fit.alternation import paste_visible_sky
     from materialist.fit.engine import PathEngine, prepared_envmap
-    from materialist.fit.inverse import paste_visible_sky
+    from materialist.fit.invert import FitSetup, Inversion
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
-    from materialist.render.scene import RenderScene
 
     photo, truth = sample.photo, sample.truth
     named = preset(method.preset)
-    # Given materials are not to be doubted: no slack of albedo.
-    light = replace(named.light, slack=None) if method.given else named.light
+    light = replace(named.light, albedo_relaxation=None) if method.given else named.light
     light = replace(light, field=method.field or light.field, height=method.height or light.height)
     height = sample.envmap.shape[0]
     surface = truth.depth > 0
@@ -263,11 +261,9 @@ def fit(
         pixels = np.flatnonzero(surface.reshape(-1))
         engine = PathEngine(mesh, photo.camera, pixels, envmap_height=method.path_height, seed=seed)
     else:
-        job = Job(
-            photo, given, named, "transport", height, 6.0, None, "default", seed, device, 0, None, lambda *_: None
-        )
-        begun, _ = job.choose(completion)
-        engine, mesh = begun.fit.engine, RenderScene(begun.geometry, photo.camera, device=device)
+        setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
+        prepared = Inversion(setup).prepare()
+        engine, mesh = prepared.fit.engine, prepared.renderer
     problem = engine.light_problem(given.materials)
     field = envmap_field(light, seed=seed)
     result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)

@@ -52,8 +52,8 @@ def _seconds_per_step(engine: Any, problem: Any, photo: Photo, prior: Prediction
 
     from materialist.color import linear_to_srgb
     from materialist.fit.materials import fit_materials, material_field
-    from materialist.fit.neighbours import neighbours
     from materialist.fit.settings import preset
+    from materialist.fit.variation import edge_weights
 
     settings = preset("default", hdr=photo.hdr).materials
     last = settings.stages[-1]
@@ -64,11 +64,11 @@ def _seconds_per_step(engine: Any, problem: Any, photo: Photo, prior: Prediction
     flat = [m.reshape(photo.camera.width * photo.camera.height, -1) for m in _arrays(maps)]
     held = torch.from_numpy(np.concatenate(flat, 1).astype(np.float32))[engine.pixels]
     field = material_field(held, settings, engine.pixels, photo.camera, seed=0)
-    pairs = neighbours(pixels, linear_to_srgb(photo.linear)) if any(settings.smooth) else None
+    edges = edge_weights(pixels, linear_to_srgb(photo.linear)) if any(settings.smooth) else None
     target = torch.from_numpy(np.ascontiguousarray(photo.linear.reshape(-1, 3)))[engine.pixels]
     moments = [time.perf_counter()]
     tick = lambda *_: moments.append(time.perf_counter())  # noqa: E731
-    fit_materials(problem, target, field, held, settings, pairs, progress=tick)
+    fit_materials(problem, target, field, held, settings, edges, progress=tick)
     return list(np.diff(moments))
 
 

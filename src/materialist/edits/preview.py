@@ -44,16 +44,16 @@ class Preview:
 
         setup(device)
         from materialist.fit.engine import TransportEngine
-        from materialist.transport.cache import TransportCache
+        from materialist.transport.cache import CacheSettings, TransportCache
         from materialist.transport.filter import taps
 
         self.scene = scene
         self._engine = TransportEngine(
-            scene.geometry, scene.camera, scene.rerender, seed=seed, diffuse_samples=diffuse_samples,
-            specular_samples=specular_samples, progress=progress,
+            scene.geometry, scene.camera, scene.rerender, seed=seed,
+            cache=CacheSettings(diffuse_samples, specular_samples), progress=progress,
         )  # fmt: skip
         # A few rays a pixel are enough for what surfaces pass on: it is averaged again where it arrives.
-        self._quick = TransportCache(scene.geometry, scene.camera, seed=seed, diffuse_samples=8, specular_samples=1)
+        self._quick = TransportCache(scene.geometry, scene.camera, CacheSettings(8, 1), seed=seed)
         self._tables = self._engine.tables(scene.envmap)
         self._taps = list(taps(self._engine.guide))
         self._other: tuple[Array, OtherLight] | None = None

@@ -14,7 +14,7 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.fit.fields import resize_envmap
-from materialist.transport.cache import Tables, TransportCache
+from materialist.transport.cache import CacheSettings, Tables, TransportCache
 from materialist.transport.filter import Guide, filter_tables
 from materialist.transport.light import LightMatrix, bilinear, light_matrix
 from materialist.transport.shading import shade
@@ -53,8 +53,8 @@ class Engine(Protocol):
     pixels: torch.Tensor
     """[P] int64 row-major pixels with a surface."""
 
-    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
-        """Rendering as a function of the light; `height`: rows of its map, where the engine lets one choose."""
+    def light_problem(self, materials: Materials) -> LightProblem:
+        """Rendering as a function of the light."""
         ...
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
@@ -68,7 +68,8 @@ class TransportEngine:
     Args:
         radiance: [H, W, 3] what the surfaces send to each other, until `set_radiance` replaces it: the photograph.
         light_height: rows of the environment map inside the light fit.
-        light_pixels: size of the pixel subset of the light fit.
+        light_pixels, least_pixels: size of the pixel subset of the light fit: the first is a share of the whole
+            picture, so that a small surface before the sky would get few; it gets at least the second, where it can.
     """
 
     name = "transport"
@@ -82,16 +83,13 @@ class TransportEngine:
         seed: int = 0,
         light_height: int = 32,
         light_pixels: int = 4096,
-        diffuse_samples: int = 64,
-        specular_samples: int = 16,
+        least_pixels: int = 256,
+        cache: CacheSettings | None = None,
         progress=None,
     ):
-        self.cache = TransportCache(
-            geometry, camera, seed=seed, diffuse_samples=diffuse_samples, specular_samples=specular_samples,
-            progress=progress,
-        )  # fmt: skip
+        self.cache = TransportCache(geometry, camera, cache or CacheSettings(), seed=seed, progress=progress)
         self.camera, self.seed = camera, seed
-        self.light_height, self.light_pixels = light_height, light_pixels
+        self.light_height, self.light_pixels, self.least_pixels = light_height, light_pixels, least_pixels
         self.radiance = radiance
         self._last: tuple[Materials, Array, LightProblem] | None = None
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
@@ -102,24 +100,22 @@ class TransportEngine:
         """Take [H, W, 3] as what the surfaces send to each other from now on."""
         self.radiance = radiance
 
-    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
-        # The same question is asked twice in a row: how far to trust the prior, and then what light it wants.
-        height = height or self.light_height
+    def light_problem(self, materials: Materials) -> LightProblem:
+        # Asked twice in a row: for the prior's error, and then for the first light.
         last = self._last
-        if last and last[0] is materials and last[1] is self.radiance and last[2].height == height:
+        if last and last[0] is materials and last[1] is self.radiance:
             return last[2]
-        problem = self._light_problem(materials, height)
+        problem = self._light_problem(materials)
         self._last = (materials, self.radiance, problem)
         return problem
 
-    def _light_problem(self, materials: Materials, height: int) -> LightProblem:
+    def _light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)
-        # Of a speck before the sky, all pixels: a share of them may be none.
-        rows = _subset(rng, count, min(1.0, max(share, FEWEST / max(count, 1))))
+        rows = _subset(rng, count, min(1.0, max(share, self.least_pixels / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
-        matrix = light_matrix(self.cache, materials, rows, height)
+        matrix = light_matrix(self.cache, materials, rows, self.light_height)
         indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
@@ -131,7 +127,7 @@ class TransportEngine:
             return torch.cat([matrix.combine(matrix.direct(flat) + indirect, albedo), seen])
 
         pixels = torch.cat([matrix.pixels, torch.from_numpy(sky.astype(np.int64))])
-        return LightProblem(pixels, height, render, matrix)
+        return LightProblem(pixels, self.light_height, render, matrix)
 
     def tables(self, envmap: Array) -> Tables:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""
@@ -172,7 +168,7 @@ class PathEngine:
             *maps_and_envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
         )
 
-    def light_problem(self, materials: Materials, height: int | None = None) -> LightProblem:
+    def light_problem(self, materials: Materials) -> LightProblem:
         maps = [
             torch.from_numpy(np.ascontiguousarray(m))
             for m in (materials.albedo, materials.roughness, materials.metallic)
@@ -197,10 +193,6 @@ class PathEngine:
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
     """[height, 2 height, 3] float32 numpy map from a torch map of any size."""
     return resize_envmap(envmap.detach(), height).contiguous().numpy().astype(np.float32)
-
-
-FEWEST = 256
-"""Surface pixels that the light is fitted to at least, where there are as many."""
 
 
 def _subset(rng, size: int, share: float) -> Array:

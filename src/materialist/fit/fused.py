@@ -15,10 +15,9 @@ import torch
 
 from materialist.bsdf.disney import DIELECTRIC_R0, base_reflectance, combine, quadratic
 from materialist.buffers import floats, integers
-from materialist.fit.losses import CLIPPED, Encoding, encode
-from materialist.fit.materials import prices, pure_dielectric
-from materialist.fit.neighbours import Neighbours
-from materialist.fit.settings import MaterialSettings
+from materialist.fit.losses import CLIPPED, encode, loss_weights, per_value
+from materialist.fit.settings import Encoding, MaterialSettings
+from materialist.fit.variation import EdgeWeights
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 
@@ -29,7 +28,7 @@ class FusedLoss:
         tables: transport under the light.
         factor: [P, 3] (or [1]) multiplies the rendering.
         photo: [P, 3] linear. prior: [P, 5].
-        neighbours: for the smoothness, or None.
+        edges: for the smoothness, or None.
     """
 
     def __init__(
@@ -39,27 +38,20 @@ class FusedLoss:
         photo: torch.Tensor,
         prior: torch.Tensor,
         settings: MaterialSettings,
-        neighbours: Neighbours | None,
+        edges: EdgeWeights | None,
     ):
         count = len(photo)
         self.count, self.encoding, self.clipped = count, settings.encoding, settings.clipped
         target = encode(photo, settings.encoding)
-        if settings.clipped:
-            # Beyond this, a rendering is no error: a channel that is not clipped never gets there.
-            roof = torch.where(photo >= CLIPPED, target, torch.full_like(target, torch.inf))
-            told = (~pure_dielectric(photo, prior)).float()
-        else:
-            roof = torch.full_like(target, torch.inf)
-            told = torch.ones_like(target)
-        columns, per_value = [0, 0, 0, 1, 2], torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-        held = settings.delta * prices(prior, settings)[:, columns] * per_value / count
+        roof = torch.full_like(target, torch.inf)
+        if settings.clipped:  # above its encoded value, a rendering is no error
+            roof = torch.where(photo >= CLIPPED, target, roof)
+        held = loss_weights(prior, settings) / count
         self._constants = [
-            _flat(v)
-            for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, told, prior, held)
+            _flat(v) for v in (tables.diffuse, tables.specular, factor.expand(count, 3), target, roof, prior, held)
         ]
-        smooth = torch.tensor([settings.smooth[k] for k in columns]) * per_value / count
-        self._smooth = _flat(smooth)
-        self._links = None if neighbours is None or not any(settings.smooth) else _links(neighbours)
+        self._smooth = _flat(per_value(settings.smooth) / count)
+        self._links = None if edges is None or not any(settings.smooth) else _links(edges)
 
     def __call__(self, maps: torch.Tensor) -> torch.Tensor:
         """Loss (a scalar that can be differentiated) of materials [P, 5]."""
@@ -86,7 +78,7 @@ class _Apply(torch.autograd.Function):
 
 def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     """Per-pixel loss, and five arrays of gradients."""
-    diffuse, specular, factor, target, roof, told, prior, held = constants
+    diffuse, specular, factor, target, roof, prior, held = constants
     lane: Any = dr.arange(mi.UInt32, objective.count)
     value: list[Any] = [dr.gather(mi.Float, maps, lane * 5 + k) for k in range(5)]
     albedo: Any = mi.Color3f(*value[:3])
@@ -106,7 +98,6 @@ def _kernel(maps, constants, smooth, links, objective: FusedLoss):
     up = dr.select(live, (_sign(error) + 2 * error) * share * slope * scale, 0)
 
     by_albedo = up * ((1 - metal) * body + metal * s0)
-    up *= dr.gather(mi.Color3f, told, lane)  # what is too pure tells of the albedo alone
     by_rough = dr.sum(up * (albedo * (1 - metal) * (d1 + 2 * rough * d2) + base * slope0 + slope1))
     by_metal = dr.sum(up * ((albedo - DIELECTRIC_R0) * s0 - albedo * body))
     gradient = [by_albedo.x, by_albedo.y, by_albedo.z, by_rough, by_metal]
@@ -170,17 +161,17 @@ def _variation(maps, prior, links, lane, change, k: int):
     return cost, pull
 
 
-def _links(neighbours: Neighbours):
+def _links(edges: EdgeWeights):
     """(lane of the neighbour, weight) below, to the right, above and to the left of each surface pixel."""
-    height, width = neighbours.right.shape[0], neighbours.down.shape[1]
-    pixels = neighbours.pixels.numpy()
+    height, width = edges.right.shape[0], edges.down.shape[1]
+    pixels = edges.pixels.numpy()
     flat = np.zeros(height * width, np.uint32)
     flat[pixels] = np.arange(len(pixels), dtype=np.uint32)
     lane = flat.reshape(height, width)
     weight = np.zeros((4, height, width), np.float32)
     other = np.zeros((4, height, width), np.uint32)
-    weight[0, :-1] = weight[2, 1:] = neighbours.down.numpy()
-    weight[1, :, :-1] = weight[3, :, 1:] = neighbours.right.numpy()
+    weight[0, :-1] = weight[2, 1:] = edges.down.numpy()
+    weight[1, :, :-1] = weight[3, :, 1:] = edges.right.numpy()
     other[0, :-1], other[2, 1:] = lane[1:], lane[:-1]
     other[1, :, :-1], other[3, :, 1:] = lane[:, 1:], lane[:, :-1]
     rows = zip(other.reshape(4, -1)[:, pixels], weight.reshape(4, -1)[:, pixels], strict=True)

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import torch
+
+from materialist.fit.settings import Encoding, MaterialSettings
 
 CLIPPED = 0.99
 """Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
-
-PURE = (1e-3, 0.1)
-"""Linear value up to which a channel is black, and that of the brightest channel from which that is no shadow."""
-
-Encoding = Literal["linear", "srgb", "log1p"]
 
 
 def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
@@ -25,27 +20,10 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def too_pure(photo: torch.Tensor) -> torch.Tensor:
-    """[..., 3] bool: channels at black in pixels of [..., 3] linear that are not dark.
-
-    Such a colour is purer than the photo's file can hold, and than any surface whose reflection is white shows: the
-    channel says how little the albedo has of it, and nothing of light, roughness and metallic.
-    """
-    return (photo <= PURE[0]) & (photo.amax(-1, keepdim=True) >= PURE[1])
-
-
-def residual(
-    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool, pure: torch.Tensor | None = None
-) -> torch.Tensor:
-    """Encoded rendering minus encoded photo, [..., 3].
-
-    With `clipped`, no error where it outshines a clipped channel, or one of those that are `pure` [..., 3] bool.
-    """
+def residual(radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool) -> torch.Tensor:
+    """Encoded rendering minus encoded photo, [..., 3]; with `clipped`, no error above a clipped channel."""
     error = encode(radiance, encoding) - encode(photo, encoding)
-    if not clipped:
-        return error
-    bound = photo >= CLIPPED if pure is None else (photo >= CLIPPED) | pure
-    return torch.where(bound, error.clamp_max(0), error)
+    return torch.where(photo >= CLIPPED, error.clamp_max(0), error) if clipped else error
 
 
 def l1_l2(error: torch.Tensor) -> torch.Tensor:
@@ -53,13 +31,35 @@ def l1_l2(error: torch.Tensor) -> torch.Tensor:
     return error.abs().mean() + error.square().mean()
 
 
-def consistency(materials, prior, weights=(1.0, 1.0, 1.0)) -> torch.Tensor:
-    """L_cons: weighted sum over albedo, roughness, metallic of the mean L1 distance to the prior.
+def loss_weights(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
+    """[P, 5] weights of |change| in delta L_cons, for each value of the prior [P, 5].
 
-    A weight is a number, or [P] one for each pixel.
+    Metallic weighs more where the prior is sure of a dielectric.
     """
-    columns = lambda x: x.reshape(len(x), -1).mean(1)  # noqa: E731  [P], also of albedo [P, 3]
-    return sum((w * columns((x - p).abs())).mean() for x, p, w in zip(materials, prior, weights, strict=True))
+    rows = settings.delta * per_value(settings.weights).repeat(len(prior), 1)
+    rows[:, 4] *= metal_factor(prior, settings)
+    return rows
+
+
+def per_value(weights: tuple[float, float, float]) -> torch.Tensor:
+    """[5] for the values of a pixel, of weights of albedo (the mean over its channels), roughness and metallic."""
+    albedo, roughness, metallic = weights
+    return torch.tensor([albedo / 3] * 3 + [roughness, metallic], dtype=torch.float32)
+
+
+def metal_factor(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
+    """[P] factor on the weight of metallic, by the prior [P, 5]: `settings.metal_factor` at 0, falling to 1."""
+    return 1 + (settings.metal_factor - 1) * fall_off(prior[:, 4], settings.surely_below)
+
+
+def fall_off(values: torch.Tensor, limit: float) -> torch.Tensor:
+    """1 at 0, falling linearly to 0 at the limit."""
+    return 1 - (values / limit).clamp(0, 1)
+
+
+def consistency(maps: torch.Tensor, prior: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+    """delta L_cons: mean over pixels of the weighted L1 distance of maps [P, 5] to the prior [P, 5]."""
+    return ((maps - prior).abs() * weights).sum(1).mean()
 
 
 def log_total_variation(log_map: torch.Tensor, weight: torch.Tensor | None = None) -> torch.Tensor:

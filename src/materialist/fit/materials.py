@@ -11,16 +11,14 @@ from torch import nn
 from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
-from materialist.fit.loop import Progress, StageResult, optimise
-from materialist.fit.losses import consistency, l1_l2, residual, too_pure
-from materialist.fit.neighbours import Neighbours
+from materialist.fit.fused import FusedLoss
+from materialist.fit.losses import consistency, fall_off, l1_l2, loss_weights, metal_factor, per_value, residual
+from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import MaterialSettings, MaterialStage
+from materialist.fit.variation import EdgeWeights
 from materialist.types import Camera
 
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
-
-DIELECTRIC = (0.2, 0.04)
-"""Predicted metallic below which a surface may be, and is, a dielectric, the surer the lower."""
 
 
 def remapped(prior: torch.Tensor) -> torch.Tensor:
@@ -46,95 +44,27 @@ def material_field(
     return field if inside is None else Unified(field, inside)
 
 
-def prices(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
-    """[P, 3] weights of albedo, roughness and metallic in L_cons: metal is dearer where the prior says dielectric."""
-    rows = torch.tensor(settings.weights, dtype=torch.float32).repeat(len(prior), 1)
-    rows[:, 2] *= _dearer(prior, settings)
-    return rows
-
-
-def _dearer(prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
-    """[P] how many times dearer metal is than its weight."""
-    return 1 + (settings.dielectric - 1) * _below(prior[:, 4], DIELECTRIC[1])
-
-
-def _below(metallic: torch.Tensor, limit: float) -> torch.Tensor:
-    """1 at 0, 0 from the limit."""
-    return 1 - (metallic / limit).clamp(0, 1)
-
-
-def pure_dielectric(photo: torch.Tensor, prior: torch.Tensor) -> torch.Tensor:
-    """[P, 3] bool: channels of photo [P, 3] that are `too_pure`, where the prior [P, 5] says dielectric.
-
-    A metal's reflection is coloured, so that it can be what the photo shows.
-    """
-    return too_pure(photo) & (prior[:, 4:] < DIELECTRIC[0])
-
-
-def better_start(
-    problem: MaterialProblem,
-    photo: torch.Tensor,
-    start: torch.Tensor,
-    prior: torch.Tensor,
-    settings: MaterialSettings,
-    smooth: Callable[[torch.Tensor], torch.Tensor],
-    *,
-    inside: torch.Tensor | None = None,
-    steps: int = 25,
-    progress: Progress | None = None,
-) -> torch.Tensor:
-    """[P, 5] maps to start from: `start`, or where it fits better after `steps` steps, another metallic.
-
-    `smooth` averages a cost [P, 1] over each pixel's surroundings, so that whole regions decide; pixels `inside` [P]
-    bool, which get one metallic (see `Unified`), decide together. Where the prior says dielectric, the other start must
-    win by `settings.doubt`: what fits either way stays what it was.
-    """
-    assert settings.other_metallic is not None
-    other = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.other_metallic)], 1)
-    share = torch.tensor([1 / 3, 1 / 3, 1 / 3, 1, 1])
-    price = settings.delta * share * prices(prior, settings)[:, [0, 0, 0, 1, 2]]
-    short = [MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=steps)) for s in settings.stages[-1:]]
-    candidates, costs = [], []
-    for maps in (start, other):
-        field = MaterialMaps(maps)
-        fit_materials(problem, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
-        with torch.no_grad():
-            error = residual(
-                problem.render(field()), photo, settings.encoding, clipped=settings.clipped,
-                pure=pure_dielectric(photo, prior),
-            )  # fmt: skip
-            cost = (error.abs() + error.square()).mean(1) + ((field() - prior).abs() * price).sum(1)
-        candidates.append(field().detach())
-        costs.append(smooth(cost[:, None]))
-    doubt = settings.doubt * _below(prior[:, 4], DIELECTRIC[0]) * _dearer(prior, settings)
-    gain = costs[0] - costs[1] - smooth(doubt[:, None])  # of the other start
-    if inside is not None:
-        gain = torch.where(inside[:, None], gain[inside].mean(), gain)
-    return torch.where(gain > 0, candidates[1], candidates[0])
-
-
 def fit_materials(
     problem: MaterialProblem,
     photo: torch.Tensor,
     field: nn.Module,
     prior: torch.Tensor,
     settings: MaterialSettings,
-    neighbours: Neighbours | None = None,
+    edges: EdgeWeights | None = None,
     *,
     factor: torch.Tensor | None = None,
     progress: Progress | None = None,
 ) -> list[StageResult]:
-    """Move `field` stage by stage: argmin L_re + delta L_cons.
+    """Move `field` stage by stage: argmin L_re + delta L_cons + smoothness.
 
     Args:
         problem: rendering under a fixed light.
         photo: [P, 3] linear.
         prior: [P, 5] the maps that L_cons holds on to.
-        neighbours: pixel pairs for the smoothness term; needed when `settings.smooth` is not zero.
+        edges: for the smoothness of the change; needed when `settings.smooth` is not zero.
         factor: [P, 3] multiplies the rendering: what the renderer is known to get wrong.
     """
-    factor = torch.ones(1) if factor is None else factor
-    objective = material_objective(problem, photo, prior, settings, neighbours, factor)
+    objective = material_objective(problem, photo, prior, settings, edges, factor)
     results = []
     for stage in settings.stages:
         frozen = [name for name in _COLUMNS if name not in stage.targets]
@@ -163,31 +93,59 @@ def material_objective(
     photo: torch.Tensor,
     prior: torch.Tensor,
     settings: MaterialSettings,
-    neighbours: Neighbours | None,
-    factor: torch.Tensor,
+    edges: EdgeWeights | None = None,
+    factor: torch.Tensor | None = None,
 ) -> Callable[[torch.Tensor], torch.Tensor]:
     """L_re + delta L_cons + smoothness as a function of the materials [P, 5]; in one kernel where there are tables."""
+    factor = torch.ones(1) if factor is None else factor
     if problem.tables is not None:
-        from materialist.fit.fused import FusedLoss
-
-        return FusedLoss(problem.tables, factor, photo, prior, settings, neighbours)
-
-    price = prices(prior, settings)
-    pure = pure_dielectric(photo, prior) if settings.clipped else torch.zeros(1, dtype=torch.bool)
+        return FusedLoss(problem.tables, factor, photo, prior, settings, edges)
+    weights, smooth = loss_weights(prior, settings), per_value(settings.smooth)
 
     def objective(values: torch.Tensor) -> torch.Tensor:
-        rendered = problem.render(values) * factor
-        if pure.any():  # there the albedo alone is to blame
-            by_albedo = problem.render(torch.cat([values[:, :3], values[:, 3:].detach()], 1)) * factor
-            rendered = torch.where(pure, by_albedo, rendered)
-        value = l1_l2(residual(rendered, photo, settings.encoding, clipped=settings.clipped))
-        parts = [values[:, c] for c in _COLUMNS.values()]
-        priors = [prior[:, c] for c in _COLUMNS.values()]
-        value = value + settings.delta * consistency(parts, priors, price.unbind(1))
-        if neighbours is not None:
-            for weight, part, held in zip(settings.smooth, parts, priors, strict=True):
-                if weight:
-                    value = value + weight * neighbours.total_variation(part - held)
-        return value
+        error = residual(problem.render(values) * factor, photo, settings.encoding, clipped=settings.clipped)
+        value = l1_l2(error) + consistency(values, prior, weights)
+        return value if edges is None else value + (smooth * edges.total_variation(values - prior)).sum()
 
     return objective
+
+
+def better_start(
+    problem: MaterialProblem,
+    photo: torch.Tensor,
+    start: torch.Tensor,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    smooth: Callable[[torch.Tensor], torch.Tensor],
+    *,
+    inside: torch.Tensor | None = None,
+    progress: Progress | None = None,
+) -> torch.Tensor:
+    """[P, 5] maps to start from: `start`, or where it fits better after a few steps, `settings.second_metallic`.
+
+    Between a dielectric and a metal the loss has a barrier that no gradient crosses. `smooth` averages a cost [P, 1]
+    over each pixel's surroundings, so that whole regions decide; pixels `inside` [P] bool, which get one metallic (see
+    `Unified`), decide together. Where the prior says dielectric, the second start must win by `settings.metal_margin`.
+    """
+    assert settings.second_metallic is not None
+    metal = torch.cat([start[:, :4], torch.full_like(start[:, 4:], settings.second_metallic)], 1)
+    weights = loss_weights(prior, settings)
+    short = [
+        MaterialStage(tuple(_COLUMNS), replace(s.schedule, max_steps=settings.second_steps))
+        for s in settings.stages[-1:]
+    ]
+    candidates, costs = [], []
+    for maps in (start, metal):
+        field = MaterialMaps(maps)
+        fit_materials(problem, photo, field, prior, replace(settings, stages=tuple(short)), progress=progress)
+        with torch.no_grad():
+            found = field()
+            error = residual(problem.render(found), photo, settings.encoding, clipped=settings.clipped)
+            cost = (error.abs() + error.square()).mean(1) + ((found - prior).abs() * weights).sum(1)
+        candidates.append(found)
+        costs.append(smooth(cost[:, None]))
+    margin = settings.metal_margin * fall_off(prior[:, 4], settings.dielectric_below) * metal_factor(prior, settings)
+    gain = costs[0] - costs[1] - smooth(margin[:, None])  # of the second start
+    if inside is not None:
+        gain = torch.where(inside[:, None], gain[inside].mean(), gain)
+    return torch.where(gain > 0, candidates[1], candidates[0])

@@ -1,39 +1,51 @@
-"""Settings of the fit: what `--preset paper` and `--preset default` mean."""
+"""Settings of the fit: what `--preset paper` and `--preset default` mean.
+
+The defaults of the classes are the paper's (Implementation Details), or leave out what the paper does not have.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from materialist.errors import InputError
-from materialist.fit.loop import Schedule
-from materialist.fit.losses import Encoding
+
+Encoding = Literal["linear", "srgb", "log1p"]
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Adam with a step-wise falling learning rate and early stopping; the defaults are those of the envmap."""
+
+    learning_rate: float = 1e-3  # paper
+    max_steps: int = 500  # paper
+    decay_every: int = 100  # paper; steps
+    decay: float = 0.8  # paper; factor on the learning rate
+    patience: int = 100  # paper; stop when the loss improved too little over this many steps; 0: never
+    min_improvement: float = 0.01  # paper; fraction of the loss
+    keep_best: bool = False  # end with the parameters of the smallest loss, not with the last
 
 
 @dataclass(frozen=True)
 class LightSettings:
     """Environment map optimisation."""
 
-    field: str = "mlp"
-    """`mlp` (directions), `mlp-uv`, `texels`, or `sh`."""
-    height: int = 256
-    """Rows of the field's map: 256 or, in the ablation, 16."""
+    field: str = "mlp"  # `mlp` (directions), `mlp-uv`, `texels` or `sh`
+    height: int = 256  # paper; rows of the field's map
     encoding: Encoding = "linear"
-    clipped: bool = False
-    """A rendering brighter than a clipped photo channel is no error."""
+    clipped: bool = False  # a rendering brighter than a clipped photo channel is no error
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
-    refit_steps: int = 0
-    """Steps of every light fit after the first; 0: the light is fitted once."""
-    slack: float | None = None
-    """If set, every pixel of the light fit may change its albedo within [0, 1] at this L1 price, so that a wrong
-    albedo does not colour the light, and light too dim to reach the photo with any albedo is an error."""
-    smooth: float = 0.0
-    """Weight of total variation of log radiance."""
-    chroma: float = 0.0
-    """Weight of the colourfulness of log radiance."""
-    fine: int | None = None
-    """Rows of the map of `texels` where the prior explains the photo so well (`FitSettings.trust`) that what is left of
-    its highlights and shadows tells of the light."""
+    refit_steps: int = 0  # steps of every light fit after the first; 0: as many as the first
+    strict_steps: int = 120  # steps of the light fit that measures the prior's error; tuned by eye
+    albedo_relaxation: float | None = None  # L1 weight of leaving the given albedo; None: it is fixed
+    relaxation_rate: float = 0.02  # learning rate of that albedo; tuned by eye
+    smooth: float = 0.0  # weight of the total variation of log radiance
+    free_from: float = 0.5  # share of a texel's light that must arrive for it to be as free as others; tuned by eye
+    hidden_weight: float = 3.0  # largest factor on the smoothness of hidden texels; tuned on 5 synthetic scenes
+    chroma: float = 0.0  # weight of the colourfulness of log radiance
+    start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
+    start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
 
 
 @dataclass(frozen=True)
@@ -46,34 +58,41 @@ class MaterialStage:
 
 @dataclass(frozen=True)
 class MaterialSettings:
-    """Material properties optimisation."""
+    """Material properties optimisation; a triple is for albedo, roughness and metallic."""
 
-    field: str = "mlp"
-    """`mlp`, `maps` or `unet`."""
-    remap: bool = True
-    """Start roughness and metallic from 0.7 x + 0.2 (paper, Default Automatic Optimization Schedule)."""
+    field: str = "mlp"  # `mlp`, `maps` or `unet`
+    remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
     clipped: bool = False
-    delta: float = 0.5
-    """Scale of L_cons."""
-    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Weights of albedo, roughness and metallic in L_cons."""
-    smooth: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Weights of the edge-aware total variation of the change of albedo, roughness and metallic."""
+    delta: float = 0.5  # paper; scale of L_cons
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
+    smooth: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the edge-aware total variation of the change
     stages: tuple[MaterialStage, ...] = ()
-    other_metallic: float | None = None
-    """If set, the first fit of `maps` also starts from this metallic, and every region goes on from what fitted it
-    better: between a dielectric and a metal the loss has a barrier that no gradient crosses."""
-    dielectric: float = 1.0
-    """Price of making a metal of what the prior calls a dielectric, as a multiple of its weight in L_cons."""
-    doubt: float = 0.0
-    """Least gain in cost (encoded error and price of leaving the prior, a pixel) for which a surface that the prior
-    calls a dielectric goes on from `other_metallic`."""
+    second_metallic: float | None = None  # a second start, for each region the better one: the loss has a barrier
+    second_steps: int = 25  # steps of each start before they are compared; tuned by eye
+    metal_margin: float = 0.0  # least gain in cost, a pixel, for which a dielectric takes that start
+    metal_factor: float = 1.0  # on the weight of metallic where the prior is sure of a dielectric
+    dielectric_below: float = 0.2  # prior metallic from 0 to which `metal_margin` falls to 0; tuned on 26 photos
+    surely_below: float = 0.04  # prior metallic from 0 to which `metal_factor` falls to 1; tuned on 26 photos
 
 
-MAX_TRUST = 100.0
-FINE_TRUST = 4.0
-"""Trust from which the light is looked for on the finer map."""
+@dataclass(frozen=True)
+class ExtentSettings:
+    """Search for the extents of planes beyond the picture (`fit.plane_extents`)."""
+
+    pixels: int = 1024  # surface pixels whose light is looked at; more is slower and less noisy; tuned by eye
+    levels: tuple[float, ...] = (0.0, 0.25, 0.5, 1.0, 2.0)  # how far a side goes on, in the plane's visible size
+    starts: tuple[float, ...] = (0.0, 0.5, 1.0)  # levels of all sides with which a descent may begin
+    descents: int = 2  # of all starts, the best so many are followed
+    finalists: int = 6  # of all extents that were tried, the best so many are compared on a finer map; tuned by eye
+    final_rows: int = 32  # rows of that map
+    sweeps: int = 2  # rounds over all planes and sides, at most
+    gain: float = 0.04  # least relative gain in error for which a side moves; tuned on 8 synthetic scenes
+    least_gain: float = 5e-4  # least absolute gain, encoded; below it is the noise of so few pixels
+    reweightings: int = 2  # of the least squares, towards the absolute encoded error
+    steps: int = 30  # projected gradient steps after each
+    ridge: float = 1e-3  # weight of bright texels that hardly reach anything, relative to a mean texel's error
+    small: float = 0.02  # encoded errors below this count by their square
 
 
 @dataclass(frozen=True)
@@ -82,33 +101,22 @@ class FitSettings:
 
     light: LightSettings
     materials: MaterialSettings
-    rounds: int = 1
-    """Alternations of light and materials; between them, what surfaces send to each other is updated."""
-    corrections: int = 0
-    """Fixed-point corrections of the material fit against the path tracer."""
+    extents: ExtentSettings = dataclasses.field(default_factory=ExtentSettings)
+    rounds: int = 1  # alternations of light and materials; between them, what surfaces send to each other is updated
+    corrections: int = 0  # fixed-point corrections of the material fit against the path tracer
     correction_spp: int = 16
-    trust: float | None = None
-    """Mean absolute error (encoded) of the best light under the prior's materials from which the prior is doubted:
-    below it, leaving the prior grows dearer with the third power. None: no such scaling."""
-    light_grid: int = 32
-    """Rows of the envmap that the transport engine's light matrix resolves."""
+    explained: float | None = None
+    """Mean absolute encoded error of the best light under the prior's materials above which the prior gets no more
+    confidence than its loss weights say; None: never more. Tuned on 8 synthetic scenes."""
+    confidence_power: float = 3.0  # how fast the prior's confidence grows below that error; tuned by eye
+    max_confidence: float = 100.0
+    light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
+    final_paths: int = 112  # paths a pixel of the final re-rendering, a splitting camera ray counts as three or four
 
-    def trust_at(self, error: float) -> float:
-        """How much dearer it is to leave the prior: (trust / e)^3, e the error of the best light for it, which is what
-        materials or geometry have wrong."""
-        return min(max(((self.trust or 0) / max(error, 1e-6)) ** 3, 1.0), MAX_TRUST)
-
-    @property
-    def fine_light(self) -> LightSettings | None:
-        """The light on its finer map, if there is one; an edge in it costs what it costs on the coarse map."""
-        light = self.light
-        if light.fine is None or self.trust is None:
-            return None
-        return replace(light, height=light.fine, smooth=light.smooth * light.fine / light.height)
-
-    def finer(self, error: float) -> LightSettings | None:
-        """The same where the coarse light leaves so small an error that it is asked for."""
-        return self.fine_light if self.trust_at(error) >= FINE_TRUST else None
+    def confidence(self, error: float) -> float:
+        """Factor >= 1 on what leaving the prior costs: (explained / error)^power, for the error that the best light
+        leaves, which is what the prior's materials or geometry have wrong."""
+        return min(max(((self.explained or 0) / max(error, 1e-6)) ** self.confidence_power, 1.0), self.max_confidence)
 
 
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
@@ -124,8 +132,6 @@ PAPER = FitSettings(
 )
 """The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
 
-_FAST = Schedule(learning_rate=0.02, max_steps=36, decay_every=24, decay=0.6, patience=0)
-
 DEFAULT = FitSettings(
     light=LightSettings(
         field="texels",
@@ -134,10 +140,9 @@ DEFAULT = FitSettings(
         clipped=True,
         schedule=Schedule(learning_rate=0.05, max_steps=150, decay_every=60, decay=0.6, patience=0),
         refit_steps=60,
-        slack=0.03,
+        albedo_relaxation=0.03,
         smooth=0.01,
         chroma=0.05,
-        fine=32,
     ),
     materials=MaterialSettings(
         field="maps",
@@ -147,15 +152,20 @@ DEFAULT = FitSettings(
         delta=1.0,
         weights=(0.02, 0.01, 0.021),
         smooth=(0.002, 0.1, 0.03),
-        stages=(MaterialStage(("albedo", "roughness", "metallic"), _FAST),),
-        other_metallic=0.95,
-        dielectric=3.3,
-        doubt=0.004,
+        stages=(
+            MaterialStage(
+                ("albedo", "roughness", "metallic"),
+                Schedule(learning_rate=0.02, max_steps=36, decay_every=24, decay=0.6, patience=0),
+            ),
+        ),
+        second_metallic=0.95,
+        metal_factor=3.3,
+        metal_margin=0.004,
     ),
     rounds=3,
     corrections=2,
     correction_spp=4,
-    trust=0.08,
+    explained=0.08,
     light_grid=16,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""

@@ -33,6 +33,17 @@ def psnr(a: Array, b: Array, *, mask: Array | None = None) -> float:
     return float("inf") if error == 0 else float(-10 * np.log10(error))
 
 
+def psnr_without_noise(first: Array, second: Array, b: Array) -> float:
+    """PSNR in dB of the mean of two pictures [H, W, 3] linear, path traced independently, without their noise.
+
+    The squared error of their mean, less its noise's variance, which a quarter of their squared difference estimates
+    (all sRGB-encoded, clipped to [0, 1]): unbiased but for what encoding makes of noise. At most 80 dB, where chance
+    takes more away than there is.
+    """
+    noise = _mean_square(linear_to_srgb(_checked(first, second)), linear_to_srgb(second), None) / 4
+    return float(-10 * np.log10(max(mse((first + second) / 2, b) - noise, 1e-8)))
+
+
 def ssim(a: Array, b: Array) -> float:
     """Structural similarity of linear images [H, W, 3] on their sRGB encoding; 1 when equal.
 

@@ -16,13 +16,13 @@ _EVERY = 0.3
 _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
     "walls": "Finding where walls end", "geometry": "Building the surface", "trace": "Tracing light paths",
-    "light": "Finding the light", "glance": "Looking at the light", "materials": "Finding the materials",
+    "light": "Finding the light", "materials": "Finding the materials",
     "rerender": "Rendering the result", "save": "Saving", "load": "Loading", "render": "Path tracing",
     "frames": "Path tracing the frames", "export": "Writing the file",
 }  # fmt: skip
 _SHARE = {
     "start": (0.0, 0.08), "read": (0.08, 0.1), "predict": (0.1, 0.14), "walls": (0.14, 0.24),
-    "geometry": (0.24, 0.27), "light": (0.27, 0.39), "glance": (0.39, 0.42), "trace": (0.42, 0.53),
+    "geometry": (0.24, 0.27), "light": (0.27, 0.42), "trace": (0.42, 0.53),
     "materials": (0.53, 0.72), "rerender": (0.72, 0.97), "save": (0.97, 1.0),
 }  # fmt: skip
 """Stage of an inversion -> where its part of the bar begins and ends, by the seconds that it usually takes."""

@@ -26,12 +26,19 @@ from materialist.types import Array, Camera, Geometry, Mesh
 ROUGHNESS_LEVELS = (0.04, 0.12, 0.2, 0.3, 0.42, 0.56, 0.75, 1.0)
 """Perceptual roughness at which the specular lobe is tabulated; between them it is interpolated linearly."""
 
-LEVEL_SHARE = (0.25, 0.375, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0)
-"""Samples of each level as a share of `specular_samples`: a narrow lobe needs fewer."""
-
 MISS = 0xFFFFFFFF
 _OFF_DIAGONAL = (0.13, 0.05)
 """Where in a pixel the primary ray passes, from the centre: not through the edge between its two triangles."""
+
+
+@dataclass(frozen=True)
+class CacheSettings:
+    """Rays of a transport cache."""
+
+    diffuse_samples: int = 64  # rays a pixel of the diffuse lobe; tuned by eye
+    specular_samples: int = 16  # rays a pixel of a wide specular level; tuned by eye
+    level_share: tuple[float, ...] = (0.25, 0.375, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0)
+    """Of `specular_samples`, by roughness level: a narrow lobe needs fewer."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +68,6 @@ class TransportCache:
     Args:
         geometry: the mesh; its faces carry the pixel whose radiance a ray that hits them sees.
         camera: pinhole camera of the photograph.
-        diffuse_samples, specular_samples: rays a pixel, for the diffuse lobe and (times LEVEL_SHARE) for each
-            roughness level.
         seed: of the point sets; equal seeds give equal caches.
     """
 
@@ -70,14 +75,13 @@ class TransportCache:
         self,
         geometry: Geometry,
         camera: Camera,
+        settings: CacheSettings | None = None,
         *,
-        diffuse_samples: int = 64,
-        specular_samples: int = 16,
         seed: int = 0,
         progress=None,
     ):
         self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
-        self.diffuse_samples, self.specular_samples = diffuse_samples, specular_samples
+        self.settings = settings or CacheSettings()
         self.scene = build_scene(geometry.mesh)
         self.slots = _radiance_slots(geometry.mesh, camera)
         self._slots = integers(mi, self.slots)
@@ -114,7 +118,9 @@ class TransportCache:
     # -- directions ----------------------------------------------------------------------------------------------------
 
     def _count(self, k: int) -> int:
-        return self.diffuse_samples if k == 0 else max(1, round(LEVEL_SHARE[k - 1] * self.specular_samples))
+        if k == 0:
+            return self.settings.diffuse_samples
+        return max(1, round(self.settings.level_share[k - 1] * self.settings.specular_samples))
 
     def _alpha(self, k: int) -> float:
         return 1.0 if k == 0 else float(alpha_of(ROUGHNESS_LEVELS[k - 1]))

@@ -8,23 +8,10 @@ from dataclasses import dataclass, field
 
 import torch
 
+from materialist.fit.settings import Schedule
+
 Progress = Callable[[str, int, int], None]
 """Called as progress(stage, done, total)."""
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """Optimiser settings; the defaults are the paper's for the environment map (Hyperparameters and Timing)."""
-
-    learning_rate: float = 1e-3
-    max_steps: int = 500
-    decay_every: int = 100
-    decay: float = 0.8
-    patience: int = 100
-    """Stop when the loss improved by less than `min_improvement` (a fraction) over this many steps; 0: never."""
-    min_improvement: float = 0.01
-    keep_best: bool = False
-    """End with the parameters of the smallest loss, not with the last."""
 
 
 @dataclass(frozen=True)

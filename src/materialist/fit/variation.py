@@ -1,4 +1,4 @@
-"""How strongly neighbouring surface pixels should change alike."""
+"""Edge-aware total variation: how strongly neighbouring surface pixels should change alike."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from materialist.types import Array
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class EdgeWeights:
     """Weights between vertically and horizontally adjacent pixels: 1 inside a surface, towards 0 across an edge."""
 
     pixels: torch.Tensor
@@ -22,19 +22,16 @@ class Neighbours:
     """[H, W-1] weight between (i, j) and (i, j+1)."""
 
     def total_variation(self, values: torch.Tensor) -> torch.Tensor:
-        """Mean over surface pixels of the weighted absolute differences of `values` [P, C]."""
+        """[C] mean over surface pixels of the weighted absolute differences of `values` [P, C]."""
         height, width = self.right.shape[0], self.down.shape[1]
-        if len(self.pixels) == height * width:
-            grid = values.view(height, width, -1)
-        else:
-            grid = values.new_zeros(height * width, values.shape[1]).index_copy(0, self.pixels, values)
-            grid = grid.view(height, width, -1)
-        vertical = ((grid[1:] - grid[:-1]).abs() * self.down[..., None]).sum()
-        horizontal = ((grid[:, 1:] - grid[:, :-1]).abs() * self.right[..., None]).sum()
-        return (vertical + horizontal) / values.numel()
+        grid = values.new_zeros(height * width, values.shape[1]).index_copy(0, self.pixels, values)
+        grid = grid.view(height, width, -1)
+        vertical = ((grid[1:] - grid[:-1]).abs() * self.down[..., None]).sum((0, 1))
+        horizontal = ((grid[:, 1:] - grid[:, :-1]).abs() * self.right[..., None]).sum((0, 1))
+        return (vertical + horizontal) / len(values)
 
 
-def neighbours(pixels: Array, guide: Array, *, tolerance: float = 0.1) -> Neighbours:
+def edge_weights(pixels: Array, guide: Array, *, tolerance: float = 0.1) -> EdgeWeights:
     """Weights for the surface pixels [P] (row-major indices) by the similarity of `guide` [H, W, C].
 
     The weight is exp(-|difference| / tolerance), |.| the largest channel.
@@ -47,7 +44,7 @@ def neighbours(pixels: Array, guide: Array, *, tolerance: float = 0.1) -> Neighb
         similar = np.exp(-np.abs(guide[a] - guide[b]).max(-1) / tolerance)
         return torch.from_numpy((similar * (surface[a] & surface[b])).astype(np.float32))
 
-    return Neighbours(
+    return EdgeWeights(
         torch.from_numpy(np.asarray(pixels, np.int64)),
         weight(np.s_[1:], np.s_[:-1]),
         weight(np.s_[:, 1:], np.s_[:, :-1]),

@@ -1,0 +1,189 @@
+"""An inversion from the prior to the re-rendering: geometry, light, materials."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from materialist.fit.alternation import Fit, Renderer
+from materialist.fit.engine import Engine, PathEngine, TransportEngine
+from materialist.fit.losses import CLIPPED
+from materialist.fit.plane_extents import find_extents
+from materialist.fit.settings import FitSettings
+from materialist.geometry.build import build_geometry
+from materialist.geometry.ends import Ends
+from materialist.io.photo import HDR_CLIP
+from materialist.render.scene import RenderScene
+from materialist.types import Array, Geometry, Materials, Photo, Prediction
+
+AUTO, FULL = "auto", "planes"
+"""Names of completions: planes with the extents that explain the photo best, and with the usual ones."""
+
+
+@dataclass(frozen=True)
+class FitSetup:
+    """What is asked of an inversion; see `pipeline.invert` for the fields."""
+
+    photo: Photo
+    prior: Prediction
+    settings: FitSettings
+    completion: str = AUTO
+    engine: str = "transport"
+    envmap_height: int = 256
+    tau: float = 6.0
+    mask: Array | None = None
+    strategy: str = "default"
+    seed: int = 0
+    device: str = "auto"
+    spp: int | None = None
+    """Camera rays a pixel of the re-rendering; None: those of `settings.final_paths`."""
+
+
+@dataclass(frozen=True)
+class PreparedFit:
+    """A mesh, its path tracer, and a fit that has not run."""
+
+    completion: str
+    ends: tuple[Ends, ...]
+    """Where walls end beyond the picture; empty: the usual extents."""
+    geometry: Geometry
+    renderer: RenderScene
+    fit: Fit
+    stages: list[dict] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
+    """What a report should say."""
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """What an inversion came to."""
+
+    prepared: PreparedFit
+    materials: Materials
+    envmap: Array
+    """[h, 2h, 3] linear radiance."""
+    halves: tuple[Array, Array]
+    """Two independent path-traced re-renderings [H, W, 3] linear, of half the samples each."""
+    spp: int
+    """Camera rays a pixel of both together."""
+    stages: tuple[dict, ...]
+
+    @property
+    def rerender(self) -> Array:
+        """[H, W, 3] linear: the mean of both halves."""
+        return (self.halves[0] + self.halves[1]) / 2
+
+    @property
+    def prior_confidence(self) -> float | None:
+        """Factor on what leaving the prior cost; 1: the prior did not explain the photo. None: that was not asked."""
+        return next((s["prior_confidence"] for s in reversed(self.stages) if "prior_confidence" in s), None)
+
+
+class Inversion:
+    """Geometry, light and materials of one photo.
+
+    Args:
+        progress: called as progress(stage, done, total).
+        found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
+    """
+
+    def __init__(self, setup: FitSetup, *, progress: Any = None, found: Callable[[str, Any], Any] = lambda *_: None):
+        self.setup, self.found = setup, found
+        self.progress = progress or (lambda *_: None)
+
+    def run(self) -> FitResult:
+        """Mesh, light, materials, path-traced re-rendering."""
+        return self.finish(self.prepare())
+
+    def prepare(self) -> PreparedFit:
+        """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
+        setup, stages = self.setup, list[dict]()
+        completion, ends, notes = setup.completion, (), ()
+        if completion == AUTO:
+            completion = FULL
+            if setup.settings.explained is not None:
+                ends, notes = self._extents(stages)
+        self.progress("geometry", 0, 1)
+        camera, prior = setup.photo.camera, setup.prior
+        geometry = timed(stages, "geometry", lambda: build_geometry(
+            prior.depth, prior.normal, camera, tau=setup.tau, completion=completion, ends=ends, seed=setup.seed
+        ))  # fmt: skip
+        renderer = timed(stages, "scene", lambda: RenderScene(geometry, camera, device=setup.device))
+        engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
+        fit = Fit(
+            setup.photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height,
+            reference=_reference(renderer), mask=setup.mask, strategy=setup.strategy, seed=setup.seed,
+            progress=self.progress, white=HDR_CLIP if setup.photo.hdr else CLIPPED,
+        )  # fmt: skip
+        return PreparedFit(completion, ends, geometry, renderer, fit, stages, notes)
+
+    def finish(self, prepared: PreparedFit) -> FitResult:
+        """Light, materials, path-traced re-rendering."""
+        fit, stages, seed = prepared.fit, list(prepared.stages), self.setup.seed
+        if isinstance(fit.engine, TransportEngine):
+            timed(stages, "trace", fit.engine.cache.trace)
+        state = fit.run()
+        stages += state.stages
+        materials = fit.materials(state)
+        self.found("light", state.envmap)
+        self.found("materials", materials)
+        self.progress("rerender", 0, 1)
+        renderer = prepared.renderer
+        renderer.set_envmap(state.envmap)
+        rays = self.setup.spp or -(-self.setup.settings.final_paths // renderer.paths)
+        each = max(1, rays // 2)
+        reference = _reference(renderer)
+        first, second = timed(stages, "rerender", lambda: [
+            reference(materials, state.envmap, each, seed + k) for k in (1, 2)
+        ])  # fmt: skip
+        return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
+
+    def _extents(self, stages: list[dict]) -> tuple[tuple[Ends, ...], tuple[str, ...]]:
+        """Where walls end, and what a report should say of it; empty for the usual extents."""
+        setup = self.setup
+        self.progress("walls", 0, 1)
+        found = timed(stages, "walls", lambda: find_extents(
+            setup.photo.linear, setup.prior, setup.photo.camera, setup.settings, tau=setup.tau, seed=setup.seed
+        ))  # fmt: skip
+        if found is None:
+            return (), ()
+        note = (
+            f"Walls beyond the picture end where light explains the photo best with the predicted materials (error "
+            f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
+        )
+        return found.ends, (note,)
+
+    def _engine(self, renderer: RenderScene, geometry: Geometry) -> Engine:
+        setup = self.setup
+        if setup.engine == "path":
+            surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
+            return PathEngine(
+                renderer, setup.photo.camera, surface, envmap_height=setup.envmap_height, seed=setup.seed
+            )  # fmt: skip
+        return TransportEngine(
+            geometry, setup.photo.camera, setup.photo.linear, seed=setup.seed,
+            light_height=setup.settings.light_grid, progress=self.progress,
+        )  # fmt: skip
+
+
+def _reference(renderer: RenderScene) -> Renderer:
+    """The path tracer as a function (materials, envmap, spp, seed) -> [H, W, 3]."""
+
+    def render(materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
+        renderer.set_materials(materials)
+        renderer.set_envmap(envmap)
+        return renderer.render(spp=spp, seed=seed)
+
+    return render
+
+
+def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:
+    """The result of `work`; its seconds are added to `stages`."""
+    start = time.perf_counter()
+    result = work()
+    stages.append({"name": name, "seconds": round(time.perf_counter() - start, 3)})
+    return result
