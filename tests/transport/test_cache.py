@@ -6,7 +6,7 @@ from disney_reference import diffuse_coefficients, specular_split
 
 from materialist.envmap import texel_directions
 from materialist.geometry.build import build_geometry
-from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, TransportCache
+from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, CacheSettings, TransportCache
 from materialist.types import Camera, Geometry, Mesh
 
 CAMERA = Camera(12, 9, 60.0)
@@ -44,7 +44,7 @@ def wall(size: float = 400.0):
 
 @pytest.fixture(scope="module")
 def open_floor():
-    return TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA, diffuse_samples=1024, specular_samples=1024)
+    return TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA, CacheSettings(1024, 1024))
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +52,7 @@ def walled_floor():
     return TransportCache(
         quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1]),
         CAMERA,
-        diffuse_samples=4096,
-        specular_samples=16,
+        CacheSettings(4096, 16),
     )
 
 
@@ -113,7 +112,7 @@ def test_matte_white_looked_at_from_above_is_a_furnace():
     """D0 + R D1 + R^2 D2 in closed form for wo = n: F_d(wo) = 1 and (h.n)^2 = (1 + cos) / 2."""
     camera = Camera(9, 9, 2.0)
     geometry = build_geometry(np.full((9, 9), 2.0, np.float32), _facing(9), camera, completion="none")
-    cache = TransportCache(geometry, camera, diffuse_samples=1024, specular_samples=16)
+    cache = TransportCache(geometry, camera, CacheSettings(1024, 16))
     d = cache.gather(constant(1.0), None).diffuse[40].reshape(3, 3)[:, 0]
     # 1 + (R (1 + c) - 1/2) (1 - c)^5 against 2 c dc: Beta integrals 2 B(2, 6) = 1/21 and 2 B(3, 6) = 1/84.
     assert d[0] == pytest.approx(1 - 0.5 / 21, abs=1e-3)
@@ -185,9 +184,7 @@ def _meets_wall(p, d):
 
 
 def test_continued_planes_have_slots_of_their_own():
-    cache = TransportCache(
-        quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, 0]), CAMERA, diffuse_samples=64, specular_samples=4
-    )
+    cache = TransportCache(quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, 0]), CAMERA, CacheSettings(64, 4))
     size = CAMERA.width * CAMERA.height
     np.testing.assert_array_equal(cache.slots, [0, 0, size, size + 1])
     radiance = np.random.default_rng(0).random((CAMERA.height, CAMERA.width, 3)).astype(np.float32)
@@ -218,7 +215,7 @@ def test_light_is_linear(walled_floor):
 def test_progress_counts_every_lobe():
     told = []
     cache = TransportCache(
-        quads(floor(), pixels=[0], planes=[-1]), CAMERA, diffuse_samples=4, specular_samples=4,
+        quads(floor(), pixels=[0], planes=[-1]), CAMERA, CacheSettings(4, 4),
         progress=lambda *a: told.append(a),
     )  # fmt: skip
     assert told == []  # a light fit traces none of them

@@ -5,7 +5,7 @@ import torch
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist.fit.engine import TransportEngine
-from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
+from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, Tables
 from materialist.transport.filter import Guide, filter_tables, guide_weights, joint_filter
 
 H, W = 12, 10
@@ -84,9 +84,7 @@ def test_sharp_levels_are_left_alone_and_noise_falls():
     """Filtered tables come closer to tables with sixteen times the samples."""
     camera, geometry, _ = furnished_room(64)
     black = np.zeros((camera.height, camera.width, 3), np.float32)
-    engines = [
-        TransportEngine(geometry, camera, black, diffuse_samples=64 * k, specular_samples=8 * k) for k in (1, 16)
-    ]
+    engines = [TransportEngine(geometry, camera, black, cache=CacheSettings(64 * k, 8 * k)) for k in (1, 16)]
     envmap = windowed_sky()
     raw, reference = (e.cache.gather(envmap, None) for e in engines)
     smooth = filter_tables(engines[0].cache, raw, engines[0].guide)

@@ -7,7 +7,7 @@ import pytest
 import torch
 from transport_scenes import furnished_room, windowed_sky
 
-from materialist.transport.cache import TransportCache
+from materialist.transport.cache import CacheSettings, TransportCache
 from materialist.transport.light import light_matrix
 from materialist.transport.shading import shade
 
@@ -18,7 +18,7 @@ HEIGHT = 16
 def both():
     """A cache with many samples, the rows compared, their materials, and the matrix of these rows."""
     camera, geometry, materials = furnished_room(48)
-    cache = TransportCache(geometry, camera, diffuse_samples=256, specular_samples=128)
+    cache = TransportCache(geometry, camera, CacheSettings(256, 128))
     rows = np.arange(3, len(cache.pixels), 7)
     return cache, rows, materials, light_matrix(cache, materials, rows, HEIGHT)
 

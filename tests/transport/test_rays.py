@@ -7,7 +7,7 @@ import pytest
 import torch
 from transport_scenes import furnished_room, windowed_sky
 
-from materialist.transport.cache import TransportCache
+from materialist.transport.cache import CacheSettings, TransportCache
 from materialist.transport.light import light_matrix
 from materialist.transport.rays import rays
 
@@ -17,7 +17,7 @@ HEIGHT = 16
 @pytest.fixture(scope="module")
 def scene():
     camera, geometry, materials = furnished_room(48)
-    cache = TransportCache(geometry, camera, diffuse_samples=4, specular_samples=4)
+    cache = TransportCache(geometry, camera, CacheSettings(4, 4))
     return cache, materials, np.arange(3, len(cache.pixels), 7)
 
 
