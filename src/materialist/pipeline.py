@@ -195,7 +195,7 @@ def _report(
     return FitReport(
         stages=stages,
         metrics={
-            "rerender_psnr_path": metrics.psnr_without_noise(*halves, picture.linear),
+            "rerender_psnr_path": metrics.psnr_without_noise(halves[0], halves[1], picture.linear),
             "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
             **distance,
             "clipped_fraction": clipped,

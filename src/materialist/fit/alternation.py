@@ -94,8 +94,8 @@ class Fit:
         strict = replace(self.settings.light, albedo_relaxation=None)
         problem, photo = self.engine.light_problem(self.prior), self._photo()
         light = envmap_field(strict, seed=self.seed, start=start_radiance(photo, strict))
-        options = {"steps": strict.strict_steps, "seed": self.seed, "progress": self.progress}
-        result = fit_light(problem, photo, light, strict, **options)
+        steps = strict.strict_steps
+        result = fit_light(problem, photo, light, strict, steps=steps, seed=self.seed, progress=self.progress)
         with torch.no_grad():
             found = problem.render(light(problem.height))
             error = residual(found, photo[problem.pixels], strict.encoding, clipped=strict.clipped)

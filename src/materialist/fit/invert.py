@@ -102,11 +102,9 @@ class Inversion:
     def prepare(self) -> PreparedFit:
         """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
         setup, stages = self.setup, list[dict]()
-        completion, ends, notes = setup.completion, (), ()
-        if completion == AUTO:
-            completion = FULL
-            if setup.settings.explained is not None:
-                ends, notes = self._extents(stages)
+        searched = setup.completion == AUTO and setup.settings.explained is not None
+        ends, notes = self._extents(stages) if searched else ((), ())
+        completion = FULL if setup.completion == AUTO else setup.completion
         self.progress("geometry", 0, 1)
         camera, prior = setup.photo.camera, setup.prior
         geometry = timed(stages, "geometry", lambda: build_geometry(
