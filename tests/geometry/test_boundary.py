@@ -226,14 +226,11 @@ def test_normals_are_turned_to_the_camera_and_zero_ones_replaced():
     "depth, normal, tau, said",
     [
         (np.ones((4, 5)), np.ones((4, 4, 3)), 6, r"\(4, 4, 3\)"),
-        (np.ones((5, 4)), np.ones((4, 5, 3)), 6, r"\(5, 4\)"),
         (np.zeros((4, 5)), np.ones((4, 5, 3)), 6, "0 everywhere"),
         (np.full((4, 5), np.nan), np.ones((4, 5, 3)), 6, "20 NaN"),
-        (np.full((4, 5), np.inf), np.ones((4, 5, 3)), 6, "20 NaN or infinite"),
         (np.full((4, 5), -2.0), np.ones((4, 5, 3)), 6, "-2"),
         (np.ones((4, 5)), np.full((4, 5, 3), np.nan), 6, "normal map has NaN"),
         (np.ones((4, 5)), np.ones((4, 5, 3)), 0, "tau is 0"),
-        (np.ones((4, 5)), np.ones((4, 5, 3)), 90, "tau is 90"),
         (np.ones((4, 5)), np.ones((4, 5, 3)), float("nan"), "tau is nan"),
     ],
 )

@@ -1,7 +1,5 @@
 """Continued planes: found where light looks for them, never seen by the camera."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
@@ -11,7 +9,6 @@ from materialist.geometry.build import build_geometry, completion_of
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 60.0)
-OFFICIAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "official_indoor" / "maps"
 
 
 @pytest.fixture(scope="module")
@@ -174,25 +171,3 @@ def test_faces_of_continuations_are_well_formed(furnished):
     texel = np.floor(uv[..., 1] * 48).astype(int) * 64 + np.floor(uv[..., 0] * 64).astype(int)
     np.testing.assert_array_equal(texel, np.repeat(pixel[:, None], 3, 1))
     assert added.sum() < 60_000
-
-
-@pytest.mark.skipif(not OFFICIAL.exists(), reason="shared/data/official_indoor is not here")
-def test_the_table_of_a_real_picture_is_one_plane_and_goes_on_under_the_camera():
-    import OpenEXR
-
-    depth, normal = (
-        next(iter(OpenEXR.File(str(OFFICIAL / f"{name}.exr")).channels().values())).pixels.astype(np.float32)
-        for name in ("depth", "normal")
-    )
-    depth, normal = depth[3::8, 3::8], normal[3::8, 3::8]
-    camera = Camera(64, 64, 35.0)
-    geometry = build_geometry(depth, normal, camera)
-    table = geometry.plane_label[-1, 32]
-    assert table >= 0 and (geometry.plane_label[-15:] == table).mean() > 0.9
-    assert geometry.plane_label[3, 10] not in (-1, table)  # the wall
-    below = [0, 0, -0.5 * np.median(depth)]
-    _, plane, _ = hit(geometry.mesh, below, (0, -1, 0))
-    assert plane == table
-    screen = np.argwhere(depth > 0)[::3, ::-1] + 0.37
-    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(camera, screen))
-    assert (face >= 0).all() and (geometry.mesh.face_plane[face] == -1).all()

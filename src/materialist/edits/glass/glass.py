@@ -17,7 +17,7 @@ from materialist.edits.remove.background import Inpaint, without
 from materialist.edits.remove.hole import GROW
 from materialist.errors import InputError
 from materialist.solids.closed import closed_proxy
-from materialist.solids.shell import Shell, cavities, joined
+from materialist.solids.shell import Shell, joined
 from materialist.types import Array, Body, Scene, Surface
 
 MODELS = ("closed", "two-interface")
@@ -106,7 +106,7 @@ def _unlike(each: list[tuple[Array, ObjectThickness]], shells: list[Shell], holl
     for (_, found), shell in zip(each, shells, strict=True):
         opened = hollow == OPEN and found.revolution is not None and found.revolution.opens(found.wall)
         notes += [LID] * (hollow == OPEN and not opened)
-        notes += [NO_ROOM] * (bool(hollow) and not opened and not cavities(shell))
+        notes += [NO_ROOM] * (bool(hollow) and not opened and not shell.hollow)
     return list(dict.fromkeys(notes))
 
 
