@@ -146,14 +146,12 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
 
 def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
-    from materialist.predict.refraction.choice import best_thickness
+    from materialist.predict.refraction import best_thickness
     from materialist.solids.finder import upright
 
     up = upright(normal, planes_of(scene, depth, normal))
     front = scene.front
-    return best_thickness(
-        photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth
-    ).thickness  # fmt: skip
+    return best_thickness(photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth)
 
 
 def planes_of(scene: GlassScene, depth: Array, normal: Array) -> Array:

@@ -11,7 +11,7 @@ from materialist.color import linear_to_srgb
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
 from materialist.predict.protocol import Part
-from materialist.predict.relative import from_inverse
+from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
@@ -53,10 +53,8 @@ class DepthAnything:
         values = _run(model, photo.linear, on_gpu(self._device))
         if model.config.depth_estimation_type == "metric":
             return Part({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
-        depth, ratio = from_inverse(values, photo.camera, normal)
-        how = "fitted to the normals" if normal is not None else "assumed"
-        note = f"Depth from {self.name} is relative: far / near = {ratio:.1f} was {how}."
-        return Part({"depth": depth}, {"depth": f"{self.name}{digest}, far / near {ratio:.1f} {how}"}, (note,))
+        depth, note, warnings = planar(values, photo.camera, normal, inverse=True, name=self.name)
+        return Part({"depth": depth}, {"depth": f"{self.name}{digest}{note}"}, warnings)
 
 
 def _run(model, linear: Array, gpu: bool) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
+from materialist.io.image import read_map as read_data
 from materialist.predict import resample
 from materialist.predict.normals import normals_from_depth
 from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
@@ -131,12 +132,8 @@ def read_map(path: Path, name: str) -> Array:
     EXR values are as stored. PNG (8 or 16 bit) is brought to [0, 1]; albedo is then sRGB-decoded and normal is
     2 v - 1. Raises InputError for a damaged file or the wrong number of channels.
     """
-    if path.suffix == ".exr":
-        from materialist.io.exr import read_exr
-
-        values = read_exr(path)
-    else:
-        values = _read_png(path)
+    values = read_data(path)
+    if path.suffix != ".exr":
         values = srgb_to_linear(values) if name == "albedo" else 2 * values - 1 if name == "normal" else values
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
@@ -151,19 +148,6 @@ def read_map(path: Path, name: str) -> Array:
             raise InputError(f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey.")
         values = values[..., 0]
     return np.ascontiguousarray(values)
-
-
-def _read_png(path: Path) -> Array:
-    """[H, W] or [H, W, 3] float32 in [0, 1] of an 8- or 16-bit PNG, alpha dropped."""
-    import cv2
-
-    pixels = (
-        cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
-    )
-    if pixels is None:
-        raise InputError(f"{path} is not a readable PNG file; write the map again.")
-    values = pixels.astype(np.float32) / (255 if pixels.dtype == np.uint8 else 65535)
-    return values if values.ndim == 2 else np.ascontiguousarray(values[..., 2::-1])  # OpenCV reads BGR(A)
 
 
 def check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:

@@ -13,7 +13,7 @@ from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
 from materialist.predict.protocol import MAPS, Part, whole
-from materialist.predict.relative import from_affine, from_inverse
+from materialist.predict.relative import planar
 from materialist.types import Array, Photo, Prediction
 
 GIVES = {
@@ -100,10 +100,8 @@ class MarigoldPart:
             maps = {"normal": unit_normals(output[0])}
         else:
             inverse = pipeline.config.prediction_type == "disparity"
-            depth, ratio = (from_inverse if inverse else from_affine)(output[0, ..., 0], photo.camera, normal)
-            how = "fitted to the normals" if normal is not None else "assumed"
-            maps, source = {"depth": depth}, f"{source}, far / near {ratio:.1f} {how}"
-            notes = (f"Depth from {self.name} is relative: far / near = {ratio:.1f} was {how}.",)
+            depth, note, notes = planar(output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name)
+            maps, source = {"depth": depth}, source + note
         lacking = [name for name in wanted if name not in maps]
         if lacking:
             raise WeightsError(f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it.")

@@ -6,11 +6,10 @@ import json
 from collections.abc import Collection
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.io.exr import read_exr
+from materialist.io.image import read_map as read_data
 from materialist.predict import resample
 from materialist.predict.maps import check_aspect, read_map
 from materialist.predict.normals import normals_from_depth
@@ -59,16 +58,15 @@ class MogeFolder:
     def _depth(self, size: tuple[int, int]) -> Array:
         """[H, W] float32 at the photo's size, 0 where there is no surface."""
         path = self.folder / "depth.exr"
-        depth = read_exr(path)
+        depth = read_data(path)
         depth = depth[..., 0] if depth.ndim == 3 else depth
         check_aspect(depth, size, path)
         mask = self.folder / "mask.png"
         if mask.is_file():
-            data = np.frombuffer(mask.read_bytes(), np.uint8)
-            pixels = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
-            if pixels is None or pixels.shape != depth.shape:
-                raise InputError(f"{mask} is damaged or of another size than depth.exr; {HOW}")
-            depth = np.where(pixels > 127, depth, 0)
+            pixels = read_data(mask)
+            if pixels.shape[:2] != depth.shape:
+                raise InputError(f"{mask} is of another size than depth.exr; {HOW}")
+            depth = np.where(pixels.reshape(*depth.shape, -1)[..., 0] > 0.5, depth, 0)
         depth = np.where(np.isfinite(depth) & (depth > 0), depth, 0).astype(np.float32)
         if not (depth > 0).any():
             raise InputError(f"{path} has no surface anywhere; {HOW}")

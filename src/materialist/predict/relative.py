@@ -58,6 +58,16 @@ def from_affine(relative: Array, camera: Camera, normal: Array | None = None) ->
     return _scaled(farness, depth, camera, normal)
 
 
+def planar(
+    values: Array, camera: Camera, normal: Array | None, *, inverse: bool, name: str
+) -> tuple[Array, str, tuple[str, ...]]:
+    """Planar depth of a relative one, the note for its source, and the warning that the report gives."""
+    depth, ratio = (from_inverse if inverse else from_affine)(values, camera, normal)
+    how = "fitted to the normals" if normal is not None else "assumed"
+    warning = f"Depth from {name} is relative: far / near = {ratio:.1f} was {how}."
+    return depth, f", far / near {ratio:.1f} {how}", (warning,)
+
+
 def _unit(values: Array) -> Array:
     """[H, W] with the settings' percentiles at 0 and 1; a constant map becomes 1."""
     low, high = np.percentile(values, SETTINGS.percentiles)

@@ -1,13 +1,14 @@
-"""Which thickness is taken: that of a surface of revolution by itself, for the rest the network's, or the mirror's."""
+"""Which thickness is taken: that of a surface of revolution by itself, for the rest the network's."""
+
+import importlib
 
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.errors import WeightsError
-from materialist.predict.refraction import choice
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Camera
 
+module = importlib.import_module("materialist.predict.refraction.thickness")  # the package has a function of that name
 CAMERA = Camera(64, 64, 40.0)
 LEVEL = np.array([0.0, 1, 0])
 
@@ -26,29 +27,17 @@ def ball(radius=0.6, distance=3.0):
 
 
 def chosen(depth, normal, mask, **options):
-    return choice.best_thickness(np.full((64, 64, 3), 0.5, np.float32), mask, normal, depth, CAMERA, **options)
+    return module.best_thickness(np.full((64, 64, 3), 0.5, np.float32), mask, normal, depth, CAMERA, **options)
 
 
 def test_a_ball_is_known_whatever_the_network_says_and_half_a_ball_is_not(monkeypatch):
     depth, normal, mask, true = ball()
     solid = (0.4 * true).astype(np.float32)
-    monkeypatch.setattr(choice, "thickness", lambda *_: Thickness(solid, 0.3 * solid))
+    monkeypatch.setattr(module, "thickness", lambda *_: Thickness(solid, 0.3 * solid))
     found = chosen(depth, normal, mask, up=LEVEL)
-    assert found.method == "revolution" and found.thickness.revolution is not None and found.thickness.back is None
-    assert np.abs(found.thickness.solid - true)[mask].sum() < 0.12 * true[mask].sum()
-    assert (found.thickness.hollow <= found.thickness.solid).all() and found.thickness.hollow.max() > 0
+    assert found.method == "revolution" and found.revolution is not None and found.back is None
+    assert np.abs(found.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    assert (found.hollow <= found.solid).all() and found.hollow.max() > 0
     half = mask & (np.arange(64) > 32)
     found = chosen(depth, normal, half, up=LEVEL)
-    assert found.method == "network" and found.thickness.solid is solid
-
-
-def test_without_weights_the_mirror_is_taken(monkeypatch):
-    def missing(*_):
-        raise WeightsError("none")
-
-    monkeypatch.setattr(choice, "thickness", missing)
-    monkeypatch.setattr(choice, "surface_of_revolution", lambda *_, **__: None)
-    depth, normal, mask, true = ball()
-    found = chosen(depth, normal, mask)
-    assert found.method == "symmetry" and (found.thickness.hollow == 0).all()
-    assert np.abs(found.thickness.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    assert found.method == "network" and found.solid is solid

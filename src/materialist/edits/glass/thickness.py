@@ -11,8 +11,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
-from materialist.predict.refraction import thickness
-from materialist.predict.refraction.choice import best_thickness
+from materialist.predict.refraction import best_thickness, thickness
 from materialist.solids.finder import upright
 from materialist.solids.front import smooth_front
 from materialist.solids.revolution import Revolution
@@ -58,14 +57,14 @@ def object_thickness(
 
     Args:
         mask: [H, W] bool at working size.
-        method: `auto` (a surface of revolution where its normals or its outline say so, else RefractionNet, without
-            weights symmetry), `network` (RefractionNet), `symmetry` (the paper's assumption), a map [H, W] of scene
+        method: `auto` (a surface of revolution where its normals or its outline say so, else
+            RefractionNet), `network` (RefractionNet), `symmetry` (the paper's assumption), a map [H, W] of scene
             units along the rays, or a file with one.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
 
     Raises:
         InputError: an unknown method, a map of another size or with negative values, a mask without a surface.
-        WeightsError: `network` without weights.
+        WeightsError: the weights of RefractionNet are missing.
     """
     inside = surface_in(mask, scene.depth, scene.camera)
     rays, photo, maps = pixel_rays(scene.camera), scene.photo.linear, (scene.normal, scene.depth, scene.camera)
@@ -78,17 +77,16 @@ def object_thickness(
         mirrored = symmetric_thickness(front, scene.normal, inside, scene.camera)
         return ObjectThickness(mirrored, WALL.usual * size, "symmetry")
     if method == "network":
-        found, name = thickness(photo, inside, *maps), "network"
+        found = thickness(photo, inside, *maps)
     else:
         up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
-        choice = best_thickness(photo, inside, *maps, up=up, behind=behind)
-        found, name = choice.thickness, choice.method
+        found = best_thickness(photo, inside, *maps, up=up, behind=behind)
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)
     wall = float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL.usual * size
     wall = float(np.clip(wall, WALL.least * size, WALL.most * size))
-    return ObjectThickness(found.solid, wall, name, found.back, found.revolution)
+    return ObjectThickness(found.solid, wall, found.method, found.back, found.revolution)
 
 
 def _given(method: str | Array | Path, inside: Array) -> Array:

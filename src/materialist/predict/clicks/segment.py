@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,17 +19,22 @@ if TYPE_CHECKING:
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
 """The weights that ship with the package; docs/training.md says how they were made."""
-SIDE = 224
-"""Longer side at which the network sees the photo, and then the object's surroundings."""
-AROUND = 1.8
-"""Surroundings that the second look has, in units of the object's extent."""
-CLOSER = 0.8
-"""A second look is worth it where it shows at most this part of the photo."""
-LEAST = 0.3
-"""Smallest part of the photo that it shows: the network has seen no finer detail."""
 
 
-class Photo(NamedTuple):
+@dataclass(frozen=True)
+class ClickSettings:
+    """How ClickNet looks at a photo: once at the whole, then closer at the object. Tuned by eye."""
+
+    side: int = 224  # longer side at which the network sees the photo and the surroundings, pixels
+    around: float = 1.8  # surroundings of the second look, in extents of the object
+    closer: float = 0.8  # largest part of the photo that is worth a second look
+    least: float = 0.3  # smallest part of the photo in a second look: the network learnt no finer detail
+
+
+SETTINGS = ClickSettings()
+
+
+class ClickMaps(NamedTuple):
     """What is known of each pixel."""
 
     rgb: Array
@@ -39,7 +45,7 @@ class Photo(NamedTuple):
     """[H, W] planar, 0 = no surface."""
 
 
-def object_at(photo: Photo, clicks: Sequence[tuple[int, int]], *, weights: str | Path = "") -> Array:
+def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: str | Path = "") -> Array:
     """How likely each pixel belongs to the object that all clicks lie on.
 
     Args:
@@ -71,8 +77,8 @@ def _around(mask: Array, clicks: Sequence[tuple[int, int]]) -> tuple[slice, slic
     rows, columns = np.nonzero(mask)
     rows, columns = np.append(rows, [y for _, y in clicks]), np.append(columns, [x for x, _ in clicks])
     extent = max(np.ptp(rows), np.ptp(columns)) + 1
-    side = max(AROUND * extent, LEAST * max(mask.shape))
-    if side > CLOSER * max(mask.shape):
+    side = max(SETTINGS.around * extent, SETTINGS.least * max(mask.shape))
+    if side > SETTINGS.closer * max(mask.shape):
         return None
     found = []
     for places, size in ((rows, mask.shape[0]), (columns, mask.shape[1])):
@@ -82,16 +88,16 @@ def _around(mask: Array, clicks: Sequence[tuple[int, int]]) -> tuple[slice, slic
     return found[0], found[1]
 
 
-def _seen(network: ClickNet, photo: Photo, clicks: Sequence[tuple[int, int]], window: tuple[slice, slice]) -> Array:
+def _seen(network: ClickNet, photo: ClickMaps, clicks: Sequence[tuple[int, int]], window: tuple[slice, slice]) -> Array:
     """[H, W] float32 share in the window, 0 elsewhere: the mean of what the network says of it and its mirror image."""
     import cv2
     import torch
 
     from materialist.predict.unet import STRIDE
 
-    part = Photo(*(np.ascontiguousarray(v[window], np.float32) for v in photo))
+    part = ClickMaps(*(np.ascontiguousarray(v[window], np.float32) for v in photo))
     height, width = part.depth.shape
-    scale = SIDE / max(height, width)
+    scale = SETTINGS.side / max(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
     way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     rgb, normal = (np.asarray(cv2.resize(v, size, interpolation=way)) for v in (part.rgb, part.normal))

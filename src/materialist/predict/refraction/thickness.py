@@ -13,6 +13,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.silhouette import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
+from materialist.solids.finder import surface_of_revolution
 from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
 
@@ -37,6 +38,11 @@ class Thickness:
     """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
     revolution: Revolution | None = None
     """The whole object, where it is a surface of revolution."""
+
+    @property
+    def method(self) -> str:
+        """`revolution` or `network`."""
+        return "network" if self.revolution is None else "revolution"
 
 
 def thickness(
@@ -73,6 +79,31 @@ def thickness(
     solid, hollow, back = found[..., 0], found[..., 1], found[..., BACK_X:]
     back = back / np.maximum(np.linalg.norm(back, axis=-1, keepdims=True), 1e-6)
     return Thickness(solid, np.minimum(hollow, solid), back)
+
+
+def best_thickness(
+    photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, up: Array | None = None,
+    behind: Array | None = None,
+) -> Thickness:  # fmt: skip
+    """The thickness of the object under a mask: of a surface of revolution by itself, else as RefractionNet says.
+
+    Args:
+        photo_linear, mask, normal, depth, camera: as for `thickness`.
+        up: [3] unit, the upright direction in the camera's frame, where a support tells it.
+        behind: [H, W] planar depth of the surface behind the object, 0 = nothing.
+
+    Returns:
+        As `thickness`; `back` is None for surfaces of revolution, whose `revolution` tells more.
+
+    Raises:
+        InputError and WeightsError as `thickness`.
+    """
+    guess = thickness(photo_linear, mask, normal, depth, camera)
+    found = surface_of_revolution(depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind)
+    if found is None:
+        return guess
+    body, solid = found
+    return Thickness(solid, np.minimum(guess.hollow, solid), revolution=body)
 
 
 def _answer(
