@@ -73,11 +73,11 @@ def test_bad_input():
 def test_fewer_triangles_keep_the_ends_of_walls():
     from dataclasses import asdict, replace
 
-    from materialist.geometry.completion import walls_of
+    from materialist.geometry.completion import continued_walls
     from materialist.geometry.planes import find_planes
 
     scene = room()
-    (wall,) = walls_of(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
+    (wall,) = continued_walls(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
     ends = replace(wall.usual, up=wall.seen.up + 5.0)
     told = replace(scene, provenance={**scene.provenance, "ends": [asdict(ends)]})
     tops = [max(float(part.mesh.vertices[:, 1].max()) for part in scene_parts(s, 3000)[1:]) for s in (scene, told)]

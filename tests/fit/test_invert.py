@@ -11,11 +11,11 @@ from materialist.fit import invert
 from materialist.fit.invert import AUTO, FULL, FitResult, FitSetup, Inversion
 from materialist.fit.plane_extents import FoundExtents
 from materialist.fit.settings import PAPER, Schedule
-from materialist.geometry.ends import Ends
+from materialist.geometry.extents import PlaneExtent
 from materialist.render.scene import RenderScene
 from materialist.types import Photo, Prediction
 
-END = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.0, -1.0, 1.0)
+END = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1.0, 1.0, -1.0, 1.0)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from materialist.fit.engine import TransportEngine
 from materialist.fit.plane_extents import SIDES, ExtentSearch, at_levels, best_light, nonnegative, search_extents
 from materialist.fit.settings import DEFAULT
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import walls_of
+from materialist.geometry.completion import continued_walls
 from materialist.geometry.planes import find_planes
 from materialist.render.scene import RenderScene
 from materialist.types import Camera, Materials
@@ -30,7 +30,7 @@ def sun(direction, height: int = 32) -> np.ndarray:
 @pytest.fixture(scope="module")
 def maps():
     depth, normal, label = room(CAMERA)
-    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
     albedo = np.array([[0.6, 0.5, 0.4], [0.5, 0.5, 0.6], [0.3, 0.5, 0.3]])[label].astype(np.float32)
     matt = np.ones(label.shape, np.float32)
     return depth, normal, wall, Materials(albedo, matt, 0 * matt)
@@ -39,14 +39,14 @@ def maps():
 def pictured(maps, levels, direction) -> tuple:
     """The engine, materials and picture of the room whose wall truly ends at the levels, under a sun."""
     depth, normal, wall, materials = maps
-    geometry = build_geometry(depth, normal, CAMERA, ends=[at_levels(wall, levels)])
+    geometry = build_geometry(depth, normal, CAMERA, extents=[at_levels(wall, levels)])
     renderer = RenderScene(geometry, CAMERA, device="cpu")
     renderer.set_materials(materials)
     renderer.set_envmap(sun(direction))
     photo = renderer.render(spp=256, seed=1)
     photo = (photo * 0.7 / np.percentile(photo, 99)).astype(np.float32)
     engine = TransportEngine(
-        build_geometry(depth, normal, CAMERA, ends=[at_levels(wall, dict.fromkeys(SIDES, 2.0))]),
+        build_geometry(depth, normal, CAMERA, extents=[at_levels(wall, dict.fromkeys(SIDES, 2.0))]),
         CAMERA,
         photo,
         light_height=16,

@@ -8,7 +8,7 @@ import torch
 from geometry_scenes import room
 
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import walls_of
+from materialist.geometry.completion import continued_walls
 from materialist.geometry.planes import find_planes
 from materialist.transport.cache import TransportCache
 from materialist.transport.light import light_matrix
@@ -22,7 +22,7 @@ CAMERA = Camera(40, 30, 60.0)
 def scene():
     """Depth, normals, the wall, materials, and what each pixel sends out."""
     depth, normal, _ = room(CAMERA)
-    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
     rng = np.random.default_rng(0)
     shape = depth.shape
     materials = Materials(
@@ -33,7 +33,7 @@ def scene():
 
 def cache_with(scene, ends) -> TransportCache:
     depth, normal, *_ = scene
-    return TransportCache(build_geometry(depth, normal, CAMERA, ends=[ends]), CAMERA)
+    return TransportCache(build_geometry(depth, normal, CAMERA, extents=[ends]), CAMERA)
 
 
 @pytest.mark.parametrize("move", [{"right": 3.0}, {"up": 2.0, "right": 1.0}, {"right": -4.0, "up": -3.0}])

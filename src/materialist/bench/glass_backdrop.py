@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from materialist.bench.glass_scenes import DEPTH, GlassScene, _light, _mesh, path_traced
-from materialist.geometry.ends import Ends
+from materialist.geometry.extents import PlaneExtent
 from materialist.types import Array
 
 SPP = 256
@@ -35,11 +35,11 @@ class Background:
     """[H, W, 3] unit."""
     albedo: Array
     """[H, W, 3] linear, in [0, 1], with which a rendering under the scene's light shows `picture`."""
-    ends: tuple[Ends, ...] = ()
+    ends: tuple[PlaneExtent, ...] = ()
     """Where its walls end beyond the picture, if light tells."""
 
 
-def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
+def wall_ends(scene: GlassScene, photo: Array) -> tuple[PlaneExtent, ...]:
     """Where walls end as `invert` finds it from the exposed photo [H, W, 3] linear in [0, 1] and the true maps."""
     from materialist.fit.plane_extents import find_extents
     from materialist.fit.settings import preset
@@ -59,7 +59,7 @@ def wall_ends(scene: GlassScene, photo: Array) -> tuple[Ends, ...]:
 
 
 def albedo_of(
-    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[Ends, ...] = (),
+    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[PlaneExtent, ...] = (),
     things: dict[str, Any] | None = None,
 ) -> Array:  # fmt: skip
     """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`.
@@ -79,7 +79,7 @@ def albedo_of(
 
 def lit(
     scene: GlassScene, depth: Array, normal: Array, albedo: Array, envmap: Array, things: dict[str, Any] | None = None,
-    *, ends: tuple[Ends, ...] = (), length: int, spp: int, seed: int = 0, around: Array | None = None,
+    *, ends: tuple[PlaneExtent, ...] = (), length: int, spp: int, seed: int = 0, around: Array | None = None,
 ) -> Array:  # fmt: skip
     """[H, W, 3] linear: Mitsuba objects before the surfaces of the maps, by paths of `length` at most."""
     surfaces = _surfaces(scene, depth, normal, albedo, ends)
@@ -94,7 +94,9 @@ def suppress_missing():
     return suppress(SetupError)
 
 
-def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array, ends: tuple[Ends, ...]) -> dict[str, Any]:
+def _surfaces(
+    scene: GlassScene, depth: Array, normal: Array, albedo: Array, ends: tuple[PlaneExtent, ...]
+) -> dict[str, Any]:
     """The maps' surfaces, planes going on beyond the picture with their mean albedo."""
     from materialist.buffers import tensor
     from materialist.geometry.build import build_geometry
@@ -102,7 +104,7 @@ def _surfaces(scene: GlassScene, depth: Array, normal: Array, albedo: Array, end
 
     if not depth.any():
         return {}
-    geometry, found = build_geometry(depth, normal, scene.camera, ends=ends), {}
+    geometry, found = build_geometry(depth, normal, scene.camera, extents=ends), {}
     for k in np.unique(geometry.mesh.face_plane):
         paint = albedo if k < 0 else np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
         texture = {"type": "bitmap", "data": tensor(scene._mi, paint), "raw": True, "wrap_mode": "clamp"}

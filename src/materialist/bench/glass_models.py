@@ -9,19 +9,19 @@ import numpy as np
 
 from materialist.bench.glass_backdrop import Background, albedo_of, lit, suppress_missing
 from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh, _paint
-from materialist.geometry.ends import Ends
+from materialist.geometry.extents import PlaneExtent
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
 
 
-def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[Ends, ...] = ()) -> Background:
+def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[PlaneExtent, ...] = ()) -> Background:
     """The room as it is, its picture [H, W, 3] rendered without the object."""
     depth, normal = scene.behind.depth, scene.behind.normal
     return Background(room, depth, normal, albedo_of(scene, depth, normal, room, envmap, ends), ends)
 
 
 def inpainted_background(
-    scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0, ends: tuple[Ends, ...] = ()
+    scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0, ends: tuple[PlaneExtent, ...] = ()
 ) -> Background:
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
 

@@ -15,7 +15,7 @@ from materialist.fit.losses import CLIPPED
 from materialist.fit.plane_extents import find_extents
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
-from materialist.geometry.ends import Ends
+from materialist.geometry.extents import PlaneExtent
 from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
@@ -48,7 +48,7 @@ class PreparedFit:
     """A mesh, its path tracer, and a fit that has not run."""
 
     completion: str
-    ends: tuple[Ends, ...]
+    ends: tuple[PlaneExtent, ...]
     """Where walls end beyond the picture; empty: the usual extents."""
     geometry: Geometry
     renderer: RenderScene
@@ -108,7 +108,7 @@ class Inversion:
         self.progress("geometry", 0, 1)
         camera, prior = setup.photo.camera, setup.prior
         geometry = timed(stages, "geometry", lambda: build_geometry(
-            prior.depth, prior.normal, camera, tau=setup.tau, completion=completion, ends=ends, seed=setup.seed
+            prior.depth, prior.normal, camera, tau=setup.tau, completion=completion, extents=ends, seed=setup.seed
         ))  # fmt: skip
         renderer = timed(stages, "scene", lambda: RenderScene(geometry, camera, device=setup.device))
         engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
@@ -140,7 +140,7 @@ class Inversion:
         ])  # fmt: skip
         return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
 
-    def _extents(self, stages: list[dict]) -> tuple[tuple[Ends, ...], tuple[str, ...]]:
+    def _extents(self, stages: list[dict]) -> tuple[tuple[PlaneExtent, ...], tuple[str, ...]]:
         """Where walls end, and what a report should say of it; empty for the usual extents."""
         setup = self.setup
         self.progress("walls", 0, 1)

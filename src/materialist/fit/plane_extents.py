@@ -17,8 +17,8 @@ from materialist.fit.light import start_radiance
 from materialist.fit.losses import encode, residual
 from materialist.fit.settings import ExtentSettings, FitSettings, LightSettings
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import Wall, walls_of
-from materialist.geometry.ends import Ends
+from materialist.geometry.completion import ContinuedWall, continued_walls
+from materialist.geometry.extents import PlaneExtent
 from materialist.geometry.planes import find_planes
 from materialist.transport.walls import WallMatrix
 from materialist.types import Array, Camera, Materials, Prediction
@@ -30,7 +30,7 @@ SIDES = ("left", "right", "up")
 class FoundExtents:
     """What a search came to."""
 
-    ends: tuple[Ends, ...]
+    ends: tuple[PlaneExtent, ...]
     error: float
     """Mean absolute error (encoded) that the best light leaves."""
     usual: float
@@ -41,19 +41,21 @@ def find_extents(
     photo: Array, prior: Prediction, camera: Camera, settings: FitSettings, *, tau: float = 6.0, seed: int = 0
 ) -> FoundExtents | None:
     """The extents of the walls of a photo [H, W, 3] linear; None if there are none, or the usual ones do as well."""
-    walls = walls_of(find_planes(prior.depth, prior.normal, camera, seed=seed), prior.depth, camera)
+    walls = continued_walls(find_planes(prior.depth, prior.normal, camera, seed=seed), prior.depth, camera)
     if not walls:
         return None
     farthest = [at_levels(wall, dict.fromkeys(SIDES, max(settings.extents.levels))) for wall in walls]
-    geometry = build_geometry(prior.depth, prior.normal, camera, tau=tau, completion="planes", ends=farthest, seed=seed)
+    geometry = build_geometry(
+        prior.depth, prior.normal, camera, tau=tau, completion="planes", extents=farthest, seed=seed
+    )
     engine = TransportEngine(geometry, camera, photo, seed=seed, light_height=settings.light_grid)
     flat = torch.from_numpy(np.ascontiguousarray(photo.reshape(-1, 3), np.float32))
     return search_extents(engine, prior.materials, flat, settings, walls, seed)
 
 
 def search_extents(
-    engine: TransportEngine, materials: Materials, photo: torch.Tensor, settings: FitSettings, walls: Sequence[Wall],
-    seed: int = 0,
+    engine: TransportEngine, materials: Materials, photo: torch.Tensor, settings: FitSettings,
+    walls: Sequence[ContinuedWall], seed: int = 0,
 ) -> FoundExtents | None:  # fmt: skip
     """The extents that explain a photo [H * W, 3] best: found on a coarse map of the light, chosen on a finer one.
 
@@ -67,7 +69,7 @@ def search_extents(
     return FoundExtents(best, error, before) if search.clearly_less(error, before) else None
 
 
-def at_levels(wall: Wall, levels: dict[str, float]) -> Ends:
+def at_levels(wall: ContinuedWall, levels: dict[str, float]) -> PlaneExtent:
     """The usual lower side, and the others at levels beyond what is seen of the wall, in its seen size."""
     seen, size = wall.seen, wall.size
     return replace(
@@ -79,7 +81,7 @@ def at_levels(wall: Wall, levels: dict[str, float]) -> Ends:
     )
 
 
-def nowhere(wall: Wall) -> Ends:
+def nowhere(wall: ContinuedWall) -> PlaneExtent:
     """No continuation."""
     return replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
 
@@ -94,7 +96,7 @@ class ExtentSearch:
 
     def __init__(
         self, engine: TransportEngine, materials: Materials, photo: torch.Tensor, settings: FitSettings,
-        walls: Sequence[Wall], height: int, seed: int = 0,
+        walls: Sequence[ContinuedWall], height: int, seed: int = 0,
     ):  # fmt: skip
         self.walls, self.photo = walls, photo
         self.light, self.settings = settings.light, settings.extents
@@ -103,30 +105,30 @@ class ExtentSearch:
         planes = [(np.array(wall.usual.normal), wall.index) for wall in walls]
         slots = engine.cache.slot_radiance(engine.radiance)
         self._matrix = WallMatrix(engine.cache, materials, np.sort(rows), height, planes, slots)
-        self._errors: dict[tuple[Ends, ...], float] = {}
+        self._errors: dict[tuple[PlaneExtent, ...], float] = {}
         self._start: torch.Tensor | None = None
         self._start = self._explained(tuple(wall.usual for wall in walls))[1]
 
-    def candidates(self, usual: tuple[Ends, ...]) -> list[tuple[Ends, ...]]:
+    def candidates(self, usual: tuple[PlaneExtent, ...]) -> list[tuple[PlaneExtent, ...]]:
         """What descents from the usual extents, or from even ones, come to, and the best of what they tried."""
         even = [tuple(at_levels(w, dict.fromkeys(SIDES, k)) for w in self.walls) for k in self.settings.starts]
         starts = sorted([usual, tuple(map(nowhere, self.walls)), *even], key=self.error)
         best = min((self._descended(ends) for ends in starts[: self.settings.descents]), key=self.error)
         return [best, *sorted(self._errors, key=self.error)[: self.settings.finalists]]
 
-    def error(self, ends: tuple[Ends, ...]) -> float:
+    def error(self, ends: tuple[PlaneExtent, ...]) -> float:
         """Mean absolute error (encoded) under the best light, which is sought from the same light for all extents."""
         if ends not in self._errors:
             self._errors[ends] = self._explained(ends)[0]
         return self._errors[ends]
 
-    def _explained(self, ends: tuple[Ends, ...]) -> tuple[float, torch.Tensor]:
+    def _explained(self, ends: tuple[PlaneExtent, ...]) -> tuple[float, torch.Tensor]:
         matrix, indirect = self._matrix.ended(ends)
         photo = self.photo[matrix.pixels]
         rest = matrix.combine(indirect)
         return best_light(matrix.per_channel(), rest, photo, self.light, self.settings, self._start)
 
-    def _descended(self, ends: tuple[Ends, ...]) -> tuple[Ends, ...]:
+    def _descended(self, ends: tuple[PlaneExtent, ...]) -> tuple[PlaneExtent, ...]:
         """One side of one wall after the other at its best level, while that helps."""
         for _ in range(self.settings.sweeps):
             before = self.error(ends)
@@ -138,7 +140,7 @@ class ExtentSearch:
                 break
         return ends
 
-    def _better(self, ends: tuple[Ends, ...], k: int, others: list[Ends]) -> tuple[Ends, ...]:
+    def _better(self, ends: tuple[PlaneExtent, ...], k: int, others: list[PlaneExtent]) -> tuple[PlaneExtent, ...]:
         """The extents with the best of `others` for wall k, where that is clearly better."""
         every = [(*ends[:k], other, *ends[k + 1 :]) for other in others]
         least = min(map(self.error, every))
@@ -151,7 +153,7 @@ class ExtentSearch:
         return error < before - max(self.settings.gain * before, self.settings.least_gain)
 
 
-def _moved(end: Ends, wall: Wall, side: str, level: float) -> Ends:
+def _moved(end: PlaneExtent, wall: ContinuedWall, side: str, level: float) -> PlaneExtent:
     """The extents with one side at a level; a wall that went nowhere has the others where the picture shows them."""
     if end.right <= end.left:
         end = at_levels(wall, dict.fromkeys(SIDES, 0.0))

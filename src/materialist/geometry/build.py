@@ -11,7 +11,7 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.geometry.boundary import QUAD, depth_to_mesh, face_camera
 from materialist.geometry.completion import complete
-from materialist.geometry.ends import Ends
+from materialist.geometry.extents import PlaneExtent
 from materialist.geometry.planes import find_planes
 from materialist.types import Array, Camera, Geometry, Mesh
 
@@ -31,13 +31,13 @@ def build_geometry(
     *,
     tau: float = 6.0,
     completion: str = "planes",
-    ends: Sequence[Ends] = (),
+    extents: Sequence[PlaneExtent] = (),
     seed: int = 0,
 ) -> Geometry:
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
-    completion: one of `COMPLETIONS` or `SYNONYMS`. ends: where continued walls end, if that is known.
+    completion: one of `COMPLETIONS` or `SYNONYMS`. extents: where continued walls end, if that is known.
     Raises InputError for maps or options that cannot be used.
     """
     completion = completion_named(completion)
@@ -47,7 +47,7 @@ def build_geometry(
         planes = find_planes(depth, normal, camera, seed=seed)
         for k, plane in enumerate(planes):
             label[plane.mask] = k
-        mesh = complete(mesh, planes, depth, camera, walls=completion == "planes", ends=ends)
+        mesh = complete(mesh, planes, depth, camera, walls=completion == "planes", extents=extents)
     return Geometry(split_creases(mesh, depth, normal), label)
 
 

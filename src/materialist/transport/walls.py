@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from materialist.buffers import integers
-from materialist.geometry.ends import Ends, axes
+from materialist.geometry.extents import PlaneExtent, axes
 from materialist.transport.cache import MISS, TransportCache
 from materialist.transport.light import (
     LightMatrix,
@@ -60,7 +60,7 @@ class _Rays:
         return _Rays(self.row[these], (self.weights[0][these], self.weights[1][these]), diffuse, self.index[these],
                      self.share[these], layers, self.last[these])  # fmt: skip
 
-    def met(self, ends: Sequence[Ends]) -> Array:
+    def met(self, ends: Sequence[PlaneExtent]) -> Array:
         """[N] uint32 slot that each ray meets, or MISS, where wall k ends as ends[k] says."""
         slot = self.last.copy()
         for wall, x, y, there in reversed(self.layers):
@@ -106,7 +106,7 @@ class WallMatrix:
                 add_to_map(faced, each.index, each.share, each.diffuse)
         self._faced = faced
 
-    def ended(self, ends: Sequence[Ends]) -> tuple[LightMatrix, torch.Tensor]:
+    def ended(self, ends: Sequence[PlaneExtent]) -> tuple[LightMatrix, torch.Tensor]:
         """The matrix, and [2, Q, 3] what arrives by way of other surfaces, where wall k ends as ends[k] says."""
         totals = tuple(t.clone() for t in self._fixed)
         for each in self._open:
@@ -119,7 +119,7 @@ class WallMatrix:
         )  # fmt: skip
         return matrix, indirect
 
-    def _add(self, totals: tuple[torch.Tensor, ...], each: _Rays, ends: Sequence[Ends]) -> None:
+    def _add(self, totals: tuple[torch.Tensor, ...], each: _Rays, ends: Sequence[PlaneExtent]) -> None:
         """What rays bring, added to both parts, the light by way of surfaces, and what is open."""
         parts, indirect, free = totals
         slot = each.met(ends)

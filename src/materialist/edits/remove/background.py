@@ -274,12 +274,12 @@ def _given(scene: Scene, background, inpaint: Inpaint | None, hole: Hole) -> tup
 
 def _geometry(scene: Scene, found: Behind):
     from materialist.geometry.build import build_geometry, completion_of
-    from materialist.geometry.ends import told
+    from materialist.geometry.extents import read_extents
 
     options = scene.provenance
     return build_geometry(
         found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
-        completion=completion_of(scene.geometry, options.get("completion")), ends=told(options),
+        completion=completion_of(scene.geometry, options.get("completion")), extents=read_extents(options),
         seed=int(options.get("seed", 0) or 0),
     )  # fmt: skip
 

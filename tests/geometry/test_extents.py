@@ -1,4 +1,4 @@
-"""Ends of walls: told, found again on changed maps, and kept to by the mesh."""
+"""Extents of walls: read from provenance, found again on changed maps, and kept to by the mesh."""
 
 import json
 from dataclasses import asdict, replace
@@ -9,8 +9,8 @@ from geometry_scenes import room, trace
 
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
-from materialist.geometry.completion import walls_of
-from materialist.geometry.ends import Ends, axes, ends_of, told
+from materialist.geometry.completion import continued_walls
+from materialist.geometry.extents import PlaneExtent, axes, extent_of, read_extents
 from materialist.geometry.planes import Plane, find_planes
 from materialist.types import Camera
 
@@ -34,13 +34,13 @@ def test_axes_are_right_handed_and_upright(normal):
 
 def test_a_wall_ends_where_it_is_told():
     depth, normal, _ = room(CAMERA)
-    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
     np.testing.assert_allclose(wall.usual.normal, (0, 0, 1), atol=0.02)
     half = 6 * CAMERA.width / (2 * CAMERA.focal)
     assert wall.seen.left == pytest.approx(-half, rel=0.03) and wall.seen.right == pytest.approx(half, rel=0.03)
     for right, up in ((half + 1, wall.seen.up), (half + 1, wall.seen.up + 2), (half + 3, wall.seen.up + 2)):
         ends = replace(wall.usual, left=-half - 0.5, right=right, up=up)
-        mesh = build_geometry(depth, normal, CAMERA, ends=[ends]).mesh
+        mesh = build_geometry(depth, normal, CAMERA, extents=[ends]).mesh
         for x, y in ((half + 0.8, 0), (half + 2, 1), (half + 3.5, 0), (-half - 0.3, 0), (-half - 0.8, 0), (0, up + 0.2),
                      (0, up - 0.2)):  # fmt: skip
             inside = -half - 0.5 < x < right and y < up
@@ -49,7 +49,7 @@ def test_a_wall_ends_where_it_is_told():
 
 def test_a_wall_may_go_nowhere():
     depth, normal, _ = room(CAMERA)
-    (wall,) = walls_of(find_planes(depth, normal, CAMERA), depth, CAMERA)
+    (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
     nowhere = replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
     meshes = [build_geometry(depth, normal, CAMERA, **o).mesh for o in ({"ends": [nowhere]}, {"completion": "planes"})]
     faces = [int((mesh.face_plane == wall.index).sum()) for mesh in meshes]
@@ -58,18 +58,18 @@ def test_a_wall_may_go_nowhere():
 
 
 def test_ends_are_those_of_the_nearest_plane():
-    first = Ends((0.0, 0.0, 1.0), -3.0, -1, 1, -1, 1)
+    first = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1, 1, -1, 1)
     tilted = replace(first, normal=(0.2, 0.0, 0.98))
     plane = Plane(np.array([0.05, 0, 0.9987]), -3.1, NONE)
-    assert ends_of(plane, [tilted, first]) is first
-    assert ends_of(replace(plane, offset=-4.0), [first]) is None
-    assert ends_of(replace(plane, normal=np.array([1.0, 0, 0])), [first]) is None
+    assert extent_of(plane, [tilted, first]) is first
+    assert extent_of(replace(plane, offset=-4.0), [first]) is None
+    assert extent_of(replace(plane, normal=np.array([1.0, 0, 0])), [first]) is None
 
 
 def test_provenance_holds_ends():
-    ends = Ends((0.0, 0.0, 1.0), -3.0, -1.0, 1.5, -1.0, 2.0)
-    assert told(json.loads(json.dumps({"ends": [asdict(ends)]}))) == (ends,)
-    assert told({}) == told({"ends": None}) == ()
+    ends = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1.0, 1.5, -1.0, 2.0)
+    assert read_extents(json.loads(json.dumps({"ends": [asdict(ends)]}))) == (ends,)
+    assert read_extents({}) == read_extents({"ends": None}) == ()
     for broken in (3, [{"normal": [0, 0, 1]}], [{**asdict(ends), "normal": [1]}], [{**asdict(ends), "up": "high"}]):
         with pytest.raises(InputError, match="ends of its walls"):
-            told({"ends": broken})
+            read_extents({"ends": broken})

@@ -1,4 +1,4 @@
-"""Where the continuation of a wall or ceiling ends beyond the picture."""
+"""Extents of planes: where the continuation of a wall or ceiling ends beyond the picture."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NUMBERS = ("offset", "left", "right", "down", "up")
 
 
 @dataclass(frozen=True)
-class Ends:
+class PlaneExtent:
     """A rectangle on one plane, in the plane's own `axes`, whose origin is the point nearest to the camera."""
 
     normal: tuple[float, float, float]
@@ -40,15 +40,15 @@ class Ends:
         return (x > self.left) & (x < self.right) & (y > self.down) & (y < self.up)
 
 
-def told(provenance: dict[str, Any]) -> tuple[Ends, ...]:
-    """What a scene's provenance says about the ends of its walls; nothing if it is of an older version.
+def read_extents(provenance: dict[str, Any]) -> tuple[PlaneExtent, ...]:
+    """The extents of continued walls in a scene's provenance; none in that of an older version.
 
     Raises:
-        InputError: something else stands there.
+        InputError: they cannot be read.
     """
     try:
         return tuple(
-            Ends((float(n[0]), float(n[1]), float(n[2])), *(float(one[name]) for name in _NUMBERS))
+            PlaneExtent((float(n[0]), float(n[1]), float(n[2])), *(float(one[name]) for name in _NUMBERS))
             for one in provenance.get("ends") or ()
             for n in (one["normal"],)
         )
@@ -67,11 +67,11 @@ def axes(normal: Array) -> Array:
     return np.stack([across, np.cross(normal, across)])
 
 
-def ends_of(plane: Plane, ends: Iterable[Ends]) -> Ends | None:
-    """Those of this plane, if any."""
+def extent_of(plane: Plane, extents: Iterable[PlaneExtent]) -> PlaneExtent | None:
+    """The extent that belongs to this plane, if any."""
     close = [
         (float(np.dot(e.normal, plane.normal)), e)
-        for e in ends
+        for e in extents
         if np.dot(e.normal, plane.normal) > _SAME_NORMAL
         and abs(e.offset - plane.offset) <= _SAME_OFFSET * max(-e.offset, -plane.offset)
     ]
