@@ -105,7 +105,7 @@ def test_the_network_is_believed_where_it_is_certain(table, monkeypatch, certain
     monkeypatch.setattr(objects, "clicknet", lambda scene, points: likely)
     monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: first)
     monkeypatch.setattr(objects, "refined", lambda scene, rough, points, likely: rough)
-    for found in (select(scene, box=around(first, 6)), select(scene, click=(45, 50))):
+    for found in (select(scene, box=around(half, 2)), select(scene, click=(45, 50))):
         assert overlap(found, half if certain else first) > 0.9
 
 
@@ -114,6 +114,14 @@ def test_an_object_that_ends_outside_of_the_box_is_not_meant(table, monkeypatch)
     monkeypatch.setattr(objects, "clicknet", lambda scene, points: np.ones(first.shape, np.float32))
     box = around(first, 6)
     np.testing.assert_array_equal(select(scene, box=box), select(scene, box=box, method="grabcut"))
+
+
+def test_an_object_that_does_not_fill_the_box_is_not_meant(table, monkeypatch):
+    scene, first, _ = table
+    speck = np.zeros(first.shape, np.float32)
+    speck[50:53, 50:53] = 1
+    monkeypatch.setattr(objects, "clicknet", lambda scene, points: speck)
+    assert overlap(select(scene, box=around(first, 0)), first) > 0.85
 
 
 def test_a_box_on_nothing_says_what_to_do(table, monkeypatch):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.select.grabcut import CERTAIN, POSSIBLE, PROBABLE, grabcut, refined, tidy
+from materialist.edits.select.grabcut import CERTAIN, POSSIBLE, PROBABLE, grabcut, overlap, refined, tidy
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
@@ -25,6 +25,8 @@ class SelectSettings:
     """Places in a box, shares of its sides, at which ClickNet is asked for the object there (tuned by eye)."""
     within: float = 0.8
     """Share of an object that must lie in the box: a table's does not (tuned by eye)."""
+    fills: float = 0.6
+    """Overlap of an object's own box with the given one from which ClickNet's is taken (tuned by eye)."""
     core: float = 0.01
     """Radius around a click that is certainly of the object, share of the longer side (tuned by eye)."""
     probable: float = 0.08
@@ -48,17 +50,29 @@ def object_at(
 
 
 def object_in(scene: Scene, box: Box, *, network: bool = True, settings: SelectSettings = DEFAULT) -> Array:
-    """[H, W] bool of the object in a box, by ClickNet where it is certain, else by GrabCut.
+    """[H, W] bool of the object in a box, by ClickNet where it is certain of one that fills the box, else by GrabCut.
 
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
-    if network:
-        likely = _in_box(scene, box, settings)
-        if likely.any() and certainty(likely) >= settings.certain:
-            return tidy(likely > 0.5, ())
+    likely = _in_box(scene, box, settings) if network else np.zeros(scene.depth.shape, np.float32)
+    known = tidy(likely > 0.5, ())
+    if box_overlap(known, box) >= settings.fills and certainty(likely) >= settings.certain:
+        return known
     label = np.zeros(scene.depth.shape, np.uint8)
     label[box[1] : box[3], box[0] : box[2]] = PROBABLE
-    return tidy(grabcut(scene, label, rounds=5), ())
+    found = tidy(grabcut(scene, label, rounds=5), ())
+    return found if box_overlap(found, box) >= min(box_overlap(known, box), settings.fills) else known
+
+
+def box_overlap(mask: Array, box: Box) -> float:
+    """Intersection over union of the bounding box of a mask [H, W] bool with a box; 0 for an empty mask."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    if not rows.size:
+        return 0.0
+    own, given = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
+    own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
+    given[box[1] : box[3], box[0] : box[2]] = True
+    return overlap(own, given)
 
 
 def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
