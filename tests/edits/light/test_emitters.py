@@ -259,10 +259,8 @@ def test_lights_glass_and_removals_meet():
         without(relight(fit, dim=0.3), window, fitted=fit)
     pane = spot(slice(5, 20), slice(10, 20))
     before = glass(fit, pane, roughness=0.5, tint=(0.2, 0.9, 0.2), thickness="symmetry")
-    dim, inside = relight(before, dim=0.5, fitted=fit), (slice(7, 9), slice(13, 17))
-    shown, plain = (composite(fit, dim, spp=16, full_render=full)[inside] for full in (False, True))
-    np.testing.assert_allclose(shown.mean((0, 1)), plain.mean((0, 1)), rtol=0.15)  # nothing of the photo's light
-    assert shown[..., 1].mean() > 1.2 * shown[..., 0].mean(), "the glass stays green"
+    shown = composite(fit, relight(before, dim=0.5, fitted=fit), spp=16)[7:9, 13:17]
+    assert shown.max() < 0.2 and shown[..., 1].mean() > 1.2 * shown[..., 0].mean(), "green glass, and no window on it"
 
 
 def test_dimming_by_one_is_none_and_dimming_brightens_nothing():

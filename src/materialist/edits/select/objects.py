@@ -27,6 +27,8 @@ class SelectSettings:
     """Share of an object that must lie in the box: a table's does not (tuned by eye)."""
     fills: float = 0.6
     """Overlap of an object's own box with the given one from which ClickNet's is taken (tuned by eye)."""
+    growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)
+    """Margins around a box that are tried until its object fills it, shares of its shorter side (tuned by eye)."""
     core: float = 0.01
     """Radius around a click that is certainly of the object, share of the longer side (tuned by eye)."""
     probable: float = 0.08
@@ -58,10 +60,15 @@ def object_in(scene: Scene, box: Box, *, network: bool = True, settings: SelectS
     known = tidy(likely > 0.5, ())
     if box_overlap(known, box) >= settings.fills and certainty(likely) >= settings.certain:
         return known
-    label = np.zeros(scene.depth.shape, np.uint8)
-    label[box[1] : box[3], box[0] : box[2]] = PROBABLE
-    found = tidy(grabcut(scene, label, rounds=5), ())
-    return found if box_overlap(found, box) >= min(box_overlap(known, box), settings.fills) else known
+    best = known
+    for share in settings.growth:
+        more = round(share * min(box[2] - box[0], box[3] - box[1]))
+        label = np.zeros(scene.depth.shape, np.uint8)
+        label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = PROBABLE
+        best = max(tidy(grabcut(scene, label, rounds=5), ()), best, key=lambda mask: box_overlap(mask, box))
+        if box_overlap(best, box) >= settings.fills:
+            break
+    return best
 
 
 def box_overlap(mask: Array, box: Box) -> float:
