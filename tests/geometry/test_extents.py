@@ -51,7 +51,7 @@ def test_a_wall_may_go_nowhere():
     depth, normal, _ = room(CAMERA)
     (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
     nowhere = replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
-    meshes = [build_geometry(depth, normal, CAMERA, **o).mesh for o in ({"ends": [nowhere]}, {"completion": "planes"})]
+    meshes = [build_geometry(depth, normal, CAMERA, extents=told).mesh for told in ([nowhere], [])]
     faces = [int((mesh.face_plane == wall.index).sum()) for mesh in meshes]
     floors = build_geometry(depth, normal, CAMERA, completion="floors").mesh
     assert faces[0] == int((floors.face_plane == wall.index).sum()) < faces[1]
