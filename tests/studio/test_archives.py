@@ -10,7 +10,7 @@ from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
-from materialist.studio import archives, objects, uploads
+from materialist.studio import StudioSettings, archives, objects
 from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
@@ -98,7 +98,7 @@ LIST = "- edit: {mask: m.png, hue: 3}"
     ],
 )  # fmt: skip
 def test_zips_that_are_refused(tmp_path, monkeypatch, members, words):
-    monkeypatch.setattr(uploads, "MAX_MEGABYTES", 2)
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(upload_megabytes=2))
     desk = tmp_path / "desk"
     desk.mkdir()
     with pytest.raises(InputError, match=words) as error:
@@ -109,7 +109,7 @@ def test_zips_that_are_refused(tmp_path, monkeypatch, members, words):
 def test_a_zip_that_would_fill_the_disk_or_is_none(tmp_path, monkeypatch):
     desk = tmp_path / "desk"
     desk.mkdir()
-    monkeypatch.setattr(archives, "MAX_UNPACKED", 1_000_000)
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):
         unpack(desk, zipped(tmp_path, {"edits.yaml": LIST, "m.png": "x" * 2_000_000}))
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")

@@ -9,7 +9,7 @@ from studio_scenes import package, png_header
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
-from materialist.studio import archives, uploads
+from materialist.studio import StudioSettings, archives, uploads
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_zips_that_are_none(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "c.zip", "w", zipfile.ZIP_DEFLATED) as pack:
         pack.writestr("scene.json", "{}")
         pack.writestr("mesh.ply", b"\0" * 5_000_000)
-    monkeypatch.setattr(archives, "MAX_UNPACKED", 1_000_000)
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):
         archives.unpack_scene(tmp_path / "c.zip", tmp_path / "target", "c.zip")
     assert not (tmp_path / "target").exists()

@@ -26,13 +26,19 @@ from materialist.jobs.pool import LocalPool, Pool
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
-TRIES = 3
-"""How often a photo is begun whose worker dies."""
-REFRESH = 30.0
-"""Seconds between two writings of the summary and the page while the batch runs."""
-SHARE = 50
-"""The batch does this many times as much other work before it writes them again."""
 Watch = Callable[[Status], None]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How often a batch does things; tuned by eye."""
+
+    tries: int = 3  # how often a photo is begun whose worker dies
+    refresh: float = 30.0  # least seconds between two writings of the summary and the page while the batch runs,
+    share: float = 50  # and least ratio of other work to the time of a writing
+
+
+PACE = Pace()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +77,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.png.
 
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
-    photo, which is begun again, `TRIES` times in all. The results do not depend on the number of workers.
+    photo, which is begun again, `Pace.tries` times in all. The results do not depend on the number of workers.
 
     Args:
         source: a folder, a list file, a photo, or a URL; see `list_photos`.
@@ -205,7 +211,7 @@ class _Run:
                 self.tell(None)
                 for key, message in pool.wait(1.0):
                     self._hear(self._tasks[key], message)
-                if time.monotonic() - self._written > max(REFRESH, SHARE * self._writing):
+                if time.monotonic() - self._written > max(PACE.refresh, PACE.share * self._writing):
                     self.write()
         finally:
             pool.close()
@@ -243,14 +249,14 @@ class _Run:
             self._stages[task.id] = str(message.facts.get("stage", self._stages[task.id]))
             return
         facts, stage = message.facts, self._stages.pop(task.id, None)
-        if message.kind == LOST and self._tries[task.id] < TRIES:
+        if message.kind == LOST and self._tries[task.id] < PACE.tries:
             self._waiting.appendleft(task)
             self.tell(f"{task.id}: {facts['reason']} It is begun again.")
             return
         if message.kind == FAILED:
             _stop_if_for_all(facts)
         if message.kind == LOST:
-            facts = {**facts, "reason": f"{facts['reason']} It was begun {TRIES} times.", "stage": stage}
+            facts = {**facts, "reason": f"{facts['reason']} It was begun {PACE.tries} times.", "stage": stage}
         if "photo_hash" in facts and is_url(task.location):
             facts = {**facts, "photo_version": fingerprint(task.location)}
         before = self._ledger.last.get(task.id, {})
@@ -265,7 +271,7 @@ class _Run:
         self.tell(_line(task, kind, facts), urgent=kind == FAILED)
 
     def tell(self, news: str | None, urgent: bool = False) -> None:
-        """Report the state, and what has happened."""
+        """Reporter the state, and what has happened."""
         total, over = len(self._photos), self._kept + self._through
         rate = self._through / max(time.monotonic() - self._worked, 1e-9)
         left = (total - over) / rate if rate else None

@@ -8,7 +8,7 @@ from typing import Any
 
 from materialist.errors import SetupError
 from materialist.jobs.process import LOST, Message
-from materialist.jobs.worker import Report, run
+from materialist.jobs.worker import Reporter, run
 
 PATIENCE = 10.0
 """Seconds that a cluster has to accept a connection."""
@@ -81,7 +81,7 @@ class RayPool:
 
 def _run(task: Callable[..., Any], arguments: dict[str, Any]) -> tuple[str, Any]:
     """The Ray task. It raises nothing, because the exception's class might not be known elsewhere."""
-    return run(task, Report(lambda kind, facts: None), arguments)
+    return run(task, Reporter(lambda kind, facts: None), arguments)
 
 
 def _check_reachable(address: str) -> None:

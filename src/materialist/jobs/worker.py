@@ -22,13 +22,13 @@ from typing import Any
 from materialist.errors import MaterialistError
 
 READY, PROGRESS, FOUND, DONE, FAILED = "ready", "progress", "found", "done", "failed"
-"""Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Report.found`; of
+"""Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Reporter.found`; of
 DONE: what the task returned; of FAILED: see `failure`."""
 INTERVAL = 0.1
 """Seconds between two messages about the progress of one stage."""
 
 
-class Report:
+class Reporter:
     """Callback of a task: `report(stage, done, total)` tells progress, `report.found(...)` an intermediate result."""
 
     def __init__(self, send: Callable[[str, Any], None], waiting: Callable[[], bool] = lambda: False):
@@ -90,7 +90,7 @@ def _sender(connection: Connection) -> Callable[[Any], None]:
 
 def _do(content: bytes, send: Callable[[Any], None], waiting: Callable[[], bool]) -> None:
     number = 0
-    report = Report(lambda kind, facts: send((kind, facts, number)), waiting)
+    report = Reporter(lambda kind, facts: send((kind, facts, number)), waiting)
     try:
         number, load = pickle.loads(content)
         task, arguments = pickle.loads(load)
@@ -100,7 +100,7 @@ def _do(content: bytes, send: Callable[[Any], None], waiting: Callable[[], bool]
     send((kind, facts, number))
 
 
-def run(task: Callable[..., Any], report: Report, arguments: dict[str, Any]) -> tuple[str, Any]:
+def run(task: Callable[..., Any], report: Reporter, arguments: dict[str, Any]) -> tuple[str, Any]:
     """(DONE, what the task returned) or (FAILED, why)."""
     try:
         return DONE, task(report, **arguments)

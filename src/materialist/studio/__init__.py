@@ -3,3 +3,37 @@
 A page (`page`, `tab_*`) turns clicks into calls of a `session.Session`; what takes long is a function of `tasks` that
 `jobs` runs in a process of its own, which can be stopped at any time. Scenes and edits lie in a `workspace.WorkFolder`.
 """
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StudioSettings:
+    """Limits and sizes of the studio; tuned by eye."""
+
+    upload_megabytes: float = 60  # largest upload
+    upload_pixels: int = 60_000_000  # largest picture, from its header
+    unpacked_bytes: int = 1_500_000_000  # largest zip once unpacked
+    free_for_scene: float = 1.2e9  # bytes of memory that must be free before another scene is opened
+    free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced
+    glass_idle: float = 900.0  # seconds without a request after which the glass process ends
+    glass_niceness: int = 3  # after live previews, before inversions and final pictures: somebody waits at a slider
+    glass_bodies: int = 2  # bodies that the glass process keeps: going between two objects builds nothing anew
+    undo_steps: int = 60  # length of the undo history
+    scenes_kept: int = 24  # edited scenes that a preview keeps: moving the last step must not replay those before
+    triangles: int = 12_000  # of a body in a sketch; of a finer mesh every n-th, and the gaps are closed
+    jpeg_quality: int = 88  # of live pictures
+    draft_spp: int = 16  # paths a pixel of a quick look at the final picture
+    final_spp: int = 256  # paths a pixel of the final picture
+    video_frames: int = 24  # of the turning light
+    video_spp: int = 32  # paths a pixel of its frames
+    part: float = 0.4  # a found object is taken out of a selection if it covers less than this share of it,
+    inside: float = 0.9  # and if more than this share of the object lies in the selection
+    message_seconds: float = 12  # a message stays on the page
+    poll_seconds: float = 0.3  # between two looks at a job
+    lamp_share: float = 0.75  # a new lamp hangs at this share of the way from the camera to the clicked surface
+
+
+SETTINGS = StudioSettings()

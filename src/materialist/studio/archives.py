@@ -16,14 +16,12 @@ from pathlib import Path
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
-from materialist.studio import uploads
+from materialist.studio import SETTINGS, uploads
 from materialist.studio.workspace import read_list, store, with_files
 
 _STEMS = {"envmap": "light"}
 """Option -> the stem of its files in a workspace, where that is another word."""
 _ADVICE = "give the zip that 'edits.yaml with its masks' makes"
-MAX_UNPACKED = 1_500_000_000
-"""Largest scene package once unpacked, bytes."""
 _MEMBER = re.compile(
     r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
     r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr|"
@@ -60,10 +58,10 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
                 entry, file = members.get(root + name), folder / name
                 if entry is None:
                     raise InputError(f"{shown} lacks the file {name}, which its list of edits names; {_ADVICE}.")
-                if entry.file_size > uploads.MAX_MEGABYTES * 1e6:
+                if entry.file_size > SETTINGS.upload_megabytes * 1e6:
                     raise InputError(
                         f"{name} in {shown} has {entry.file_size / 1e6:.0f} MB; the studio takes up to "
-                        f"{uploads.MAX_MEGABYTES} MB a file."
+                        f"{SETTINGS.upload_megabytes} MB a file."
                     )
                 unpack_member(given, entry, file, shown)
                 return file
@@ -77,8 +75,8 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
 
             steps = read_list(taken(found.removeprefix(root)))
             total = sum(members[root + name].file_size for name in named(steps) if root + name in members)
-            if total > MAX_UNPACKED:
-                most = f"{MAX_UNPACKED / 1e9:g} GB"
+            if total > SETTINGS.unpacked_bytes:
+                most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
                 raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
             return tuple(replace(with_files(step, moved), folder=workspace) for step in steps)
 
@@ -126,8 +124,9 @@ def _members(pack: zipfile.ZipFile, shown: str) -> list[tuple[zipfile.ZipInfo, s
         if info.filename.startswith(root) and _MEMBER.fullmatch(info.filename.removeprefix(root))
     ]
     total = sum(info.file_size for info, _ in found)
-    if total > MAX_UNPACKED:
-        raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {MAX_UNPACKED / 1e9:g} GB.")
+    if total > SETTINGS.unpacked_bytes:
+        most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
+        raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
     return found
 
 

@@ -20,17 +20,10 @@ from materialist.edits.glass.glass import check_glass
 from materialist.edits.recipe import REGION, Step, apply, glass_arguments
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
-from materialist.jobs.worker import DONE, FAILED, PROGRESS, Report
+from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
+from materialist.studio import SETTINGS
 from materialist.types import Array, Scene
 
-LEAST_FREE = 2.0e9
-"""Bytes of memory that must be free before the process starts."""
-IDLE = 900.0
-"""Seconds without a request after which the process ends."""
-NICENESS = 3
-"""After live previews, before inversions and final pictures: somebody waits at a slider."""
-BODIES = 2
-"""Bodies that the process keeps: going to and fro between two objects builds nothing anew."""
 VALUES = ("ior", "transmission", "tint", "roughness")
 """Options of a glass step that its body does not depend on."""
 Tint = tuple[float, float, float]
@@ -183,11 +176,11 @@ class GlassClient:
     def _start(self) -> None:
         import psutil
 
-        if psutil.virtual_memory().available < LEAST_FREE:
+        if psutil.virtual_memory().available < SETTINGS.free_for_glass:
             raise InputError(
                 "This machine has too little memory free to trace glass while sliders move; press Quick look instead."
             )
-        self._worker, self._stage = Worker(niceness=NICENESS, idle=IDLE), "load"
+        self._worker, self._stage = Worker(niceness=SETTINGS.glass_niceness, idle=SETTINGS.glass_idle), "load"
         threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()
 
     def _listen(self, worker: Worker) -> None:
@@ -233,7 +226,7 @@ class GlassBodies:
         self._scene: tuple[str, Any] | None = None
         self._built: OrderedDict[str, Any] = OrderedDict()
 
-    def preview(self, report: Report, request: Request) -> tuple[Any, dict[str, Any]]:
+    def preview(self, report: Reporter, request: Request) -> tuple[Any, dict[str, Any]]:
         """(the `GlassPreview` of a request, values for its picture). Raises InputError."""
         folder, key = Path(request["folder"]), body_key(request)
         report("load", 0, 1)
@@ -247,7 +240,7 @@ class GlassBodies:
             fixed = {name: value for name, value in options.items() if name not in VALUES}
             self._built[key] = GlassPreview(edited, region, **fixed)
         self._built.move_to_end(key)
-        while len(self._built) > BODIES:
+        while len(self._built) > SETTINGS.glass_bodies:
             self._built.popitem(last=False)
         return self._built[key], {name: options[name] for name in VALUES if name in options}
 
@@ -264,7 +257,7 @@ _BODIES = GlassBodies()
 """Of this process."""
 
 
-def trace(report: Report, request: Request) -> Pane | None:
+def trace(report: Reporter, request: Request) -> Pane | None:
     """The pane of one request; None where a newer one came meanwhile. Raises InputError."""
     preview, values = _BODIES.preview(report, request)
     if report.outdated:

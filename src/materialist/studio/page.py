@@ -9,7 +9,17 @@ from typing import Any
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.studio import objects, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take, tasks
+from materialist.studio import (
+    SETTINGS,
+    objects,
+    tab_light,
+    tab_look,
+    tab_material,
+    tab_object,
+    tab_open,
+    tab_take,
+    tasks,
+)
 from materialist.studio.selection import read_pick, sam_missing
 from materialist.studio.session import FinalPicture, Session
 from materialist.studio.stage import stage
@@ -17,8 +27,6 @@ from materialist.studio.studio import Studio
 from materialist.studio.widgets import LIVE, LONG, PageContext, handler, steps
 
 TITLE = "Materialist studio"
-DRAFT_SPP = 16
-"""Paths a pixel of a quick look at the final picture."""
 _HEAD = (
     "<h1>Materialist</h1><p>One photo, taken apart into shape, material and light. Click something and change it.</p>"
 )
@@ -165,6 +173,6 @@ def _wire_final(context: PageContext) -> None:
         return run
 
     outputs = [*context.picture_parts, context["progress"], context["stop"]]
-    context["final"].click(render(tab_take.SPP), None, outputs, **LONG)
-    context["draft"].click(render(DRAFT_SPP), None, outputs, **LONG)
+    context["final"].click(render(SETTINGS.final_spp), None, outputs, **LONG)
+    context["draft"].click(render(SETTINGS.draft_spp), None, outputs, **LONG)
     context.stops("stop", "final")

@@ -13,7 +13,7 @@ from materialist.camera import project
 from materialist.color import luminance
 from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
-from materialist.studio import glass
+from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import summary
 from materialist.types import Array, Body, Scene
 
@@ -29,11 +29,7 @@ _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_
 """The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
 LIVE = ("edit", "relight")
 """Kinds of steps that the preview shades; the others are sketched."""
-_KEPT = 24
-"""Edited scenes that are kept: moving the last of several steps must not replay those before."""
 
-_TRIANGLES = 12_000
-"""Triangles that are drawn; of a finer mesh every n-th, and the gaps are closed."""
 _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 
 
@@ -72,7 +68,7 @@ class LivePreview:
         for count in range(start + 1, len(steps) + 1):
             known = _after(self.scene, known, steps[count - 1])
             self._edited[_key(steps[:count])] = known
-        while len(self._edited) > _KEPT:
+        while len(self._edited) > SETTINGS.scenes_kept:
             self._edited.popitem(last=False)
         return known
 
@@ -116,7 +112,7 @@ class LivePreview:
         key = _key((step,))
         if key not in self._panes:
             self._panes[key] = glass.checked(self.scene, step)
-            while len(self._panes) > _KEPT:
+            while len(self._panes) > SETTINGS.scenes_kept:
                 self._panes.popitem(last=False)
         return self._panes[key]
 
@@ -193,7 +189,7 @@ def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
 
     colour = np.zeros((*scene.depth.shape, 3), np.float32)
     depth = np.zeros(scene.depth.shape, np.float32)
-    stride = -(-len(body.faces) // _TRIANGLES)
+    stride = -(-len(body.faces) // SETTINGS.triangles)
     corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
     pixels, away = project(corners, scene.camera)
     middle = away.mean(1)

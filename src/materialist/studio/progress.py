@@ -9,10 +9,9 @@ from pathlib import Path
 
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import FAILED
+from materialist.studio import SETTINGS
 from materialist.studio.uploads import without_paths
 
-_EVERY = 0.3
-"""Seconds between two looks at a job."""
 _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
     "walls": "Finding where walls end", "geometry": "Building the surface", "trace": "Tracing light paths",
@@ -36,7 +35,7 @@ def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
         if text != last:
             last = text
             yield text
-        time.sleep(_EVERY)
+        time.sleep(SETTINGS.poll_seconds)
     yield shown(jobs, job)
 
 

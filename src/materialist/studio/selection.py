@@ -11,13 +11,10 @@ import numpy as np
 
 from materialist.edits.select.select import select
 from materialist.errors import InputError
+from materialist.studio import SETTINGS
 from materialist.types import Array, Scene
 
-_QUALITY = 88
-"""JPEG quality of live pictures."""
 REPLACE, ADD, REMOVE = "new", "add", "remove"
-PART, INSIDE = 0.4, 0.9
-"""An object is a part of the selection if it covers less than PART of it, and lies in it by more than INSIDE."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +62,7 @@ class Selection:
         if mode == REMOVE and inside and mask is not None:
             found = select(scene, click=(x, y), method=method)
             # One thing found again from another place of it is never quite the same.
-            if (found & mask).sum() > INSIDE * found.sum() and found.sum() < PART * mask.sum():
+            if (found & mask).sum() > SETTINGS.inside * found.sum() and found.sum() < SETTINGS.part * mask.sum():
                 return self._without(found)
         if (inside and mode != ADD) or mode == REMOVE:
             return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
@@ -141,6 +138,6 @@ def data_url(pixels: Array, suffix: str, kind: str) -> str:
     import cv2
 
     order = [2, 1, 0, 3][: pixels.shape[-1]]
-    quality = [cv2.IMWRITE_JPEG_QUALITY, _QUALITY] if suffix == ".jpg" else []
+    quality = [cv2.IMWRITE_JPEG_QUALITY, SETTINGS.jpeg_quality] if suffix == ".jpg" else []
     data: Any = cv2.imencode(suffix, np.ascontiguousarray(pixels[..., order]), quality)[1]
     return f"data:{kind};base64,{base64.b64encode(data.tobytes()).decode()}"

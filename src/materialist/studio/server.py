@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 from materialist.errors import InputError, SetupError
 from materialist.io.examples import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
-from materialist.studio import uploads
+from materialist.studio import SETTINGS, uploads
 from materialist.studio.studio import ALONE, Studio
 from materialist.studio.workspace import Project, WorkFolder
 
@@ -92,7 +92,7 @@ def serve(
         _, address, _ = page.launch(
             server_name=host, server_port=port, share=False, quiet=True, prevent_thread_lock=True, show_error=True,
             auth=_login(password), auth_message="Any name will do; the password counts.",
-            max_file_size=f"{uploads.MAX_MEGABYTES}mb", allowed_paths=[], theme=_theme(gr),
+            max_file_size=f"{SETTINGS.upload_megabytes}mb", allowed_paths=[], theme=_theme(gr),
             css=asset("style.css"), app_kwargs={"middleware": [_host_check(studio, host)]},
             js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
         )  # fmt: skip

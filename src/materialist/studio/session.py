@@ -11,6 +11,7 @@ from typing import Any
 from materialist.edits.recipe import REGION, Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.jobs.queue import Job, JobQueue
+from materialist.studio import SETTINGS
 from materialist.studio.archives import unpack
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.glass import GlassClient
@@ -22,8 +23,6 @@ from materialist.types import Scene
 EDITS = "edits.yaml"
 ENDING = ("final", "take", "fall")
 """Kinds of jobs that end with the page that asked for them."""
-_UNDO = 60
-"""How many steps back there are."""
 DRAGGED = (
     "hue", "saturation", "value", "albedo", "roughness", "metallic", "texture_scale", "ior", "transmission", "tint",
 )  # fmt: skip
@@ -303,7 +302,7 @@ class Session:
         if what != "select":
             self._check_unchanged()
         if not (moving and self._past and self._past[-1][0] == what):
-            self._past = [*self._past[-_UNDO:], (what, self.edits, self.selection)]
+            self._past = [*self._past[-SETTINGS.undo_steps :], (what, self.edits, self.selection)]
 
     def _region_of(self, edits: EditList) -> Selection:
         """The selection that the step in hand was made with."""

@@ -16,14 +16,12 @@ from typing import Any
 
 from materialist.errors import InputError, OutputError
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import tasks
+from materialist.studio import SETTINGS, tasks
 from materialist.studio.session import Session
 from materialist.studio.workspace import Project, WorkFolder
 
 ALONE = "me"
 """The person, where the studio serves this machine only."""
-_LEAST_FREE = 1.2e9
-"""Bytes of memory that must be free before another scene is opened."""
 
 
 @dataclass
@@ -101,7 +99,7 @@ class Studio:
         project = self.project(name, session.person)
         session.close()
         free()
-        if psutil.virtual_memory().available < _LEAST_FREE:
+        if psutil.virtual_memory().available < SETTINGS.free_for_scene:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
         self.work.touch(project)

@@ -10,15 +10,13 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.options import Relight
-from materialist.studio import lights, uploads
+from materialist.studio import SETTINGS, lights, uploads
 from materialist.studio.session import Session
 from materialist.studio.widgets import LIVE, SUN, PageContext, default, handler, number_text, slider
 from materialist.studio.workspace import store
 from materialist.types import Array
 
 OWN = "The photo's own"
-_BEFORE = 0.75
-"""A lamp hangs at this share of the way from the camera to the clicked surface."""
 
 
 def layout(context: PageContext) -> None:
@@ -47,7 +45,7 @@ def layout(context: PageContext) -> None:
             parts["kelvin"] = gr.Slider(1700, 12000, 2700, step=100, label="Colour, kelvin: warm to cold", buttons=[])
             parts["power"] = gr.Slider(0.05, 5, 1, step=0.05, label="Strength", buttons=[])
             parts["before"] = gr.Slider(
-                0.2, 0.98, _BEFORE, step=0.01, label="Nearer to you, or to the surface", buttons=[]
+                0.2, 0.98, SETTINGS.lamp_share, step=0.01, label="Nearer to you, or to the surface", buttons=[]
             )
             parts["no_lamps"] = gr.Button("Take all lamps away", size="sm")
 

@@ -11,7 +11,7 @@ import gradio as gr
 
 from materialist.errors import InputError
 from materialist.jobs.queue import Job
-from materialist.studio import tasks
+from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
 from materialist.studio.progress import box
 from materialist.studio.session import EDITS, FinalPicture, Session
@@ -32,7 +32,6 @@ KINDS = {
     "turn": ("A video: the light goes round", ".mp4"),
 }
 """Kind of result -> its title, and the suffix of the file."""
-SPP, FRAMES, FRAME_SPP = 256, 24, 32
 
 
 def layout(context: PageContext) -> None:
@@ -80,7 +79,7 @@ def wire(context: PageContext) -> None:
                     return
             if what in ("png", "exr"):
                 if job is not None:
-                    final = session.final = FinalPicture(steps, context.studio.final_file(session), SPP)
+                    final = session.final = FinalPicture(steps, context.studio.final_file(session), SETTINGS.final_spp)
                 assert final is not None
                 shutil.copyfile(final.path.with_suffix(file.suffix), file)
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
@@ -102,11 +101,11 @@ def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job
     given = {"scene": str(session.project.scene), "steps": session.edits.active}
     if what in ("png", "exr"):
         final = session.final
-        if final is not None and final.of(session.edits.active) and final.spp >= SPP:
+        if final is not None and final.of(session.edits.active) and final.spp >= SETTINGS.final_spp:
             return None
         target = context.studio.final_file(session)
-        return submit(tasks.final, target.parent, output=str(target), spp=SPP, **given)
-    more: dict[str, Any] = {"frames": FRAMES, "spp": FRAME_SPP} if what == "turn" else {}
+        return submit(tasks.final, target.parent, output=str(target), spp=SETTINGS.final_spp, **given)
+    more: dict[str, Any] = {"frames": SETTINGS.video_frames, "spp": SETTINGS.video_spp} if what == "turn" else {}
     return submit(tasks.take, session.workspace, output=str(file), what=what, **given, **more)
 
 

@@ -13,7 +13,7 @@ from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import SetupError
 from materialist.io.atomic import partial
-from materialist.jobs.worker import Report
+from materialist.jobs.worker import Reporter
 from materialist.types import Array, Materials, Prediction, Scene
 
 Steps = tuple[Step, ...]
@@ -21,7 +21,7 @@ Task = Callable[..., dict[str, Any]]
 """task(report, **arguments) -> what the studio is told."""
 
 
-def on_device(device: str, task: Task, report: Report, **arguments: Any) -> dict[str, Any]:
+def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> dict[str, Any]:
     """Do a task on a device of `invert`, which is set for the whole process."""
     if device != "auto":
         from materialist.render.variant import setup
@@ -30,7 +30,7 @@ def on_device(device: str, task: Task, report: Report, **arguments: Any) -> dict
     return task(report, **arguments)
 
 
-def photo(report: Report, photo: str, thumbnail: str) -> dict[str, Any]:
+def photo(report: Reporter, photo: str, thumbnail: str) -> dict[str, Any]:
     """Read a photo: its size and field of view, and a small picture of it in the file `thumbnail`."""
     from materialist.io.photo import read_photo
 
@@ -44,7 +44,7 @@ def photo(report: Report, photo: str, thumbnail: str) -> dict[str, Any]:
 
 
 def invert(
-    report: Report, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
+    report: Reporter, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
     fov: float | str = "auto", seed: int = 0,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
@@ -63,7 +63,7 @@ def invert(
     return {"scene": scene, "psnr": done.report.metrics.get("rerender_psnr_path")}
 
 
-def _show(report: Report, folder: Path, name: str, value: Any) -> None:
+def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     """Pictures of what `invert` has found so far."""
     from materialist.exporters import pictures
 
@@ -90,7 +90,7 @@ def _materials(before: str, maps: Materials) -> dict[str, Array]:
     }
 
 
-def final(report: Report, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
+def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
@@ -106,7 +106,7 @@ def final(report: Report, scene: str, steps: Steps, output: str, spp: int = 256,
     return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 
 
-def mesh(report: Report, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
+def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
     from materialist.exporters.glb import write_glb
     from materialist.exporters.parts import scene_parts
@@ -121,7 +121,7 @@ def mesh(report: Report, scene: str, output: str, triangles: int = 60_000) -> di
 
 
 def take(
-    report: Report, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36
+    report: Reporter, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36
 ) -> dict[str, Any]:
     """One thing to take away, as a single file at `output` (its suffix included)."""
     maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
@@ -131,7 +131,7 @@ def take(
 
 
 def fall(
-    report: Report, scene: str, mesh: str, at: list[float], output: str, options: dict[str, Any], frames: int = 36,
+    report: Reporter, scene: str, mesh: str, at: list[float], output: str, options: dict[str, Any], frames: int = 36,
     spp: int = 32,
 ) -> dict[str, Any]:  # fmt: skip
     """`materialist drop` with these options: a mesh falls onto the photo, as a video."""
@@ -150,7 +150,7 @@ def fall(
     return {"file": output}
 
 
-def _edited(report: Report, scene: str, steps: Steps) -> tuple[Scene, Scene]:
+def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     """The fitted scene, and the same after the list of edits (if there is one)."""
     from materialist.edits.recipe import apply
     from materialist.io.package import load_scene
@@ -160,7 +160,7 @@ def _edited(report: Report, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     return loaded, apply(loaded, list(steps)) if steps else loaded
 
 
-def _package(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
+def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
     """The edited scene as a zipped package, its photo the composite."""
     from materialist.edits.composite.composite import composite, developed
     from materialist.io.package import save_scene
@@ -175,7 +175,7 @@ def _package(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp:
     _zip(folder, output)
 
 
-def _exported(report: Report, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
+def _exported(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
     """Another program's format; several files come as a zip."""
     from materialist.exporters.run import FOLDERS, export
 
@@ -189,7 +189,7 @@ def _exported(report: Report, loaded: Scene, edited: Scene, output: Path, *, wha
     _zip(folder, output)
 
 
-def _turntable(report: Report, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
+def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
     """`materialist relight --rotate 360`: the light once round, over the edits."""
     from materialist.edits.composite.composite import pictures
     from materialist.edits.light.frames import moving_light

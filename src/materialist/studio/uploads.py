@@ -10,11 +10,8 @@ from pathlib import Path
 from materialist.errors import InputError, MaterialistError
 from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.decoded import check_size
+from materialist.studio import SETTINGS
 
-MAX_MEGABYTES = 60
-"""Largest upload."""
-MAX_PIXELS = 60_000_000
-"""Largest picture, from its header."""
 PHOTOS = frozenset(
     (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr")
 )
@@ -33,10 +30,10 @@ def checked_picture(path: Path, name: str) -> str:
     size = None if suffix in RAW_SUFFIXES else header_size(path, shown)
     if size is not None:
         width, height = size
-        if width * height > MAX_PIXELS:
+        if width * height > SETTINGS.upload_pixels:
             raise InputError(
                 f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the studio takes up to "
-                f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
+                f"{SETTINGS.upload_pixels / 1e6:.0f}: shrink it first."
             )
         check_size(width, height, shown)
     return suffix
@@ -71,8 +68,8 @@ def header_size(path: Path, shown: str) -> tuple[int, int]:
             return image.size
     except Exception as error:  # decoders raise anything
         if type(error).__name__ == "DecompressionBombError":
-            text = f"{shown} has far too many pixels; the studio takes up to {MAX_PIXELS / 1e6:.0f} megapixels."
-            raise InputError(text) from error
+            most = f"{SETTINGS.upload_pixels / 1e6:.0f} megapixels"
+            raise InputError(f"{shown} has far too many pixels; the studio takes up to {most}.") from error
         raise InputError(f"{shown} is not an image this program can read; export it again as PNG or JPEG.") from error
 
 
@@ -119,5 +116,5 @@ def check_bytes(path: Path, shown: str) -> None:
     size = path.stat().st_size
     if size == 0:
         raise InputError(f"{shown} is empty (0 bytes); copy it again.")
-    if size > MAX_MEGABYTES * 1e6:
-        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {MAX_MEGABYTES} MB.")
+    if size > SETTINGS.upload_megabytes * 1e6:
+        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {SETTINGS.upload_megabytes} MB.")

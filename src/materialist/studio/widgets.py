@@ -21,7 +21,7 @@ from materialist.errors import MaterialistError
 from materialist.jobs.queue import Job
 from materialist.option_kinds import OperationOptions, declarations, parse_colour
 from materialist.options import Glass, Insertion, InvertOptions, MaterialEdit, Relight
-from materialist.studio import objects
+from materialist.studio import SETTINGS, objects
 from materialist.studio.edit_list import summary
 from materialist.studio.progress import follow
 from materialist.studio.session import EDITS, Session
@@ -34,8 +34,6 @@ LIVE: dict[str, Any] = {
 """Events that skip the queue; while one request is under way only the newest value waits."""
 LONG: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
 """Events that take long, and send updates meanwhile."""
-SHOWN_SECONDS = 12
-"""How long a message stays on the page."""
 MATERIAL = ("hue", "saturation", "value", "roughness", "metallic", "colour", "texture_scale")
 LIGHT = ("rotate", "ambient", "sun_on", "azimuth", "elevation", "sun_power")
 GLASS = ("glass_ior", "glass_transmission", "glass_roughness", "glass_tint", "glass_hollow")
@@ -75,10 +73,10 @@ def _message(error: Exception) -> Exception:
         return error
     if isinstance(error, MaterialistError):  # its message may hold a name that a stranger chose
         text = escape(str(error), quote=False)
-        return gr.Error(text, duration=SHOWN_SECONDS, title="That did not work", print_exception=False)
+        return gr.Error(text, duration=SETTINGS.message_seconds, title="That did not work", print_exception=False)
     traceback.print_exception(error)
     text = f"Something went wrong inside ({type(error).__name__}); the terminal of the studio has the details."
-    return gr.Error(text, duration=SHOWN_SECONDS, title="Our mistake", print_exception=False)
+    return gr.Error(text, duration=SETTINGS.message_seconds, title="Our mistake", print_exception=False)
 
 
 @dataclass
