@@ -1,7 +1,5 @@
 """Previews from cached transport against the path tracer."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
@@ -51,22 +49,3 @@ def test_nothing_changed_is_the_photo(preview):
 def test_another_geometry_is_refused(preview):
     with pytest.raises(InputError, match="another geometry"):
         preview.render(flat_scene())
-
-
-@pytest.mark.parametrize("ambient, share", [(0.3, 0.7), (1.0, 0.1), (1.5, 0.2), (0.0, 1.0)])
-def test_dimmed_lights_of_the_photo_take_their_share_of_the_light_along(ambient, share):
-    from materialist.edits.core.emitters import KEY
-
-    preview = Preview.__new__(Preview)
-    preview.scene = rendered_scene()
-    light = {
-        dim: preview._seen(
-            replace(
-                preview.scene, envmap=preview.scene.envmap * np.float32(ambient),
-                provenance={KEY: {"ambient": ambient, "radiance": 4.0, "dim": dim, "share": share}},
-            )
-        ).envmap.mean() / preview.scene.envmap.mean() for dim in (0.0, 1.0, 2.0)
-    }  # fmt: skip
-    assert light[1.0] == pytest.approx(1, rel=1e-5)  # as the photo is
-    assert light[0.0] == pytest.approx(ambient / (ambient + share), abs=1e-5)
-    assert light[2.0] == pytest.approx(1 + share / (ambient + share), rel=1e-5)

@@ -7,7 +7,7 @@ from edit_scenes import block_mask, flat_scene
 from made_meshes import box_file
 
 from materialist.edits.composite.composite import composite
-from materialist.edits.core.sky import LEAST, sky_maps, traced
+from materialist.edits.core.sky import LEAST, sky_maps
 from materialist.edits.glass.glass import glass
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
@@ -69,31 +69,3 @@ def test_inserted_glass_shows_it_too(tmp_path):
     high = np.s_[14:20, 33:39]
     assert (SCENE.depth[high] == 0).all()
     np.testing.assert_allclose(shown[high], SCENE.photo.linear[high], atol=0.1)
-
-
-class Target:
-    """A scene that shows the mean of its map, and its albedo's."""
-
-    def set_materials(self, materials):
-        self.albedo = float(materials.albedo.mean())
-
-    def set_envmap(self, envmap):
-        self.light = float(envmap.mean())
-
-
-def test_both_maps_have_their_share_of_the_paths_and_the_scene_is_as_it_was():
-    scene, target, asked = before_sky(), Target(), []
-    target.set_materials(scene.materials)
-    target.set_envmap(scene.envmap)
-    before = target.albedo, target.light
-
-    def trace(share):
-        asked.append((share, target.albedo == 0))
-        return np.full((2, 2, 3), target.light)
-
-    maps = np.full((4, 8, 3), 0.7), np.full((4, 8, 3), 0.2)
-    found = traced(trace, target, scene, maps, share=0.25)
-    np.testing.assert_allclose(found, before[1] + 0.7 - 0.2)
-    assert asked == [(1.0, False), (0.25, True), (0.25, True)]
-    assert (target.albedo, target.light) == before
-    assert traced(trace, target, scene, None, share=0.25).shape == (2, 2, 3) and asked[3:] == [(1.0, False)]

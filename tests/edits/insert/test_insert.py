@@ -63,15 +63,6 @@ def test_scale_size_and_turn(box):
     assert front @ UP < 0.01 and front @ -support.point > 0
 
 
-def test_on_a_wall_it_stands_out_of_the_wall(box):
-    from edit_scenes import flat_scene
-
-    edited = insert(flat_scene(), box, (40.0, 20.0))
-    (body,) = edited.bodies
-    np.testing.assert_allclose(body.vertices[:, 2].min(), -3, atol=0.01)
-    assert np.ptp(body.vertices[:, 2]) > np.ptp(body.vertices[:, 0])  # its longest side points to the camera
-
-
 def test_bad_places_and_numbers(box):
     scene = floor_scene(96, 72)
     scene = replace(scene, depth=np.where(np.arange(72)[:, None] < 10, 0, scene.depth))

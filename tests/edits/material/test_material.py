@@ -57,27 +57,12 @@ def test_shift_and_set_differ_by_the_sign():
         np.testing.assert_allclose(got, expected, atol=1e-6)
 
 
-def test_soft_masks_mix():
-    soft = MASK * np.float32(0.25)
-    np.testing.assert_allclose(edit(SCENE, soft, roughness=0.1).materials.roughness[MASK], 0.4, atol=1e-6)
-
-
 def test_set_albedo_in_linear_and_in_srgb():
     np.testing.assert_allclose(
         edit(SCENE, MASK, albedo=(0.2, 0.4, 0.6)).materials.albedo[MASK], [[0.2, 0.4, 0.6]] * MASK.sum()
     )
     np.testing.assert_allclose(parse_colour("#ff8000"), srgb_to_linear(np.array([1, 128 / 255, 0])), atol=1e-6)
     np.testing.assert_allclose(parse_colour("0.1,0.2,0.3"), [0.1, 0.2, 0.3], atol=1e-7)
-
-
-@pytest.mark.parametrize(("lean", "wanted"), [(1.0, [0, 0, -1]), (-1.0, [0, 0, 1]), (0.0, [0, 1, 0])])
-def test_textures_are_upright_as_the_camera_sees_them(lean, wanted):
-    """On a floor up is away from the camera, on a ceiling towards it; right is right on all."""
-    from materialist.edits.material.texture import _tangents
-
-    right, up = _tangents(np.array([0.0, lean, 1.0 - abs(lean)]))
-    np.testing.assert_allclose(up, wanted, atol=1e-9)
-    np.testing.assert_allclose(right, [1, 0, 0], atol=1e-9)
 
 
 def test_texture_lies_upright_on_a_wall():
