@@ -5,8 +5,8 @@ import pytest
 from render_scenes import empty
 
 from materialist.render.bodies import is_transparent
+from materialist.render.coverage import coverage, first_hits
 from materialist.render.scene import GLASS_DEPTH, RenderScene
-from materialist.render.seen import bodies_seen
 from materialist.types import Body, Camera, Surface
 
 CAMERA = Camera(48, 32, 40.0)
@@ -117,20 +117,21 @@ def test_a_mirror_shows_the_light_behind_the_camera():
     np.testing.assert_allclose(mirror[0, 0], 0.1, atol=0.01)
 
 
-@pytest.mark.parametrize("size", [None, (128, 192)])
-def test_the_share_of_a_pixel_covered_by_a_body(size):
-    target = RenderScene(empty(CAMERA), CAMERA, bodies=(sphere(surface()),))
-    share = bodies_seen(target.mi_scene, CAMERA, ["body0"], size=size)
-    scale = 1 if size is None else size[0] / CAMERA.height
-    assert share.shape == (size or (CAMERA.height, CAMERA.width))
-    assert share.sum() == pytest.approx(np.pi * (outline() * scale) ** 2, rel=0.02)
-    assert ((share > 0) & (share < 1)).any()
-    assert not bodies_seen(target.mi_scene, CAMERA, ["body1"], size=size).any()
+def test_the_share_of_a_pixel_covered_by_a_body():
+    body = sphere(surface())
+    target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
+    share = coverage(target.mi_scene, CAMERA, ["body0"])
+    assert share.shape == (CAMERA.height, CAMERA.width)
+    assert share.sum() == pytest.approx(np.pi * outline() ** 2, rel=0.02)
+    assert ((share > 0) & (share < 1)).any() and not coverage(target.mi_scene, CAMERA, ["body1"]).any()
+    size, box = (4 * CAMERA.height, 4 * CAMERA.width), (0, 4 * CAMERA.height, 0, 4 * CAMERA.width)
+    larger = first_hits(target.mi_scene, CAMERA, {"body0": body}, size, box).share
+    assert larger.sum() == pytest.approx(16 * np.pi * outline() ** 2, rel=0.02)
 
 
 def test_a_body_alone_has_its_own_radiance_at_its_rim():
     """A grey sphere in white light before a bright sky: rays that miss it do not count."""
-    from materialist.render.portrait import look, radiance
+    from materialist.render.native import radiance
 
     body = sphere(surface(0.5, roughness=1.0))
     target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
@@ -146,7 +147,7 @@ def test_a_body_alone_has_its_own_radiance_at_its_rim():
     assert rim.sum() > 10
     assert alone[disc()] == pytest.approx(mixed[disc()], rel=1e-5)
     assert np.abs(mixed - alone)[rim].mean() > 1
-    share = look(target.mi_scene, CAMERA, {"body0": body}, size, box).share[..., None]
+    share = first_hits(target.mi_scene, CAMERA, {"body0": body}, size, box).share[..., None]
     expected = share * alone + (1 - share) * 10
     met = (alone > 0).any(-1)
     error = np.abs(mixed - expected)  # the share is one of 16 rays
@@ -157,7 +158,7 @@ def test_a_body_behind_a_thing_is_seen_as_if_that_were_not_there():
     """In its own light: the outline of what hides it may be elsewhere in the photo than in the depth."""
     from render_scenes import wall
 
-    from materialist.render.portrait import radiance
+    from materialist.render.native import radiance
 
     columns = np.indices((CAMERA.height, CAMERA.width))[1]
     geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from render_scenes import empty, uniform, wall, with_floor
 
-from materialist.camera import pixel_rays, unproject
+from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
@@ -55,21 +55,12 @@ def bilinear(envmap, direction):
     return top * (1 - fr) + (envmap[r0 + 1, c0 % w] * (1 - fc) + envmap[r0 + 1, (c0 + 1) % w] * fc) * fr
 
 
-@pytest.mark.parametrize("camera", [CAMERA, Camera(6, 17, 35.0), Camera(8, 8, 100.0)])
+@pytest.mark.parametrize("camera", [CAMERA, Camera(6, 17, 35.0)])
 def test_rays_go_through_the_pixels_of_the_camera_model(camera):
     scene = RenderScene(wall(camera), camera, device="cpu")
     row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
     direction = np.array(camera_rays(scene, col + 0.5, row + 0.5).d).T
     np.testing.assert_allclose(direction / -direction[:, 2:], pixel_rays(camera).reshape(-1, 3), atol=2e-5)
-
-
-def test_hits_are_the_unprojected_depth():
-    scene = RenderScene(wall(CAMERA, depth=3.0), CAMERA, device="cpu")
-    # Just beside the pixel centre: the diagonal of its quad runs through the centre itself.
-    row, col = np.indices(SIZE).reshape(2, -1)
-    si = scene.mi_scene.ray_intersect(camera_rays(scene, col + 0.501, row + 0.502))
-    expected = unproject(np.full(SIZE, 3.0, np.float32), CAMERA).reshape(-1, 3)
-    np.testing.assert_allclose(np.array(si.p).T, expected, atol=3 * 0.003 / CAMERA.focal)
 
 
 def test_every_pixel_shows_its_own_material():
@@ -82,18 +73,6 @@ def test_every_pixel_shows_its_own_material():
         np.testing.assert_allclose(np.array(bsdf.base_color.eval(si)).T, maps.albedo.reshape(-1, 3), atol=1e-6)
         np.testing.assert_allclose(np.array(bsdf.roughness.eval_1(si)), maps.roughness.reshape(-1), atol=1e-6)
         np.testing.assert_allclose(np.array(bsdf.metallic.eval_1(si)), maps.metallic.reshape(-1), atol=1e-6)
-
-
-def test_the_picture_is_affine_in_the_albedo_of_its_own_pixel():
-    """Under constant light alone, L = L_0 + A (L_1 - L_0), pixel by pixel: orientation end to end, in the picture."""
-    maps = random_maps(1)
-    scene = scene_of(wall(CAMERA))
-    images = {}
-    for name, albedo in (("black", 0.0), ("white", 1.0), ("maps", maps.albedo)):
-        scene.set_materials(uniform(CAMERA, albedo))
-        images[name] = scene.render(spp=1024, seed=3, max_depth=2)
-    expected = images["black"] + maps.albedo * (images["white"] - images["black"])
-    np.testing.assert_allclose(images["maps"], expected, atol=0.02)
 
 
 def test_faces_keep_the_order_of_the_mesh():
@@ -115,8 +94,7 @@ def test_no_ray_slips_between_the_faces():
     assert hit.all(), f"{(~hit).sum()} of {len(hit)} rays slip through"
 
 
-@pytest.mark.parametrize("rough", [0.3, 1.0])
-@pytest.mark.parametrize("metallic", [0.0, 0.7])
+@pytest.mark.parametrize(("rough", "metallic"), [(0.3, 0.7), (1.0, 0.0)])
 def test_direct_light_is_the_integral_of_the_reference(rough, metallic):
     """A wall under constant light: L = integral of f_r cos, by quadrature of the numpy reference."""
     albedo = np.float32([0.8, 0.4, 0.1])
@@ -132,7 +110,7 @@ def test_direct_light_is_the_integral_of_the_reference(rough, metallic):
         np.testing.assert_allclose(image[row, col], expected, rtol=0.03)
 
 
-@pytest.mark.parametrize("height", [4, 5, 16])
+@pytest.mark.parametrize("height", [4, 16])
 def test_light_is_the_bilinear_lookup_between_texel_centres(height):
     """To float precision, all around, poles and seam included."""
     rng = np.random.default_rng(height)
@@ -149,31 +127,7 @@ def test_light_is_the_bilinear_lookup_between_texel_centres(height):
     np.testing.assert_allclose(seen, bilinear(envmap, direction.astype(np.float32)), atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("row", "col", "where"),
-    [(4, 8, "centre"), (4, 9, "right"), (4, 7, "left"), (3, 8, "above"), (5, 8, "below"), (4, 0, "behind")],
-)
-def test_a_bright_texel_shows_where_the_convention_says(row, col, where):
-    """Centre column along -Z, right columns towards +X, top rows towards +Y; a texel map of 9 rows and 18 columns."""
-    height = 9
-    envmap = np.zeros((height, 2 * height, 3), np.float32)
-    # 18 columns have no middle one: columns 8 and 9 meet at -Z, so light both for the ones that should be centred.
-    columns = [8, 9] if where in ("centre", "above", "below") else [col]
-    envmap[row, columns] = 1
-    camera = Camera(81, 81, 80.0)
-    image = scene_of(empty(camera), envmap=envmap, camera=camera).render(spp=16, seed=1)[..., 0]
-    total = image.sum()
-    if where == "behind":
-        assert total == 0
-        return
-    rows, cols = np.indices(image.shape)
-    x, y = (image * cols).sum() / total - 40, (image * rows).sum() / total - 40
-    side = {"centre": (0, 0), "right": (1, 0), "left": (-1, 0), "above": (0, -1), "below": (0, 1)}[where]
-    for offset, expected in ((x, side[0]), (y, side[1])):
-        assert abs(offset) < 0.5 if expected == 0 else offset * expected > 5
-
-
-def test_sky_pixels_see_the_light_and_can_be_hidden():
+def test_sky_pixels_see_the_light():
     holes = np.zeros(SIZE, bool)
     holes[:3, 5:] = True
     envmap = np.random.default_rng(2).random((6, 12, 3)).astype(np.float32)
@@ -183,8 +137,6 @@ def test_sky_pixels_see_the_light_and_can_be_hidden():
     within = [pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal for u, v in offsets]
     expected = np.mean([bilinear(envmap, rays.reshape(-1, 3)) for rays in within], axis=0).reshape(*SIZE, 3)
     np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
-    hidden = scene.render(spp=16, seed=1, hide_emitters=True)
-    assert not hidden[holes].any() and (hidden[~holes] > 0).all()
 
 
 def test_a_continued_plane_carries_the_mean_of_its_pixels():

@@ -49,7 +49,7 @@ def is_peaked(envmap: Array) -> bool:
 
 
 def is_sunny(envmap: Array) -> bool:
-    """Whether the light of [h, 2h, 3] comes from sources so small that `render.aim` is too coarse for them."""
+    """Whether the light of [h, 2h, 3] comes from sources too small for the cells of `render.light_sampling`."""
     return _unevenness(envmap) > SUNNY
 
 

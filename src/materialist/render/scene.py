@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from materialist.buffers import floats, integers, tensor
@@ -10,6 +12,9 @@ from materialist.render.bodies import body_bsdf, body_emitter
 from materialist.render.envmap import check_envmap, half_turn, is_peaked, is_sunny, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
+
+if TYPE_CHECKING:
+    from materialist.render.light_sampling import LightSampler
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
@@ -51,7 +56,7 @@ class RenderScene:
         self.mi = mi = setup(device)
         self._envmap = np.ones((4, 8, 3), np.float32)
         self._sunny = False
-        self._aim = None
+        self._sampler: LightSampler | None = None
         self._openness: Array | None = None
         self._like: RenderScene | None = None
         self.camera = camera
@@ -95,12 +100,16 @@ class RenderScene:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
         if not np.array_equal(envmap, self._envmap):
-            self._envmap, self._sunny, self._aim = np.array(envmap, np.float32), is_sunny(envmap), None
+            self._envmap, self._sunny, self._sampler = np.array(envmap, np.float32), is_sunny(envmap), None
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
     def render(
-        self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False, share=None
+        self,
+        *,
+        spp: int,
+        seed: int = 0,
+        max_depth: int = MAX_DEPTH,
     ) -> Array:
         """Path-trace the picture: by splitting paths (`render.split`), or under a sun by Mitsuba's `path`.
 
@@ -108,8 +117,6 @@ class RenderScene:
             spp: samples per pixel, at least this many: camera rays that split, or paths. seed: equal seeds give equal
                 pictures.
             max_depth: path length; 2 is direct light alone, 1 the sky alone.
-            hide_emitters: leave pixels of the sky black.
-            share: a `split.Share`: trace these rays alone. Only the splitting tracer can.
 
         Returns:
             [H, W, 3] float32 linear radiance.
@@ -118,24 +125,19 @@ class RenderScene:
 
         _check_options(spp, max_depth)
         if self._sunny or not 2 <= max_depth <= DEEPEST:
-            if share is not None:
-                raise InputError("A share of the rays cannot be traced under a sun, or at this path length.")
-            return self.render_path(spp=spp, seed=seed, max_depth=max_depth, hide_emitters=hide_emitters)
-        return trace(
-            self.mi_scene, self.camera, self._aimed(), spp=spp, seed=seed, max_depth=max_depth,
-            hide_emitters=hide_emitters, share=share,
-        )  # fmt: skip
+            return self.render_path(spp=spp, seed=seed, max_depth=max_depth)
+        return trace(self.mi_scene, self.camera, self._lights(), spp=spp, seed=seed, max_depth=max_depth)
 
-    def aim_as(self, other: RenderScene) -> None:
-        """Aim at the light as another scene does, whose geometry differs: pictures with the same random numbers."""
-        self._like, self._aim = other, None
+    def sample_lights_as(self, other: RenderScene) -> None:
+        """Sample the light as another scene does, whose geometry differs: pictures with common random numbers."""
+        self._like, self._sampler = other, None
 
-    def _from_where(self) -> Array:
-        """From where light reaches what the camera sees (`aim.openness`)."""
+    def _openness_seen(self) -> Array:
+        """From where light reaches what the camera sees (`light_sampling.openness`)."""
         if self._like is not None:
-            return self._like._from_where()
+            return self._like._openness_seen()
         if self._openness is None:
-            from materialist.render.aim import openness
+            from materialist.render.light_sampling import openness
 
             self._openness = openness(self.mi_scene, self.camera)
         return self._openness
@@ -145,22 +147,22 @@ class RenderScene:
         """Paths that `render` follows from one camera ray under this light."""
         from materialist.render.split import SPLIT
 
-        return 1 if self._sunny else SPLIT + 1 + (self._aimed() is not None)
+        return 1 if self._sunny else SPLIT + 1 + (self._lights() is not None)
 
-    def _aimed(self):
-        """The `Aim` at this light, None where it is not worth its rays."""
-        from materialist.render.aim import Aim
+    def _lights(self) -> LightSampler | None:
+        """The sampler of this light, None where it is not worth its rays."""
+        from materialist.render.light_sampling import LightSampler
 
-        if self._aim is None:
-            self._aim = Aim(self._envmap, self._from_where())
+        if self._sampler is None:
+            self._sampler = LightSampler(self._envmap, self._openness_seen())
         # What is hidden from most of the scene may still be all the light of the rest.
-        return self._aim if self._aim.worth or is_peaked(self._envmap) else None
+        return self._sampler if self._sampler.worth or is_peaked(self._envmap) else None
 
-    def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, hide_emitters: bool = False) -> Array:
+    def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH) -> Array:
         """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""
         _check_options(spp, max_depth)
         mi = self.mi
-        integrator = mi.load_dict({"type": "path", "max_depth": max_depth, "hide_emitters": hide_emitters})
+        integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
         # Bounded wavefronts, all of one size: memory stays the same for any number of samples.
         passes = min(spp, -(-spp * self.camera.width * self.camera.height // _WAVEFRONT))
         each = _stratified(-(-spp // passes))
@@ -170,10 +172,7 @@ class RenderScene:
             total += np.array(image)[..., :3]
         return (total / passes).astype(np.float32)
 
-    def render_torch(
-        self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH,
-        hide_emitters: bool = False,
-    ):  # fmt: skip
+    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
         """Differentiable rendering by path replay backpropagation (the paper's engine; section Implementation Details).
 
         Continued planes follow the means of the maps, and so do their gradients.
@@ -181,7 +180,7 @@ class RenderScene:
         Args:
             albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors.
             spp: samples per pixel of the image; its gradient uses as many, with another seed.
-            max_depth, hide_emitters: as in `render`.
+            max_depth: as in `render`.
 
         Returns:
             [H, W, 3] linear radiance, a torch tensor; its scene keeps these materials and this light.
@@ -190,7 +189,7 @@ class RenderScene:
         import torch
 
         _check_options(spp, max_depth)
-        integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth, "hide_emitters": hide_emitters})
+        integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
 
         @dr.wrap(source="torch", target="drjit")
         def run(a, r, m, e):

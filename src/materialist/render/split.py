@@ -4,20 +4,16 @@ Mitsuba's `path` spends three quarters of its rays beyond the first hit, where a
 noise is. Here one camera ray sends SPLIT diffuse directions and one specular direction on their way, and all of a
 pixel's directions of a lobe form one lattice. Each of them goes on as a path of its own: where light is hidden by a
 surface, that surface's light takes its place in the same stratum. Where some light stands out, one more ray from every
-hit aims at it (`render.aim`), and each direction counts by how likely it was to be found that way (balance heuristic).
+hit goes towards it (`render.light_sampling`), and each direction counts by the balance heuristic.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.buffers import integers
-from materialist.render.aim import Aim
-from materialist.render.share import Share
+from materialist.render.light_sampling import LightSampler
 from materialist.transport.sampling import R2, point
 from materialist.types import Array, Camera
 
@@ -30,82 +26,51 @@ DEEPEST = 6
 
 
 def trace(
-    scene: mi.Scene, camera: Camera, aim: Aim | None, *, spp: int, seed: int, max_depth: int, hide_emitters: bool,
-    share: Share | None = None,
-) -> Array:  # fmt: skip
+    scene: mi.Scene, camera: Camera, lights: LightSampler | None, *, spp: int, seed: int, max_depth: int
+) -> Array:
     """[H, W, 3] radiance of a scene whose one emitter is an environment map and whose BSDFs are `materialist_disney`.
 
     Args:
-        aim: directions to aim at from every hit; None: scattered ones alone.
-        spp: camera rays per pixel; each counts for SPLIT + 1 paths, and one more with `aim`.
+        lights: directions that every hit sends a ray to; None: scattered ones alone.
+        spp: camera rays per pixel; each counts for SPLIT + 1 paths, and one more with `lights`.
         seed: equal seeds give equal pictures.
         max_depth: path length, 2 (direct light) to DEEPEST.
-        hide_emitters: leave pixels of the sky black.
-        share: trace these rays alone; the radiance is their mean, and 0 in pixels without any.
     """
-    pixels = np.arange(camera.width * camera.height) if share is None or share.pixels is None else share.pixels
-    rays = spp if share is None else share.rays(spp)
-    picture = np.zeros((camera.height * camera.width, 3), np.float32)
-    if rays and len(pixels):
-        lane = integers(mi, pixels)
-        corner, pixel = _corners(camera, lane)
-        shifts, random = _random(lane, seed, share is not None and share.rest)
-        order = (dr.opaque(mi.UInt32, value) for value in _order(share))
-        count = (dr.opaque(mi.UInt32, rays), dr.opaque(mi.UInt32, spp), *order)
-        total = _loop(scene, aim, corner, pixel, shifts, random, count, max_depth - 1, not hide_emitters)
-        dr.eval(total)
-        picture[pixels] = np.array(total).T / np.float32(rays)
-    return picture.reshape(camera.height, camera.width, 3)
-
-
-def _order(share: Share | None) -> tuple[int, int, int]:
-    """(first, step, group): ray j of those that are traced is number first + step * j + j // group of them all."""
-    endless = 2**31
-    if share is None:
-        return 0, 1, endless
-    return (1, 1, share.every - 1) if share.rest else (0, share.every, endless)
-
-
-def _random(lane, seed: int, rest: bool):
-    """The starts of a pixel's four lattices, which all its rays share, and its generator for what follows."""
-    number = mi.UInt64(lane)
-    # As PCG32(size=...) does it for all pixels at once; a pixel's numbers do not depend on which others are traced.
-    stream = mi.UInt64(0xDA3E39CB94B95BDB) + number  # type: ignore[operator]
-    random: Any = mi.PCG32(initstate=mi.UInt64(seed) + number, initseq=stream)  # type: ignore[operator]
-    shifts = tuple(_uniform(random) for _ in range(4))
-    if rest:
-        random = mi.PCG32(initstate=mi.UInt64(seed + (1 << 40)) + number, initseq=stream)  # type: ignore[operator]
+    lane = dr.arange(mi.UInt32, camera.width * camera.height)
+    corner, pixel = _corners(camera, lane)
+    random = mi.PCG32(size=camera.width * camera.height, initstate=mi.UInt64(seed))
+    shifts = tuple(_uniform(random) for _ in range(4))  # the starts of a pixel's lattices, which all its rays share
     dr.eval(shifts, random)
-    return shifts, random
+    total = _loop(scene, lights, corner, pixel, shifts, random, dr.opaque(mi.UInt32, spp), max_depth - 1)
+    dr.eval(total)
+    picture = np.array(total).T / np.float32(spp)
+    return np.ascontiguousarray(picture.reshape(camera.height, camera.width, 3))
 
 
 @dr.syntax
-def _loop(scene, aim, corner, pixel, shifts, random, counts, bounces: int, sky: bool):
-    """Sum over camera rays of every pixel; `counts`: how many are traced, how many there are, and `_order`."""
+def _loop(scene, lights, corner, pixel, shifts, random, count, bounces: int):
+    """Sum over `count` camera rays of every pixel."""
     jitter, diffuse, specular, lamp = shifts
-    rays, count, first, step, group = counts
     total = mi.Color3f(0)
-    j = dr.zeros(mi.UInt32, dr.width(corner))
-    while j < rays:
-        i = first + step * j + j // group
+    i = dr.zeros(mi.UInt32, dr.width(corner))
+    while i < count:
         ray = _camera_ray(corner + pixel * _kronecker(i, jitter))
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
         hit = si.is_valid()
-        if dr.hint(sky, mode="scalar"):
-            total += dr.select(hit, 0, radiance(scene, ray.d, ~hit))
-        if dr.hint(aim is not None, mode="scalar"):
-            total += _aimed(scene, aim, si, ((0, SPLIT), (1, 1)), point(i, count, lamp), hit)
+        total += dr.select(hit, 0, radiance(scene, ray.d, ~hit))
+        if dr.hint(lights is not None, mode="scalar"):
+            total += _direct(scene, lights, si, ((0, SPLIT), (1, 1)), point(i, count, lamp), hit)
         k = mi.UInt32(0)
         while k < SPLIT:
             sample = point(k * count + i, count * SPLIT, diffuse)
-            total += _path(scene, aim, si, 0, sample, hit, bounces, random) / SPLIT
+            total += _path(scene, lights, si, 0, sample, hit, bounces, random) / SPLIT
             k += 1
-        total += _path(scene, aim, si, 1, point(i, count, specular), hit, bounces, random)
-        j += 1
+        total += _path(scene, lights, si, 1, point(i, count, specular), hit, bounces, random)
+        i += 1
     return total
 
 
-def _path(scene, aim, si, component: int, sample, active, bounces: int, random):
+def _path(scene, lights, si, component: int, sample, active, bounces: int, random):
     """Light along one direction of the BSDF's `component`, and by way of what stands there, over `bounces` rays."""
     context = mi.BSDFContext()
     context.component = component
@@ -120,12 +85,12 @@ def _path(scene, aim, si, component: int, sample, active, bounces: int, random):
         else:
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=False, active=active)
             escaped = active & ~si.is_valid()
-        balance = mi.Float(1) if aim is None else found / (found + aim.pdf(ray.d, escaped))
+        balance = mi.Float(1) if lights is None else found / (found + lights.pdf(ray.d, escaped))
         total = total + dr.select(escaped, balance * weight * radiance(scene, ray.d, escaped), 0)
         if bounce < bounces - 1:
             active = active & si.is_valid()
-            if aim is not None:
-                total += weight * _aimed(scene, aim, si, ((ALL, 1),), _uniform(random), active)
+            if lights is not None:
+                total += weight * _direct(scene, lights, si, ((ALL, 1),), _uniform(random), active)
             lobe, direction = random.next_float32(), _uniform(random)
             bs, value = si.bsdf().sample(mi.BSDFContext(), si, lobe, direction, active)
             found = bs.pdf
@@ -133,10 +98,10 @@ def _path(scene, aim, si, component: int, sample, active, bounces: int, random):
     return total
 
 
-def _aimed(scene, aim, si, components, sample, active):
-    """Light from one direction of `aim`, by those of the BSDF's (component, directions that it scatters itself)."""
+def _direct(scene, lights, si, components, sample, active):
+    """Light from one direction of `lights`, by those of the BSDF's (component, directions that it scatters itself)."""
     context, bsdf = mi.BSDFContext(), si.bsdf()
-    direction, density = aim.sample(sample)
+    direction, density = lights.sample(sample)
     local = si.to_local(direction)
     weight = mi.Color3f(0)
     for component, count in components:

@@ -78,7 +78,8 @@ def _traced(
     target: Any, scene: Scene, edited: Scene, names: list[str], spp: int, seed: int, clean: bool
 ) -> NativeLayer | None:
     """The named bodies of a `RenderScene` as a layer."""
-    from materialist.render import portrait as trace
+    from materialist.render.coverage import first_hits
+    from materialist.render.native import only, radiance
     from materialist.render.scene import MAX_DEPTH
 
     camera, native = scene.camera, scene.photo.original.shape[:2]
@@ -86,12 +87,12 @@ def _traced(
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
     bodies |= {f"lamp{k}": LAMP for k in range(len(edited.lamps))}
     chosen = {name: bodies[name] for name in names}
-    small = trace.look(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1]))
+    small = first_hits(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1]))
     if not small.share.any():
         return None
     box = _box(small.share, native)
-    sight = trace.look(target.mi_scene, camera, chosen, native, box)
-    alone = trace.look(trace.only(target.mi_scene, names), camera, chosen, native, box)
+    sight = first_hits(target.mi_scene, camera, chosen, native, box)
+    alone = first_hits(only(target.mi_scene, names), camera, chosen, native, box)
     factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
     size = (max(2, round(native[0] * factor)), max(2, round(native[1] * factor)))
     part = _scaled(box, native, size)
@@ -105,8 +106,8 @@ def _traced(
     options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
     clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
     maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
-    picture = traced(lambda _: trace.radiance(target, size, part, **options), target, edited, maps)
-    guide = sight if size == native else trace.look(target.mi_scene, camera, chosen, size, part)
+    picture = traced(lambda _: radiance(target, size, part, **options), target, edited, maps)
+    guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
     picture = spread(picture)
     if clean:
         picture = denoised(picture, guide.albedo, guide.normal)

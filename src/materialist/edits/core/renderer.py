@@ -82,10 +82,10 @@ class EditRenderer:
 
     def body_coverage_in(self, scene: Scene, size: tuple[int, int], box: tuple[int, int, int, int]) -> Array:
         """`body_coverage` in a box (top, bottom, left, right) of a picture of another size (H, W)."""
-        from materialist.render.portrait import look
+        from materialist.render.coverage import first_hits
 
         bodies = {f"body{k}": body for k, body in enumerate(scene.bodies)}
-        return look(self.render_scene(scene).mi_scene, scene.camera, bodies, size, box).share
+        return first_hits(self.render_scene(scene).mi_scene, scene.camera, bodies, size, box).share
 
     def guides(self, edited: Scene) -> tuple[Array, Array]:
         """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with those of its bodies."""
@@ -93,14 +93,14 @@ class EditRenderer:
 
     def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
         """Albedo and normal [H, W, 3] of the edited scene for the denoiser, where `covered` those of its bodies."""
-        from materialist.render.portrait import look
+        from materialist.render.coverage import first_hits
 
         if not covered.any():
             return edited.materials.albedo, edited.normal
         bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
         rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
         box = (int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1)
-        sight = look(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, box)
+        sight = first_hits(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, box)
         albedo, normal = edited.materials.albedo.copy(), edited.normal.copy()
         part = np.s_[box[0] : box[1], box[2] : box[3]]
         share = np.where(covered[part], sight.share, 0)[..., None]
@@ -141,9 +141,9 @@ class EditRenderer:
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
-        from materialist.render.seen import bodies_seen
+        from materialist.render.coverage import coverage
 
-        return bodies_seen(self._target(scene).mi_scene, scene.camera, names)
+        return coverage(self._target(scene).mi_scene, scene.camera, names)
 
     def _target(self, scene: Scene):
         """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""
@@ -156,7 +156,7 @@ class EditRenderer:
             scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
         )  # fmt: skip
         if self._built:
-            target.aim_as(self._built[0][1])
+            target.sample_lights_as(self._built[0][1])
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target

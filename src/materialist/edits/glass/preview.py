@@ -66,7 +66,7 @@ class GlassPreview:
         from materialist.edits.core.renderer import denoised
         from materialist.edits.core.sky import traced
         from materialist.edits.glass.glass import check_glass
-        from materialist.render.portrait import radiance
+        from materialist.render.native import radiance
         from materialist.render.scene import GLASS_DEPTH
 
         check_glass(ior, transmission, tint, roughness)
@@ -117,10 +117,10 @@ class GlassPreview:
         self._guides: dict[tuple[int, int], Any] = {}
 
     def _sight(self, size: tuple[int, int], box: tuple[int, int, int, int]) -> Any:
-        from materialist.render.portrait import look
+        from materialist.render.coverage import first_hits
 
         target = self._dressed(self._edited.bodies[-1].surface)
-        return look(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, size, box)
+        return first_hits(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, size, box)
 
     def _size(self, spp: int) -> tuple[tuple[int, int], tuple[int, int, int, int]]:
         """Size of the whole picture, and the rectangle of it to trace."""

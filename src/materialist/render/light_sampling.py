@@ -43,7 +43,7 @@ def openness(scene: Any, camera: Camera, *, seed: int = 0) -> Array:
     return share / max(share.mean(), 1e-12)
 
 
-class Aim:
+class LightSampler:
     """A distribution of directions, constant in each cell of a map's grid.
 
     Light that is not brighter than usual has none: scattered directions find it better, and the weights by which both

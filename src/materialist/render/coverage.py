@@ -1,0 +1,114 @@
+"""What the camera sees of bodies, at any resolution: coverage of pixels, and guides for denoisers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from materialist.types import Array, Body, Camera
+
+GRID = 4
+"""Rays along each side of a pixel."""
+_RAYS = 2**20
+"""Pixels looked at together: bounds the memory."""
+Box = tuple[int, int, int, int]
+"""Rows and columns (top, bottom, left, right) of a part of a picture, the ends excluded."""
+
+
+@dataclass(frozen=True)
+class FirstHits:
+    """What rays through the pixels of a box meet first, of some bodies; means over the rays that meet one."""
+
+    share: Array
+    """[h, w] float32 in [0, 1]: coverage, the share of each pixel in which one of the bodies is seen."""
+    albedo: Array
+    """[h, w, 3] float32 in [0, 1]; 0 where none is seen. White for glass and mirrors, as denoisers want it."""
+    normal: Array
+    """[h, w, 3] float32, camera frame; 0 where none is seen."""
+    depth: Array
+    """[h, w] float32 planar, scene units; 0 where none is seen."""
+
+
+def coverage(scene, camera: Camera, names: Sequence[str]) -> Array:
+    """[H, W] float32 in [0, 1]: share of each pixel in which the first thing seen is one of the named shapes.
+
+    scene: a Mitsuba scene (`RenderScene.mi_scene`).
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    shapes = [shape for shape in scene.shapes() if shape.id() in names]
+    size = (camera.height, camera.width)
+    total = np.zeros(size[0] * size[1], np.float32)
+    for direction in _directions(camera, size, (0, size[0], 0, size[1])):
+        hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(0), direction))
+        wanted = mi.Bool(False)
+        for shape in shapes:
+            wanted |= hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
+        total += np.array(dr.select(wanted, mi.Float(1), mi.Float(0)))
+    return (total / GRID**2).reshape(size)
+
+
+def first_hits(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> FirstHits:
+    """See `FirstHits`.
+
+    Args:
+        scene: a Mitsuba scene in which the bodies are shapes by these names (`RenderScene.mi_scene`).
+        size: (H, W) of the whole picture. box: the part of it that is wanted.
+    """
+    top, bottom, left, right = box
+    rows = max(1, _RAYS // max(right - left, 1))
+    strips = [
+        _strip(scene, camera, bodies, size, (first, min(first + rows, bottom), left, right))
+        for first in range(top, bottom, rows)
+    ]
+    found = np.concatenate(strips)  # [h, w, 8]
+    take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
+    return FirstHits(take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7]))
+
+
+def _strip(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> Array:
+    """[h, w, 8] share, albedo, normal and depth of a few rows."""
+    import mitsuba as mi
+
+    top, bottom, left, right = box
+    h, w = bottom - top, right - left
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    total = np.zeros((h * w, 8))
+    for direction in _directions(camera, size, box):
+        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), direction))
+        normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
+        for name, body in bodies.items():
+            hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
+            if hit.any():
+                part = [np.ones((hit.sum(), 1)), _albedo(body, uv[hit]), normal[hit], depth[hit, None]]
+                total[hit] += np.concatenate(part, 1)
+    total[:, 1:] /= np.maximum(total[:, :1], 1)
+    total[:, 0] /= GRID**2
+    return total.reshape(h, w, 8)
+
+
+def _directions(camera: Camera, size: tuple[int, int], box: Box) -> Iterator:
+    """Unit directions through GRID x GRID points of every pixel of a box, one point of all pixels at a time."""
+    import drjit as dr
+    import mitsuba as mi
+
+    top, bottom, left, right = box
+    pixel, width = dr.arange(mi.UInt32, (bottom - top) * (right - left)), right - left
+    row, column = mi.Float(pixel // width) + top, mi.Float(pixel % width) + left
+    half = float(np.tan(np.radians(camera.fov) / 2))
+    for k in range(GRID * GRID):
+        x = (column + dr.opaque(mi.Float, (k % GRID + 0.5) / GRID)) / size[1] * 2 - 1
+        y = 1 - (row + dr.opaque(mi.Float, (k // GRID + 0.5) / GRID)) / size[0] * 2
+        yield dr.normalize(mi.Vector3f(x * half, y * (half * camera.height / camera.width), -1))
+
+
+def _albedo(body: Body, uv: Array) -> Array:
+    """[n, 3] albedo at texture coordinates [n, 2], repeated; white where light goes on in one direction."""
+    surface = body.surface
+    h, w = surface.albedo.shape[:2]
+    x, y = (np.floor(np.nan_to_num(uv[:, k]) * n).astype(np.int64) % n for k, n in ((0, w), (1, h)))
+    clear = max(surface.transmission, float(surface.metallic.mean() * (surface.roughness.mean() < 0.2)))
+    return surface.albedo[y, x] * (1 - clear) + clear
