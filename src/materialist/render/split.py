@@ -38,7 +38,7 @@ def trace(
     """
     lane = dr.arange(mi.UInt32, camera.width * camera.height)
     corner, pixel = _corners(camera, lane)
-    random = mi.PCG32(size=camera.width * camera.height, initstate=mi.UInt64(seed))
+    random: Any = mi.PCG32(size=camera.width * camera.height, initstate=mi.UInt64(seed))  # type: ignore[operator]
     shifts = tuple(_uniform(random) for _ in range(4))  # the starts of a pixel's lattices, which all its rays share
     dr.eval(shifts, random)
     total = _loop(scene, lights, corner, pixel, shifts, random, dr.opaque(mi.UInt32, spp), max_depth - 1)
