@@ -9,6 +9,8 @@ hit goes towards it (`render.light_sampling`), and each direction counts by the 
 
 from __future__ import annotations
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
