@@ -43,7 +43,7 @@ class ObjectThickness:
     wall: float
     """Of the object, were it hollow."""
     method: str
-    """Which method it comes from: one of those of `choice.Choice`, or `given`."""
+    """Which method it comes from: `revolution`, `network`, `symmetry` or `given`."""
     back: Array | None = None
     """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
     revolution: Revolution | None = None
