@@ -4,7 +4,7 @@ import numpy as np
 
 from materialist.procedural import materials as m
 from materialist.procedural.objects import solids as s
-from materialist.procedural.walls import Wall, surface
+from materialist.procedural.walls import Hole, Wall, surface
 from materialist.procedural.world import Part, Portal, World, look
 from materialist.render.envmap import half_turn, on_mitsuba_grid
 
@@ -27,7 +27,7 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
         Part(s.moved(s.slab(np.array([0.4, 0.4, 0.4])), (-0.4, 0, 0), 0.2), red),
     ]  # fmt: skip
     hole = (0.6, 1.4, 0.6, 1.5) if window else (2.0, 2.0, 2.0, 2.0)
-    side = Wall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [hole] if window else [])
+    side = Wall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [Hole(*hole)] if window else [])
     parts += surface(side, grey)
     if lamp:
         glow = plain((0.8, 0.8, 0.8), emission=(8.0, 6.0, 4.0))

@@ -2,13 +2,9 @@
 
 import numpy as np
 import pytest
+from shape_measures import volume
 
 from materialist.procedural.objects.implicit import creature, surface
-
-
-def volume(solid):
-    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
 def open_edges(solid):

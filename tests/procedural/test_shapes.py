@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shape_measures import volume
 
 from materialist.procedural.objects import shapes
 
@@ -14,11 +15,6 @@ SOLIDS = {
     "cylinder": (shapes.lathe(np.array([(0, 0), (0.5, 0), (0.5, 2), (0, 2)])), np.pi * 0.5),
     "vase": (shapes.vessel(np.array([(0.1, 0), (0.2, 0.3), (0.1, 0.6)]), 0.02), None),
 }
-
-
-def volume(solid: shapes.Solid) -> float:
-    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
-    return float((np.cross(a, b) * c).sum() / 6)
 
 
 @pytest.mark.parametrize("name", SOLIDS)

@@ -16,6 +16,7 @@ from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera
 
 GROUPS = ("symmetric", "asymmetric")
@@ -280,7 +281,7 @@ def _room(rng: np.random.Generator) -> list[scenes.Item]:
     return [scenes.Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0) for p, k in zip((floor, wall), chosen, strict=True)]
 
 
-def _view(solid: Solid, rng: np.random.Generator) -> scenes.View:
+def _view(solid: Solid, rng: np.random.Generator) -> Viewpoint:
     """A camera that looks down 8 to 25 degrees at the object, which takes about half of the picture."""
     fov, tilt, azimuth = rng.uniform(30, 45), np.radians(rng.uniform(8, 25)), rng.uniform(-0.25, 0.25)
     height = float(solid.vertices[:, 1].max())
@@ -289,7 +290,7 @@ def _view(solid: Solid, rng: np.random.Generator) -> scenes.View:
     back = np.array([np.cos(tilt) * np.sin(azimuth), np.sin(tilt), np.cos(tilt) * np.cos(azimuth)])
     right = np.cross([0, 1, 0], back)
     right /= np.linalg.norm(right)
-    return scenes.View(
+    return Viewpoint(
         np.array([0, height / 2, 0]) + distance * back, np.stack([right, np.cross(back, right), back], -1), float(fov)
     )
 

@@ -11,6 +11,7 @@ from materialist.errors import InputError
 from materialist.procedural import patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.world import Viewpoint
 from materialist.types import Array
 
 
@@ -23,18 +24,6 @@ class Item:
     """[h, w, 3] float32 linear picture, repeated over the texture coordinates."""
     roughness: float
     metallic: float
-
-
-@dataclass(frozen=True)
-class View:
-    """A camera in the scene frame."""
-
-    position: Array
-    """[3] metres."""
-    to_scene: Array
-    """[3, 3] rotation that turns camera directions into scene directions."""
-    fov: float
-    """Horizontal field of view, degrees."""
 
 
 def arrangement(scene_index: int, *, seed: int, data: Path | None) -> list[Item]:
@@ -54,7 +43,7 @@ def arrangement(scene_index: int, *, seed: int, data: Path | None) -> list[Item]
     return items
 
 
-def view(scene_index: int, view_index: int, *, seed: int) -> View:
+def view(scene_index: int, view_index: int, *, seed: int) -> Viewpoint:
     """A camera that looks down 10 to 35 degrees onto the objects, with a field of view of 35 to 60 degrees.
 
     It stays on the side of the scene that has no wall.
@@ -67,10 +56,10 @@ def view(scene_index: int, view_index: int, *, seed: int) -> View:
     target = np.array([rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.35), rng.uniform(-0.1, 0.1)])
     right = np.cross([0, 1, 0], back)
     right /= np.linalg.norm(right)
-    return View(target + distance * back, np.stack([right, np.cross(back, right), back], -1), fov)
+    return Viewpoint(target + distance * back, np.stack([right, np.cross(back, right), back], -1), fov)
 
 
-def in_camera(item: Item, camera: View) -> Item:
+def in_camera(item: Item, camera: Viewpoint) -> Item:
     """The item with its shape in the frame of the camera."""
     solid = item.solid
     vertices = (solid.vertices - camera.position) @ camera.to_scene

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import colorsys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from materialist.procedural import tiles
 from materialist.types import Array
 
 Colour = tuple[float, float, float]
+Range = tuple[float, float]
+Shade = tuple[float, Range, Range, Range]
+"""Share, and ranges of hue, saturation and value (sRGB)."""
 
 
 @dataclass(frozen=True)
@@ -55,235 +60,221 @@ def hsv(h: float, s: float, v: float) -> Colour:
     return tuple(np.clip(srgb**2.2, 0.02, 0.92).tolist())
 
 
-def _tile(rng: np.random.Generator, kind: str) -> int:
-    where = tiles.bank()[1][kind]
-    return int(rng.integers(where.start, where.stop))
-
-
-def _near(rng: np.random.Generator, colour: Colour, low: float, high: float) -> Colour:
-    """That colour, darker or lighter by a factor, and a little off its hue."""
+def near(rng: np.random.Generator, colour: Colour, low: float, high: float) -> Colour:
+    """That colour, darker or lighter by a factor in [low, high], and a little off its hue."""
     factor = rng.uniform(low, high) * rng.uniform(0.92, 1.08, 3)
     return tuple(np.clip(np.array(colour) * factor, 0.015, 0.92).tolist())
 
 
-def any_colour(rng: np.random.Generator) -> Colour:
-    """Greys and beiges often, saturated colours often enough, dark to light."""
-    kind = rng.random()
-    if kind < 0.3:
-        return hsv(rng.uniform(0.05, 0.15), rng.uniform(0, 0.12), rng.uniform(0.15, 0.95))
-    if kind < 0.55:
-        return hsv(rng.uniform(0.03, 0.13), rng.uniform(0.12, 0.6), rng.uniform(0.2, 0.9))
-    if kind < 0.8:
-        return hsv(rng.random(), rng.uniform(0.1, 0.5), rng.uniform(0.2, 0.9))
-    return hsv(rng.random(), rng.uniform(0.5, 0.97), rng.uniform(0.25, 0.95))
+def uniform(colour: Colour, roughness: float, metallic: float = 0.0, grain: float = 0.0) -> Material:
+    """One colour all over."""
+    return Material(0, (colour,) * 3, grain, (roughness, roughness), (metallic, metallic))
 
 
-def wall_paint(rng: np.random.Generator) -> Material:
-    """Painted plaster: pale as a rule, deep colours now and then."""
-    if rng.random() < 0.78:
-        colour = hsv(rng.choice([rng.uniform(0.05, 0.17), rng.random()]), rng.uniform(0, 0.18), rng.uniform(0.7, 0.97))
-    else:
-        colour = hsv(rng.random(), rng.uniform(0.15, 0.65), rng.uniform(0.25, 0.85))
-    kind = str(rng.choice(["plain", "cloudy"], p=[0.75, 0.25]))
-    other, dark = _near(rng, colour, 0.85, 1.05), _near(rng, colour, 0.6, 0.95)
-    r = rng.uniform(0.45, 0.95)
-    return Material(
-        _tile(rng, kind), (colour, other, dark), rng.uniform(0, 0.12), (r, min(r + 0.1, 1)), repeat=_span(rng, 0.8, 3)
-    )
+ALL: Range = (0, 1)
+ANY_COLOUR: tuple[Shade, ...] = (
+    (0.3, (0.05, 0.15), (0, 0.12), (0.15, 0.95)), (0.25, (0.03, 0.13), (0.12, 0.6), (0.2, 0.9)),
+    (0.25, ALL, (0.1, 0.5), (0.2, 0.9)), (0.2, ALL, (0.5, 0.97), (0.25, 0.95)),
+)  # fmt: skip
+"""Greys and beiges often, saturated colours often enough, dark to light."""
+PALE: Shade = (0.8, (0.05, 0.15), (0, 0.15), (0.5, 0.97))
 
 
-def _span(rng: np.random.Generator, low: float, high: float) -> tuple[float, float]:
-    """A square tile size, log-uniform."""
-    size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-    return size, size
+T = TypeVar("T")
 
 
-def wallpaper(rng: np.random.Generator) -> Material:
-    """Printed paper: ornaments, stripes, spots."""
-    base = hsv(rng.random(), rng.uniform(0.02, 0.5), rng.uniform(0.4, 0.95))
-    kind = str(rng.choice(["ornament", "stripes", "spots", "plaid"], p=[0.5, 0.3, 0.1, 0.1]))
-    second = _near(rng, base, 0.5, 0.95) if rng.random() < 0.7 else any_colour(rng)
-    return Material(
-        _tile(rng, kind), (base, second, any_colour(rng)), rng.uniform(0, 0.1), (0.6, 0.8), repeat=_span(rng, 0.4, 1.5)
-    )
+def pick(rng: np.random.Generator, options: Sequence[tuple[float, T]]) -> T:
+    """One of several (share, option)."""
+    shares = np.array([share for share, _ in options])
+    return options[rng.choice(len(options), p=shares / shares.sum())][1]
 
 
-def wood(rng: np.random.Generator, kind: str = "wood", gloss: bool | None = None) -> Material:
-    """Pale, brown, red or nearly black timber, raw or varnished."""
-    value = rng.uniform(0.2, 0.88)
-    base = hsv(rng.uniform(0.045, 0.105), rng.uniform(0.25, 0.7), value)
-    gloss = rng.random() < 0.45 if gloss is None else gloss
-    r = rng.uniform(0.12, 0.35) if gloss else rng.uniform(0.4, 0.8)
-    repeat = _span(rng, 0.5, 1.4) if kind == "wood" else _span(rng, 0.9, 2.2)
-    return Material(
-        _tile(rng, kind), (base, _near(rng, base, 0.35, 0.75), _near(rng, base, 0.15, 0.4)), rng.uniform(0.1, 0.5),
-        (r, min(r + 0.2, 1)), repeat=(repeat[0] * rng.uniform(1, 2), repeat[1]),
-    )  # fmt: skip
+def shade(rng: np.random.Generator, shades: tuple[Shade, ...] = ANY_COLOUR) -> Colour:
+    """A colour from one of the ranges, any by default."""
+    ranges = pick(rng, tuple((share, parts) for share, *parts in shades))
+    return hsv(*(rng.uniform(*r) for r in ranges))
 
 
-def floor_boards(rng: np.random.Generator) -> Material:
-    """Parquet, boards or laminate."""
-    return wood(rng, "planks")
+any_colour: Callable[[np.random.Generator], Colour] = shade
 
 
-def tiled(rng: np.random.Generator) -> Material:
-    """Ceramic tiles with joints, chequered or of one colour."""
-    kind = str(rng.choice(["tiling", "checker"], p=[0.75, 0.25]))
-    base = any_colour(rng) if rng.random() < 0.5 else hsv(0.1, rng.uniform(0, 0.15), rng.uniform(0.5, 0.95))
-    second = any_colour(rng) if kind == "checker" else _near(rng, base, 0.75, 1.0)
-    r = rng.uniform(0.06, 0.5)
-    joint = hsv(0.1, 0.05, rng.uniform(0.25, 0.85))
-    return Material(
-        _tile(rng, kind),
-        (base, second, joint),
-        rng.uniform(0, 0.2),
-        (r, rng.uniform(0.5, 0.9)),
-        repeat=_span(rng, 0.6, 3),
-    )
+@dataclass(frozen=True)
+class Finish:
+    """A family of materials as ranges; a call draws one of them."""
+
+    tiles: str
+    """Kinds of tile, separated by spaces; one named twice is drawn twice as often."""
+    base: tuple[Shade, ...] = ANY_COLOUR
+    second: tuple[float, float, float] = (0, 1, 1)
+    """Probability that the second colour is the first one times a factor, from and to; else it is any colour."""
+    third: tuple[float, float, float] | tuple[Shade, ...] = (0, 1, 1)
+    """The same for the third colour, or its own ranges."""
+    grain: Range = (0, 0.1)
+    roughness: tuple[tuple[float, float, float], ...] = ((1, 0.6, 0.6),)
+    """(share, from, to) at 0 of the tile's roughness channel."""
+    rougher: Range = (0, 0)
+    """How much larger it is at 1 of that channel."""
+    repeat: Range = (0.3, 1)
+    """Metres that a tile covers, log-uniform."""
+    stretch: Range = (1, 1)
+    """Factor on that along u."""
+    quarter: bool = False
+    """Whether the tile is turned by 90 degrees half of the time."""
+
+    def __call__(self, rng: np.random.Generator) -> Material:
+        """A material of the family."""
+        first = shade(rng, self.base)
+        rough = rng.uniform(*pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness)))
+        size = float(np.exp(rng.uniform(*np.log(self.repeat))))
+        return Material(
+            tile(rng, str(rng.choice(self.tiles.split()))),
+            (first, self._other(rng, first, self.second), self._other(rng, first, self.third)),
+            rng.uniform(*self.grain), (rough, float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))),
+            repeat=(size * rng.uniform(*self.stretch), size), turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
+        )  # fmt: skip
+
+    def _other(self, rng: np.random.Generator, first: Colour, how: tuple) -> Colour:
+        if isinstance(how[0], tuple):
+            return shade(rng, how)
+        return near(rng, first, how[1], how[2]) if rng.random() < how[0] else shade(rng)
 
 
-def stone(rng: np.random.Generator) -> Material:
-    """Marble, granite, terrazzo, concrete."""
-    kind = str(rng.choice(["marble", "speckle", "cloudy"]))
-    base = hsv(rng.uniform(0.03, 0.16), rng.uniform(0, 0.25), rng.uniform(0.2, 0.92))
-    dark = _near(rng, base, 0.3, 0.8) if rng.random() < 0.7 else hsv(0.1, 0.1, rng.uniform(0.3, 0.95))
-    r = rng.uniform(0.08, 0.4) if rng.random() < 0.5 else rng.uniform(0.5, 0.95)
-    return Material(
-        _tile(rng, kind), (base, dark, any_colour(rng) if kind == "speckle" else dark), rng.uniform(0.1, 0.6),
-        (r, min(r + 0.15, 1)), repeat=_span(rng, 0.4, 2),
-    )  # fmt: skip
+def tile(rng: np.random.Generator, kind: str) -> int:
+    """The number of a tile of that kind."""
+    where = tiles.bank()[1][kind]
+    return int(rng.integers(where.start, where.stop))
 
 
-def brick(rng: np.random.Generator) -> Material:
-    """Brickwork, bare or painted, with joints."""
-    base = hsv(rng.uniform(0.0, 0.09), rng.uniform(0.15, 0.7), rng.uniform(0.3, 0.85))
-    if rng.random() < 0.2:
-        base = hsv(0.1, 0.03, rng.uniform(0.7, 0.92))
-    joint = hsv(0.1, rng.uniform(0, 0.15), rng.uniform(0.35, 0.85))
-    return Material(
-        _tile(rng, "bricks"), (base, _near(rng, base, 0.5, 1.0), joint), rng.uniform(0.3, 0.9), (0.75, 0.95),
-        repeat=_span(rng, 0.6, 1.2),
-    )  # fmt: skip
+SHINY_OR_MATT = ((0.5, 0.08, 0.35), (0.5, 0.35, 0.7))
+TIMBER: tuple[Shade, ...] = ((1, (0.045, 0.105), (0.25, 0.7), (0.2, 0.88)),)
+EARTH: tuple[Shade, ...] = ((1, (0.03, 0.14), (0, 0.4), (0.2, 0.8)),)
+MORTAR: tuple[Shade, ...] = ((1, (0.1, 0.1), (0, 0.15), (0.25, 0.85)),)
+
+wall_paint = Finish(
+    "plain plain plain cloudy",
+    ((0.4, (0.05, 0.17), (0, 0.18), (0.7, 0.97)), (0.4, ALL, (0, 0.18), (0.7, 0.97)),
+     (0.2, ALL, (0.15, 0.65), (0.25, 0.85))),
+    (1, 0.85, 1.05), (1, 0.6, 0.95), (0, 0.12), ((1, 0.45, 0.95),), (0.1, 0.1), (0.8, 3),
+)  # fmt: skip
+wallpaper = Finish(
+    "ornament ornament ornament stripes stripes spots plaid", ((1, ALL, (0.02, 0.5), (0.4, 0.95)),), (0.7, 0.5, 0.95),
+    rougher=(0.2, 0.2), repeat=(0.4, 1.5),
+)  # fmt: skip
+white_paint = Finish(
+    "plain", ((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), (1, 1, 1), (1, 1, 1), (0, 0.05), ((1, 0.2, 0.6),)
+)
+lacquer = Finish("plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),))
+"""Of any colour, dull or shiny."""
+rubber = Finish("plain", ((1, ALL, (0, 0.05), (0.05, 0.3)),), (1, 1, 1), (1, 1, 1), (0, 0.2), ((1, 0.5, 0.9),))
+card = Finish(
+    "plain", ((1, (0.07, 0.1), (0.3, 0.55), (0.45, 0.75)),), (1, 1, 1), (1, 1, 1), (0, 0.2), ((1, 0.7, 0.95),)
+)
+raw_wood = Finish(
+    "wood", TIMBER, (1, 0.35, 0.75), (1, 0.15, 0.4), (0.1, 0.5), ((1, 0.4, 0.8),), (0.2, 0.2), (0.5, 1.4), (1, 2)
+)
+wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
+"""Pale, brown, red or nearly black timber, raw or varnished."""
+floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
+tiled = Finish(
+    "tiling tiling tiling checker", (*ANY_COLOUR, PALE), (0.75, 0.75, 1.0), MORTAR, (0, 0.2), ((1, 0.06, 0.5),),
+    (0.2, 0.8), (0.6, 3),
+)  # fmt: skip
+stone = Finish(
+    "marble speckle cloudy", ((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),), (0.7, 0.3, 0.8), (0.7, 0.3, 0.8), (0.1, 0.6),
+    ((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)), (0.15, 0.15), (0.4, 2),
+)  # fmt: skip
+"""Marble, granite, terrazzo, concrete."""
+brick = Finish(
+    "bricks", ((0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)), (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92))),
+    (1, 0.5, 1.0), MORTAR, (0.3, 0.9), ((1, 0.75, 0.75),), (0.2, 0.2), (0.6, 1.2),
+)  # fmt: skip
+woven = Finish("weave", second=(0.5, 0.4, 0.9), grain=(0.1, 0.7), roughness=((1, 0.6, 1.0),), repeat=(0.08, 0.3))
+printed_cloth = replace(woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9))
+ceramic = Finish(
+    "plain plain plain stripes ornament spots cloudy", (*ANY_COLOUR, PALE), grain=(0, 0.15),
+    roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)), repeat=(0.1, 0.5), quarter=True,
+)  # fmt: skip
+"""Glazed pottery: white, coloured, decorated; matt clay now and then."""
+plastic = Finish(
+    "plain", (*ANY_COLOUR, (1, ALL, (0.6, 1), (0.3, 0.95))), (1, 1, 1), (1, 1, 1), (0, 0.08), SHINY_OR_MATT
+)
+foliage = Finish(
+    "leaf", ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))), (1, 0.5, 1.3),
+    (1, 1.0, 1.6), (0.2, 0.6), ((1, 0.35, 0.7),), repeat=(0.1, 0.3),
+)  # fmt: skip
+"""Leaves, fresh or autumnal."""
+paved = Finish(
+    "speckle speckle paving paving cloudy bricks tiling", EARTH, (1, 0.55, 1.1), (0.8, 0.35, 0.8), (0.3, 1.1),
+    ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)), (0.1, 0.1), (1, 4),
+)  # fmt: skip
+grass = replace(paved, tiles="grass", base=((1, (0.14, 0.34), (0.3, 0.7), (0.25, 0.6)),), roughness=((1, 0.7, 1.0),))
+facade = Finish(
+    "facade", ((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))), (0.5, 0.5, 1.5),
+    ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),), (0.1, 0.5), ((1, 0.7, 0.95),), (-0.8, -0.5), (5, 12),
+)  # fmt: skip
+"""House front with rows of dark or mirroring windows, which are smoother than the wall."""
+skin = Finish(
+    "plain", ((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), (1, 1, 1), (1, 1, 1), (0.1, 0.1), ((1, 0.4, 0.65),)
+)
+
+METALS = ((0.91, 0.90, 0.88), (0.62, 0.61, 0.60), (0.95, 0.78, 0.36), (0.93, 0.65, 0.52), (0.78, 0.68, 0.46),
+          (0.45, 0.44, 0.43))  # fmt: skip
+"""Silver and aluminium, steel, gold, copper, brass, iron: linear reflectance at normal incidence."""
 
 
 def fabric(rng: np.random.Generator) -> Material:
     """Upholstery, curtains, table cloths, clothes."""
-    kind = str(rng.choice(["weave", "plain", "stripes", "plaid", "ornament", "spots", "cloudy"],
-                          p=[0.3, 0.22, 0.12, 0.1, 0.12, 0.06, 0.08]))  # fmt: skip
-    base = any_colour(rng)
-    second = _near(rng, base, 0.4, 0.9) if rng.random() < 0.5 else any_colour(rng)
-    repeat = _span(rng, 0.08, 0.3) if kind == "weave" else _span(rng, 0.2, 0.9)
-    r = rng.uniform(0.6, 1.0)
-    return Material(_tile(rng, kind), (base, second, any_colour(rng)), rng.uniform(0.1, 0.7), (r, r), repeat=repeat)
-
-
-def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
-    """A carpet of that size in metres, its tile fitted once."""
-    base = any_colour(rng)
-    second = any_colour(rng) if rng.random() < 0.6 else _near(rng, base, 0.4, 0.8)
-    r = rng.uniform(0.8, 1.0)
-    return Material(_tile(rng, "carpet"), (base, second, any_colour(rng)), rng.uniform(0.2, 0.9), (r, r),
-                    repeat=(width, depth), offset=(0.5, 0.5))  # fmt: skip
-
-
-_METALS = ((0.91, 0.90, 0.88), (0.62, 0.61, 0.60), (0.95, 0.78, 0.36), (0.93, 0.65, 0.52), (0.78, 0.68, 0.46),
-           (0.45, 0.44, 0.43))  # fmt: skip
-
-
-def metal(rng: np.random.Generator) -> Material:
-    """Steel, aluminium, brass, copper, gold, iron: polished, brushed, or worn."""
-    colour = tuple((np.array(_METALS[rng.integers(len(_METALS))]) * rng.uniform(0.85, 1, 3)).clip(0, 0.95).tolist())
-    kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
-    r = rng.uniform(0.05, 0.25) if rng.random() < 0.5 else rng.uniform(0.25, 0.6)
-    if kind == "rust":
-        paint = any_colour(rng) if rng.random() < 0.5 else hsv(0.05, 0.7, rng.uniform(0.25, 0.5))
-        return Material(_tile(rng, kind), (colour, paint, _near(rng, paint, 0.5, 0.8)), 0.3, (r, rng.uniform(0.5, 0.9)),
-                        (1.0, 0.0), _span(rng, 0.15, 0.6))  # fmt: skip
-    return Material(_tile(rng, kind), (colour, colour, colour), rng.uniform(0, 0.25), (r, min(r + 0.15, 1)), (1.0, 1.0),
-                    _span(rng, 0.1, 0.5), turn=float(rng.choice([0, np.pi / 2])))  # fmt: skip
-
-
-def ceramic(rng: np.random.Generator) -> Material:
-    """Glazed pottery: white, coloured, decorated; matt clay now and then."""
-    base = hsv(rng.uniform(0.05, 0.15), rng.uniform(0, 0.15), rng.uniform(0.75, 0.97))
-    base = base if rng.random() < 0.4 else any_colour(rng)
-    kind = str(rng.choice(["plain", "stripes", "ornament", "spots", "cloudy"], p=[0.5, 0.15, 0.15, 0.1, 0.1]))
-    r = rng.uniform(0.06, 0.3) if rng.random() < 0.75 else rng.uniform(0.5, 0.9)
-    return Material(_tile(rng, kind), (base, any_colour(rng), any_colour(rng)), rng.uniform(0, 0.15), (r, r),
-                    repeat=_span(rng, 0.1, 0.5), turn=float(rng.choice([0, np.pi / 2])))  # fmt: skip
-
-
-def plastic(rng: np.random.Generator) -> Material:
-    """Coloured plastic or lacquer, shiny or matt."""
-    base = any_colour(rng) if rng.random() < 0.5 else hsv(rng.random(), rng.uniform(0.6, 1), rng.uniform(0.3, 0.95))
-    r = rng.uniform(0.08, 0.35) if rng.random() < 0.5 else rng.uniform(0.35, 0.7)
-    return Material(_tile(rng, "plain"), (base, base, base), rng.uniform(0, 0.08), (r, r), repeat=_span(rng, 0.3, 1))
-
-
-def printed(rng: np.random.Generator, width: float, height: float) -> Material:
-    """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
-    kind = str(rng.choice(["picture", "print", "ornament", "cloudy", "spots"], p=[0.5, 0.2, 0.1, 0.1, 0.1]))
-    r = rng.uniform(0.15, 0.7)
-    paper = hsv(0.12, rng.uniform(0, 0.2), rng.uniform(0.8, 0.97)) if kind == "print" else any_colour(rng)
-    return Material(_tile(rng, kind), (paper, any_colour(rng), any_colour(rng)), rng.uniform(0.1, 0.9), (r, r),
-                    repeat=(width, -height), offset=(0.5, 0.5))  # fmt: skip
-
-
-def foliage(rng: np.random.Generator) -> Material:
-    """Leaves, fresh or autumnal."""
-    hue = rng.uniform(0.2, 0.38) if rng.random() < 0.8 else rng.uniform(0.02, 0.16)
-    base = hsv(hue, rng.uniform(0.3, 0.8), rng.uniform(0.2, 0.65))
-    r = rng.uniform(0.35, 0.7)
-    return Material(_tile(rng, "leaf"), (base, _near(rng, base, 0.5, 1.3), _near(rng, base, 1.0, 1.6)),
-                    rng.uniform(0.2, 0.6), (r, r), repeat=_span(rng, 0.1, 0.3))  # fmt: skip
+    return (woven if rng.random() < 0.3 else printed_cloth)(rng)
 
 
 def ground(rng: np.random.Generator) -> Material:
     """Outdoor ground: asphalt, paving, grass, earth, gravel, sand, concrete."""
-    kind = str(rng.choice(["speckle", "paving", "grass", "cloudy", "bricks", "tiling"],
-                          p=[0.25, 0.25, 0.2, 0.15, 0.1, 0.05]))  # fmt: skip
-    if kind == "grass":
-        base = hsv(rng.uniform(0.14, 0.34), rng.uniform(0.3, 0.7), rng.uniform(0.25, 0.6))
-    else:
-        base = hsv(rng.uniform(0.03, 0.14), rng.uniform(0, 0.4), rng.uniform(0.2, 0.8))
-    r = rng.uniform(0.7, 1.0) if rng.random() < 0.88 else rng.uniform(0.2, 0.5)
-    second = _near(rng, base, 0.55, 1.1)
-    third = _near(rng, base, 0.35, 0.8) if rng.random() < 0.7 else _near(rng, base, 1, 1.8)
-    return Material(_tile(rng, kind), (base, second, third), rng.uniform(0.3, 1.1), (r, min(r + 0.1, 1)),
-                    repeat=_span(rng, 1.0, 4))  # fmt: skip
+    return (grass if rng.random() < 0.2 else paved)(rng)
 
 
-def facade(rng: np.random.Generator) -> Material:
-    """House front with rows of dark or mirroring windows."""
-    wall = hsv(rng.uniform(0.02, 0.16), rng.uniform(0, 0.5), rng.uniform(0.35, 0.95))
-    if rng.random() < 0.15:
-        wall = any_colour(rng)
-    glass = hsv(rng.uniform(0.5, 0.65), rng.uniform(0, 0.3), rng.uniform(0.1, 0.35))
-    return Material(_tile(rng, "facade"), (wall, hsv(0.1, 0.05, rng.uniform(0.3, 0.95)), glass), rng.uniform(0.1, 0.5),
-                    (rng.uniform(0.7, 0.95), rng.uniform(0.06, 0.2)), repeat=_span(rng, 5, 12))  # fmt: skip
+def metal(rng: np.random.Generator) -> Material:
+    """Steel, aluminium, brass, copper, gold, iron: polished, brushed, or worn."""
+    colour = cast(Colour, tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()))
+    kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
+    made = Finish(kind, grain=(0, 0.3), roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)), rougher=(0.1, 0.2),
+                  repeat=(0.1, 0.5), quarter=True)(rng)  # fmt: skip
+    if kind == "rust":  # corroded or painted over where the tile's first channel is 1
+        return replace(made, colours=(colour, *made.colours[1:]), metallic=(1.0, 0.0))
+    return replace(made, colours=(colour,) * 3, metallic=(1.0, 1.0))
 
 
-def skin(rng: np.random.Generator) -> Material:
-    """Skin of any tone."""
-    base = hsv(rng.uniform(0.03, 0.08), rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.95))
-    r = rng.uniform(0.4, 0.65)
-    return Material(_tile(rng, "plain"), (base, base, base), 0.1, (r, r), repeat=(0.3, 0.3))
+def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
+    """A carpet of that size in metres, its tile fitted once."""
+    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(rng)
+    return replace(made, repeat=(width, depth), offset=(0.5, 0.5))
 
 
-def light(rng: np.random.Generator, emission: Colour, *, surface: bool = True) -> Material:
+def printed(rng: np.random.Generator, width: float, height: float) -> Material:
+    """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
+    kinds = "picture picture picture print ornament cloudy spots"
+    made = Finish(kinds, (*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),))(rng)
+    return replace(made, repeat=(width, -height), offset=(0.5, 0.5))
+
+
+def light(rng: np.random.Generator, radiance: Colour) -> Material:
     """A luminous white surface of that radiance."""
-    white = (0.8, 0.8, 0.8)
-    scaled = tuple((np.array(emission) / 0.8).tolist())
-    return Material(_tile(rng, "plain"), (white,) * 3, 0.0, (0.6, 0.6), emission=scaled, surface=surface)
+    emission = cast(Colour, tuple((np.array(radiance) / 0.8).tolist()))
+    return Material(tile(rng, "plain"), ((0.8, 0.8, 0.8),) * 3, 0.0, emission=emission)
 
 
-_OBJECTS = ((ceramic, 0.2), (plastic, 0.2), (metal, 0.26), (wood, 0.11), (fabric, 0.07), (stone, 0.07),
-            (wall_paint, 0.09))  # fmt: skip
+Maker = Callable[[np.random.Generator], Material]
+OBJECTS: tuple[tuple[float, Maker], ...] = (
+    (0.2, ceramic), (0.2, plastic), (0.26, metal), (0.11, wood), (0.07, fabric), (0.07, stone), (0.09, wall_paint)
+)  # fmt: skip
 
 
 def any_object(rng: np.random.Generator) -> Material:
     """What a movable thing may be made of, at a scale that suits 10 to 40 centimetres."""
-    makers, shares = zip(*_OBJECTS)
-    material = makers[rng.choice(len(makers), p=np.array(shares))](rng)
+    material = pick(rng, OBJECTS)(rng)
     shrink = rng.uniform(0.15, 0.5) if max(material.repeat) > 0.5 else 1.0
     return replace(material, repeat=(material.repeat[0] * shrink, material.repeat[1] * shrink))
+
+
+def one_of(rng: np.random.Generator, *makers: Callable[[np.random.Generator], T]) -> T:
+    """What one of the makers makes, each as likely."""
+    return makers[rng.integers(len(makers))](rng)

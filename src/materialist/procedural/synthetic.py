@@ -17,6 +17,7 @@ import numpy as np
 from materialist.buffers import floats, integers, tensor
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
+from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
@@ -93,7 +94,7 @@ def _exposure(picture: Array, surface: Array) -> float:
 class TrueScene:
     """The true geometry and materials of one view in Mitsuba, to be rendered under any envmap."""
 
-    def __init__(self, items: list[scenes.Item], view: scenes.View, height: int, width: int):
+    def __init__(self, items: list[scenes.Item], view: Viewpoint, height: int, width: int):
         import mitsuba as mi
 
         self.view = view

@@ -34,7 +34,7 @@ class Portal:
 
 
 @dataclass(frozen=True)
-class View:
+class Viewpoint:
     """A camera in the scene frame."""
 
     position: Array
@@ -52,12 +52,12 @@ class World:
     parts: list[Part]
     envmap: Array
     """[h, 2h, 3] float32 linear radiance in the scene frame, in the project's envmap convention."""
-    view: View
+    view: Viewpoint
     portals: list[Portal] = field(default_factory=list)
     kind: str = ""
 
 
-def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> View:
+def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
     """The camera at `position` [3] that looks at `target` [3], rolled by `roll` radians."""
     back = np.asarray(position, float) - target
     back /= np.linalg.norm(back)
@@ -65,4 +65,15 @@ def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> View:
     right /= max(np.linalg.norm(right), 1e-9)
     up = np.cross(back, right)
     c, s = np.cos(roll), np.sin(roll)
-    return View(np.asarray(position, float), np.stack([c * right + s * up, c * up - s * right, back], -1), fov)
+    return Viewpoint(np.asarray(position, float), np.stack([c * right + s * up, c * up - s * right, back], -1), fov)
+
+
+def look_down(
+    target: Array, distance: float, turn: float, up: float, fov: float, roll: float = 0.0, within: Array | None = None
+) -> Viewpoint:
+    """The camera that looks at `target` [3] from `distance` metres, `turn` radians to its side and `up` above it.
+
+    within: [2, 3] lower and upper corner of a box that the camera stays in.
+    """
+    eye = target + distance * np.array([np.sin(turn) * np.cos(up), np.sin(up), np.cos(turn) * np.cos(up)])
+    return look(eye if within is None else np.clip(eye, *within), target, fov, roll)

@@ -77,13 +77,13 @@ def capsule(radius: float, length: float) -> Solid:
     return lathe(np.concatenate([lower, upper]))
 
 
-def vessel(control: Array, thickness: float) -> Solid:
+def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Solid:
     """Open vase, cup or bowl: a smooth wall through `control` [K, 2] (radius, height), with an inside and a rim."""
     from scipy.interpolate import PchipInterpolator
 
-    height = np.linspace(control[0, 1], control[-1, 1], 48)
+    height = np.linspace(control[0, 1], control[-1, 1], rows)
     radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
-    inner = np.maximum(radius - thickness, 0.02)
+    inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
     keep = height > thickness
     t = np.linspace(0, np.pi, 8)[1:-1, None]
     rim = np.concatenate([np.cos(t), np.sin(t)], -1) * thickness / 2 + [radius[-1] - thickness / 2, height[-1]]
@@ -91,7 +91,7 @@ def vessel(control: Array, thickness: float) -> Solid:
     inside = np.stack([inner, height], -1)[keep][::-1]
     bottom = np.stack([np.linspace(0, radius[0], 6), np.zeros(6)], -1)[:-1]
     floor = np.stack([np.linspace(inside[-1, 0], 0, 6), np.full(6, inside[-1, 1])], -1)[1:]
-    return lathe(np.concatenate([bottom, outside, rim, inside, floor]))
+    return lathe(np.concatenate([bottom, outside, rim, inside, floor]), n)
 
 
 def panel(origin: Array, right: Array, up: Array, repeat: tuple[float, float]) -> Solid:
@@ -112,7 +112,7 @@ def load(path: Path) -> Solid:
     faces = np.array(params["faces"], np.int32).reshape(-1, 3)
     low, high = vertices.min(0), vertices.max(0)
     vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (high - low).max()
-    normals = _smooth_normals(vertices, faces)
+    normals = smooth_normals(vertices, faces)
     # Each face gets corners of its own, so that the texture can close around the axis without a seam.
     corners = vertices[faces]  # [F, 3, 3]
     u = np.arctan2(corners[..., 2], corners[..., 0]) / (2 * np.pi) + 0.5
@@ -133,14 +133,20 @@ def placed(solid: Solid, *, scale: float = 1.0, turn: float = 0.0, at: tuple[flo
 def _grid(points: Array) -> Solid:
     """Mesh of a parametric grid [n, m, 3] whose last column repeats the first; u along columns, v along rows."""
     n, m = points.shape[:2]
+    faces = grid_faces(n, m)
+    vertices = points.reshape(-1, 3).astype(np.float64)
+    area = np.linalg.norm(_face_normals(vertices, faces), axis=-1)
+    faces = faces[area > 1e-12]  # the triangles at poles that have no area
+    u, v = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n))
+    return Solid(vertices, faces, smooth_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2))
+
+
+def grid_faces(n: int, m: int, flip: bool = False) -> Array:
+    """[2 (n - 1)(m - 1), 3] int32 triangles of an n x m grid of vertices, rows along the first axis."""
     index = np.arange(n * m).reshape(n, m)
     a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    vertices = points.reshape(-1, 3).astype(np.float64)
-    area = np.linalg.norm(_face_normals(vertices, faces), axis=-1)
-    faces = faces[area > 1e-12].astype(np.int32)  # the triangles at poles that have no area
-    u, v = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n))
-    return Solid(vertices, faces, _smooth_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2))
+    return (faces[:, ::-1] if flip else faces).astype(np.int32)
 
 
 def _face_normals(vertices: Array, faces: Array) -> Array:
@@ -149,14 +155,16 @@ def _face_normals(vertices: Array, faces: Array) -> Array:
     return np.cross(b - a, c - a)
 
 
-def _smooth_normals(vertices: Array, faces: Array) -> Array:
-    """[V, 3] area-weighted unit normals, shared by vertices at one place (seams and poles stay invisible)."""
-    scale = np.ptp(vertices, axis=0).max()
-    _, place = np.unique(np.round(vertices / scale * 1e6).astype(np.int64), axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    flat = _face_normals(vertices, faces)
-    total = np.zeros((place.max() + 1, 3))
-    for k in range(3):
-        np.add.at(total, place[faces[:, k]], flat)
+def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -> Array:
+    """[V, 3] area-weighted unit normals, shared by the vertices that lie at one of `places` [V, 3].
+
+    Seams and poles stay invisible: `places` are the vertices themselves by default.
+    """
+    places = vertices if places is None else places
+    scale = max(float(np.ptp(places, axis=0).max()), 1e-9)
+    keys = np.round(places / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
+    _, place = np.unique(keys, return_inverse=True)
+    flat, corners = np.tile(_face_normals(vertices, faces), (3, 1)), place[faces].T.ravel()
+    total = np.stack([np.bincount(corners, flat[:, k], place.max() + 1) for k in range(3)], -1)
     length = np.linalg.norm(total, axis=-1, keepdims=True)
     return np.where(length > 0, total / np.maximum(length, 1e-30), [0, 1, 0])[place]

@@ -1,4 +1,4 @@
-"""Solids that `bench.shapes` lacks: rounded slabs, soft bodies, thin leaves; texture coordinates in metres."""
+"""Solids beside those of `shapes`: rounded slabs, soft bodies, thin leaves; texture coordinates in metres."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from materialist.procedural.objects.shapes import Solid, lathe
+from materialist.procedural.objects.shapes import Solid, grid_faces, lathe, smooth_normals, vessel
 from materialist.types import Array
 
 _AXES = ((0, 2, 1), (1, 0, 2), (2, 0, 1))
@@ -39,7 +39,7 @@ def _side(half: Array, radius: float, arc: Array, axis: int, u: int, v: int, sig
     normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     place = inner + radius * normal
     handed = np.linalg.det(np.stack([np.eye(3)[u], np.eye(3)[v], np.eye(3)[axis] * sign]))
-    faces = _grid_faces(len(a), a.shape[1], flip=handed < 0)
+    faces = grid_faces(len(a), a.shape[1], flip=handed < 0)
     uv = np.stack([a, b], -1).reshape(-1, 2)
     return Solid(place.reshape(-1, 3), faces, normal.reshape(-1, 3), uv)
 
@@ -51,43 +51,21 @@ def _line(half: float, radius: float, arc: Array) -> Array:
     return np.concatenate([-tips[::-1], tips])
 
 
-def _grid_faces(n: int, m: int, flip: bool = False) -> Array:
-    """[2 (n - 1)(m - 1), 3] int32 triangles of an n x m grid of vertices, rows along the first axis."""
-    index = np.arange(n * m).reshape(n, m)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    return (faces[:, ::-1] if flip else faces).astype(np.int32)
-
-
-def sheet(origin: ArrayLike, right: Array, up: Array, n: int = 1) -> Solid:
+def sheet(origin: ArrayLike, right: ArrayLike, up: ArrayLike, n: int = 1) -> Solid:
     """Rectangle from `origin` along `right` and `up` (all [3], metres), facing right x up, in n x n pieces."""
-    t = np.linspace(0, 1, n + 1)
+    right, up, t = np.asarray(right, float), np.asarray(up, float), np.linspace(0, 1, n + 1)
     a, b = np.meshgrid(t, t, indexing="ij")
     vertices = np.asarray(origin) + a[..., None] * right + b[..., None] * up
     normal = np.cross(right, up)
     normal = np.broadcast_to(normal / np.linalg.norm(normal), vertices.shape)
     uv = np.stack([a * np.linalg.norm(right), b * np.linalg.norm(up)], -1)
-    return Solid(vertices.reshape(-1, 3), _grid_faces(n + 1, n + 1), normal.reshape(-1, 3).copy(), uv.reshape(-1, 2))
+    return Solid(vertices.reshape(-1, 3), grid_faces(n + 1, n + 1), normal.reshape(-1, 3).copy(), uv.reshape(-1, 2))
 
 
 def warped(solid: Solid, function) -> Solid:
     """The solid with its vertices [V, 3] sent through `function`, and new smooth normals."""
     vertices = function(solid.vertices)
     return replace(solid, vertices=vertices, normals=smooth_normals(vertices, solid.faces, solid.vertices))
-
-
-def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -> Array:
-    """[V, 3] area-weighted unit normals, shared by the vertices that lie at one of `places` [V, 3]."""
-    places = vertices if places is None else places
-    scale = max(float(np.ptp(places, axis=0).max()), 1e-9)
-    keys = np.round(places / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
-    _, place = np.unique(keys, return_inverse=True)
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    flat = np.cross(b - a, c - a)
-    corners = place[faces].ravel()
-    total = np.stack([np.bincount(corners, np.repeat(flat[:, k], 3), place.max() + 1) for k in range(3)], -1)
-    length = np.linalg.norm(total, axis=-1, keepdims=True)
-    return np.where(length > 0, total / np.maximum(length, 1e-30), [0, 1, 0])[place]
 
 
 def lumps(rng: np.random.Generator, amount: float, waves: float, count: int = 6):
@@ -112,22 +90,38 @@ def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 4
     return grounded(replace(body, uv=body.uv * half.mean()))
 
 
-def pot(control: Array, thickness: float, n: int = 40) -> Solid:
-    """Open vessel through `control` [K, 2] (radius, height), as `bench.shapes.vessel` with an eighth of its faces.
+def pot(control: Array, thickness: float) -> Solid:
+    """`shapes.vessel` with an eighth of its faces; texture coordinates in metres."""
+    radius, height = control[:, 0].mean(), control[-1, 1]
+    return metric(vessel(control, thickness, rows=18, n=40), np.pi * radius, 2 * height)
 
-    Texture coordinates are in metres.
-    """
-    from scipy.interpolate import PchipInterpolator
 
-    height = np.linspace(control[0, 1], control[-1, 1], 18)
-    radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
-    outside = np.stack([radius, height], -1)
-    inside = np.stack([np.maximum(radius - thickness, 0.1 * radius), np.maximum(height, thickness)], -1)[::-1]
-    rim = [[radius[-1] - 0.25 * thickness, height[-1] + 0.35 * thickness],
-           [radius[-1] - 0.75 * thickness, height[-1] + 0.35 * thickness]]  # fmt: skip
-    profile = np.concatenate([[[1e-4, 0]], outside, rim, inside, [[1e-4, thickness]]])
-    solid = lathe(profile, n)
-    return replace(solid, uv=solid.uv * [np.pi * radius.mean(), 2 * height[-1]])
+def disc(radius: float) -> Solid:
+    """A flat disc about the origin that faces upwards."""
+    return lathe(np.array([[radius, 0], [1e-4, 0]]), 32)
+
+
+def drum(radius: float, height: float, top: float | None = None) -> Solid:
+    """A cylinder about the Y axis, its middle at the origin; or a cone, whose upper radius is `top`."""
+    h = height / 2
+    return lathe(np.array([(1e-3, -h), (radius, -h), (radius if top is None else top, h), (1e-3, h)]), 24)
+
+
+def torus(major: float, minor: float, n: int) -> Solid:
+    """A ring about the Y axis, its tube of n sides; texture coordinates in metres."""
+    phi = np.linspace(0, 2 * np.pi, n + 1)
+    ring = lathe(np.stack([major + minor * np.cos(phi), minor * np.sin(phi)], -1), 40)
+    return metric(ring, np.pi * major, 2 * np.pi * minor)
+
+
+def strip(line: ArrayLike, width: float, flip: bool = False) -> Solid:
+    """A band of that width along Z over a line [P, 3] in the plane of X and Y; texture coordinates in metres."""
+    line = np.asarray(line, float)
+    vertices = (line[:, None] + [[0, 0, -width / 2], [0, 0, width / 2]]).reshape(-1, 3)
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
+    uv = np.stack(np.broadcast_arrays([0, width], along[:, None]), -1).reshape(-1, 2)
+    faces = grid_faces(len(line), 2, flip)
+    return Solid(vertices, faces, smooth_normals(vertices, faces), uv)
 
 
 def grounded(solid: Solid) -> Solid:
@@ -136,7 +130,7 @@ def grounded(solid: Solid) -> Solid:
 
 
 def metric(solid: Solid, width: float, height: float) -> Solid:
-    """A solid of `bench.shapes` with texture coordinates in metres: u over `width`, v over `height`."""
+    """The solid with texture coordinates in metres: u over `width`, v over `height`."""
     return replace(solid, uv=solid.uv * [width, height])
 
 
@@ -155,7 +149,7 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     vertices = line[:, None] + width[:, None, None] * normal
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
     uv = np.stack(np.broadcast_arrays(phi[..., 0] * width.mean(), length[:, None]), -1)
-    faces = _grid_faces(*vertices.shape[:2])
+    faces = grid_faces(*vertices.shape[:2])
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
 
