@@ -4,8 +4,9 @@ import numpy as np
 
 from materialist.procedural import materials as m
 from materialist.procedural.objects import solids as s
-from materialist.procedural.walls import Hole, Wall, surface
-from materialist.procedural.world import Part, Portal, World, look
+from materialist.procedural.objects.parts import block
+from materialist.procedural.walls import Opening, RoomWall, surface
+from materialist.procedural.world import Portal, ScenePart, World, look
 from materialist.render.envmap import half_turn, on_mitsuba_grid
 
 X, Y, Z = np.eye(3)
@@ -20,18 +21,18 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
     """A closed box of 2 m with a metal and a painted block, lit by a window in its right side and by a lamp."""
     grey, red = plain((0.6, 0.6, 0.55)), plain((0.7, 0.2, 0.15), 0.4)
     parts = [
-        Part(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey), Part(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
-        Part(s.sheet((-1, 0, -1), 2 * X, 2 * Y), grey), Part(s.sheet((1, 0, 1), -2 * X, 2 * Y), grey),
-        Part(s.sheet((-1, 0, 1), -2 * Z, 2 * Y), red),
-        Part(s.moved(s.slab(np.array([0.5, 0.7, 0.5]), 0.05), (0.3, 0, -0.3), 0.5), plain((0.9, 0.7, 0.4), 0.3, 1.0)),
-        Part(s.moved(s.slab(np.array([0.4, 0.4, 0.4])), (-0.4, 0, 0), 0.2), red),
+        ScenePart(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey), ScenePart(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
+        ScenePart(s.sheet((-1, 0, -1), 2 * X, 2 * Y), grey), ScenePart(s.sheet((1, 0, 1), -2 * X, 2 * Y), grey),
+        ScenePart(s.sheet((-1, 0, 1), -2 * Z, 2 * Y), red),
+        block((0.5, 0.7, 0.5), (0.3, 0, -0.3), plain((0.9, 0.7, 0.4), 0.3, 1.0), 0.05, turn=0.5),
+        block((0.4, 0.4, 0.4), (-0.4, 0, 0), red, turn=0.2),
     ]  # fmt: skip
     hole = (0.6, 1.4, 0.6, 1.5) if window else (2.0, 2.0, 2.0, 2.0)
-    side = Wall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [Hole(*hole)] if window else [])
+    side = RoomWall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [Opening(*hole)] if window else [])
     parts += surface(side, grey)
     if lamp:
         glow = plain((0.8, 0.8, 0.8), emission=(8.0, 6.0, 4.0))
-        parts.append(Part(s.sheet((-0.3, 1.95, -0.3), 0.6 * X, 0.6 * Z), glow))
+        parts.append(ScenePart(s.sheet((-0.3, 1.95, -0.3), 0.6 * X, 0.6 * Z), glow))
     envmap = np.full((32, 64, 3), sky, np.float32)
     envmap[:12] *= np.array([1.0, 1.5, 3.0], np.float32)
     envmap[10, 40] *= 60
@@ -42,9 +43,9 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
 def still() -> World:
     """Blocks on a ground under the open sky."""
     parts = [
-        Part(s.sheet((-2, 0, 2), 4 * X, -4 * Z), plain((0.5, 0.45, 0.4))),
-        Part(s.moved(s.slab(np.array([0.5, 0.7, 0.5]), 0.1), (0.3, 0, -0.3), 0.5), plain((0.9, 0.7, 0.4), 0.3, 1.0)),
-        Part(s.moved(s.ball(32), (-0.4, 0.35, 0), scale=0.35), plain((0.2, 0.4, 0.7), 0.25)),
+        ScenePart(s.sheet((-2, 0, 2), 4 * X, -4 * Z), plain((0.5, 0.45, 0.4))),
+        block((0.5, 0.7, 0.5), (0.3, 0, -0.3), plain((0.9, 0.7, 0.4), 0.3, 1.0), 0.1, turn=0.5),
+        ScenePart(s.moved(s.ball(32), (-0.4, 0.35, 0), scale=0.35), plain((0.2, 0.4, 0.7), 0.25)),
     ]
     return World(parts, room(window=True, lamp=False).envmap, look((0, 1.2, 2.5), (0, 0.3, 0), 45))
 

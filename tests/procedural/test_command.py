@@ -35,4 +35,4 @@ def test_makes_resumes_refuses_and_draws(tmp_path, capsys):
 def test_a_sheet_of_nothing_is_refused(tmp_path, capsys):
     code, out = run(capsys, "-o", tmp_path, "--sheet", tmp_path / "sheet.png")
     assert code == 2
-    assert "no samples" in out.err
+    assert "no folder 'samples'" in out.err

@@ -15,10 +15,16 @@ import pytest
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError, OutputError
-from materialist.procedural.dataset import HELD_OUT, options_for, produce, read_description, sample_path
+from materialist.procedural.dataset import (
+    HELD_OUT,
+    options_for,
+    produce,
+    read_description,
+    sample_path,
+    write_data_sheet,
+)
 from materialist.procedural.objects import things
 from materialist.procedural.sample import KINDS, make_sample, make_world
-from materialist.procedural.sheet import write_sheet
 
 SIZE = 32
 CONTRACT = {
@@ -216,14 +222,14 @@ def test_the_splits_share_no_file(tmp_path):
 
 
 def test_the_sheet(made, tmp_path):
-    assert write_sheet(made, tmp_path / "sheet.png", count=3) == 3
+    assert write_data_sheet(made, tmp_path / "sheet.png", count=3) == 3
     assert (tmp_path / "sheet.png").stat().st_size > 5000
-    with pytest.raises(InputError, match="no samples"):
-        write_sheet(tmp_path, tmp_path / "none.png")
+    with pytest.raises(InputError, match="no folder 'samples'"):
+        write_data_sheet(tmp_path, tmp_path / "none.png")
     shutil.copytree(made, tmp_path / "copy")
     os.truncate(sample_path(tmp_path / "copy", 2), 900)
     with pytest.raises(InputError, match=r"0000002\.npz cannot be read"):
-        write_sheet(tmp_path / "copy", tmp_path / "none.png")
+        write_data_sheet(tmp_path / "copy", tmp_path / "none.png")
 
 
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):

@@ -8,8 +8,8 @@ import numpy as np
 from materialist.procedural import packing, sample, tiles
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import solids as s
-from materialist.procedural.tracer import Tracer
-from materialist.procedural.world import Part, World, look
+from materialist.procedural.tracer import SampleTracer
+from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -21,7 +21,7 @@ SIZE = 64
 def developed(world):
     """The stored arrays of a world, and what its label rays saw."""
     rng = np.random.default_rng(0)
-    tracer = Tracer(packing.pack(world, rng), Camera(SIZE, SIZE, world.view.fov), device="cpu")
+    tracer = SampleTracer(packing.pack(world, rng), Camera(SIZE, SIZE, world.view.fov), device="cpu")
     probe = tracer.probe(sample.PROBE)
     return sample._developed(world, probe, tracer, rng, sample.Options(size=SIZE, device="cpu")), probe
 
@@ -30,7 +30,7 @@ def test_texture_is_not_printed_into_the_shading():
     """A chequered floor under an even sky: its light is even, too."""
     tile = tiles.bank()[1]["checker"][0]
     floor = Material(tile, ((0.1, 0.1, 0.1), (0.8, 0.8, 0.8), (0.9, 0.3, 0.1)), 0.3, (0.6, 0.6), repeat=(0.3, 0.3))
-    ground = Part(s.sheet((-9, 0, 9), 18 * X, -18 * Z), floor)
+    ground = ScenePart(s.sheet((-9, 0, 9), 18 * X, -18 * Z), floor)
     arrays, probe = developed(World([ground], np.ones((16, 32, 3), np.float32), look((0, 2, 1e-3), (0, 0, 0), 50)))
     texture = probe["albedo"].mean((2, 3))
     shading = arrays["shading"].astype(np.float32).mean(-1)

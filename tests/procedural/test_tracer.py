@@ -11,7 +11,7 @@ from materialist.errors import InputError
 from materialist.procedural import packing, tracer
 from materialist.procedural.objects import solids as s
 from materialist.procedural.sample import labels_of
-from materialist.procedural.world import Part, World, look
+from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -22,12 +22,12 @@ SIZE = 32
 
 def traced(world, spp=400, seed=1, size=SIZE):
     packed = packing.pack(world, np.random.default_rng(0))
-    return tracer.Tracer(packed, Camera(size, size, world.view.fov), device="cpu").render(spp=spp, seed=seed)
+    return tracer.SampleTracer(packed, Camera(size, size, world.view.fov), device="cpu").render(spp=spp, seed=seed)
 
 
 def probed(world, side=4, size=SIZE):
     packed = packing.pack(world, np.random.default_rng(0))
-    return tracer.Tracer(packed, Camera(size, size, world.view.fov), device="cpu").probe(side)
+    return tracer.SampleTracer(packed, Camera(size, size, world.view.fov), device="cpu").probe(side)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_portal_changes_the_noise_alone():
 
 def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     """Shading = (1/pi) * integral of F_d(wi) F_d(wo) cos over the hemisphere, by quadrature, times the radiance."""
-    ground = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
+    ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
     world = World([ground], np.full((16, 32, 3), 2.0, np.float32), look((0, 1, 1e-3), (0, 0, 0), 10))
     image, shading = traced(world, spp=100)
     theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
@@ -76,7 +76,7 @@ def test_the_image_is_albedo_times_shading_plus_what_does_not_depend_on_albedo()
     """Direct light alone, on two albedos with the same random numbers: the difference is (A1 - A2) * shading."""
 
     def ground(value):
-        part = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((value,) * 3, 0.5))
+        part = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((value,) * 3, 0.5))
         return World([part], still().envmap, look((0, 1, 1), (0, 0, 0), 30))
 
     bright, shading = traced(ground(0.6), spp=900)
@@ -93,7 +93,7 @@ def test_equal_seeds_give_equal_pictures():
 def test_labels_of_a_ground_seen_from_a_known_camera():
     """Depth and normal against the plane's equation, in the camera frame."""
     colour = (0.5, 0.3, 0.1)
-    ground = Part(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain(colour, 0.7))
+    ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain(colour, 0.7))
     world = World([ground], np.ones((8, 16, 3), np.float32), look((0, 2, 0), (0, 0, -3), 40))
     labels = labels_of(probed(world))
     up = world.view.to_scene.T @ np.array([0, 1, 0])
@@ -110,7 +110,7 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
 
 
 def test_normals_face_the_viewer_even_from_behind():
-    behind = Part(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
+    behind = ScenePart(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
     world = World([behind], np.ones((8, 16, 3), np.float32), look((0, 0, 0), (0, 0, -1), 40))
     labels = labels_of(probed(world))
     np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
@@ -155,7 +155,7 @@ def test_a_second_world_compiles_nothing():
 def test_sizes_that_do_not_fill_vectors_are_refused():
     packed = packing.pack(still(), np.random.default_rng(0))
     with pytest.raises(InputError, match="33 x 33"):
-        tracer.Tracer(packed, Camera(33, 33, 40.0), device="cpu")
+        tracer.SampleTracer(packed, Camera(33, 33, 40.0), device="cpu")
 
 
 def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
@@ -163,12 +163,12 @@ def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
 
     from materialist.procedural.objects.things import one_thing, placed
     from materialist.procedural.sample import things_of
-    from materialist.procedural.world import Part
+    from materialist.procedural.world import ScenePart
 
     solid, _ = SimpleNamespace(), None
-    floor = Part(solid, None)
-    cup = one_thing([Part(solid, None), Part(solid, None)])
-    ball = one_thing([Part(solid, None)])
+    floor = ScenePart(solid, None)
+    cup = one_thing([ScenePart(solid, None), ScenePart(solid, None)])
+    ball = one_thing([ScenePart(solid, None)])
     assert cup[0].thing is cup[1].thing is not ball[0].thing
     world = SimpleNamespace(parts=[floor, *cup, *ball])
     owner = np.array([[[-1] * 4, [0] * 4, [1] * 4, [2] * 4, [3] * 4]])

@@ -27,7 +27,7 @@ from materialist.train.trainer import Trainer
 @pytest.fixture(scope="module")
 def views(tmp_path_factory):
     folder = tmp_path_factory.mktemp("views")
-    dataset.produce(folder, dataset.Plan(shapes=2, views=3))
+    dataset.produce(folder, dataset.ViewPlan(shapes=2, views=3))
     return folder
 
 
@@ -96,7 +96,7 @@ def test_views_that_cannot_be_used(views, tmp_path):
         dataset.load(tmp_path / "views")
     (tmp_path / "views" / dataset.DESCRIPTION).write_text("")
     with pytest.raises(InputError, match="name another folder"):
-        dataset.produce(tmp_path / "views", dataset.Plan(shapes=1, views=3))
+        dataset.produce(tmp_path / "views", dataset.ViewPlan(shapes=1, views=3))
     with pytest.raises(InputError, match="views have 64"):
         RefractionTask(views, None, RECIPE.changed(side=96))
 

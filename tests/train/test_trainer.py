@@ -11,10 +11,10 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.procedural.thickness.dataset import Plan, produce
+from materialist.procedural.thickness.dataset import ViewPlan, produce
 from materialist.train import checkpoint
 from materialist.train.bundled import RECIPE
-from materialist.train.schedule import Budget, Schedule
+from materialist.train.schedule import Budget, TrainingSchedule
 from materialist.train.trainer import RunOptions
 
 
@@ -28,7 +28,7 @@ def tasks(data, tmp_path_factory):
     """Kind of run -> what makes its task."""
     place = tmp_path_factory.mktemp("views")
     made_runs.write_click_views(place / "clicks")
-    produce(place / "shapes", Plan(shapes=1, views=3))
+    produce(place / "shapes", ViewPlan(shapes=1, views=3))
     return {
         "matnet": lambda: made_runs.bundled(data),
         "clicks": lambda: made_runs.clicks(place / "clicks"),
@@ -179,24 +179,24 @@ def test_pictures_grow_with_the_run(data, tmp_path):
 
 
 def test_the_rate_rises_falls_and_is_restarted():
-    schedule = Schedule(Budget(steps=100))
+    schedule = TrainingSchedule(Budget(steps=100))
     assert schedule.rate(10, 0.1) == pytest.approx(0.1)
     schedule.step = 50
     assert schedule.rate(10, 0.1) == pytest.approx(0.55)
     unfinished = schedule.as_dict()
     schedule.step = 100
     assert schedule.rate(10, 0.1) == pytest.approx(0.1) and schedule.done
-    same = Schedule(Budget(steps=100), unfinished)
+    same = TrainingSchedule(Budget(steps=100), unfinished)
     assert same.rate(10, 0.1) == pytest.approx(0.55), "the same budget goes on"
-    longer = Schedule(Budget(steps=900), schedule.as_dict())
+    longer = TrainingSchedule(Budget(steps=900), schedule.as_dict())
     assert longer.progress == pytest.approx(0.1) and not longer.done
     longer.step = 150
     assert longer.rate(10, 0.1) > 0.9, "a longer whole goes on near its peak"
-    shorter = Schedule(Budget(steps=10), schedule.as_dict())
+    shorter = TrainingSchedule(Budget(steps=10), schedule.as_dict())
     shorter.step = 105
     assert shorter.rate(0, 0.1) < 0.2, "a short budget at the end anneals"
-    done = {**Schedule(Budget(minutes=1)).as_dict(), "seconds": 60.0, "done": True}
-    assert Schedule(Budget(minutes=1), done).progress == pytest.approx(0.5, abs=0.01)
+    done = {**TrainingSchedule(Budget(minutes=1)).as_dict(), "seconds": 60.0, "done": True}
+    assert TrainingSchedule(Budget(minutes=1), done).progress == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -203,13 +203,13 @@ class GlassScene:
 
 def seen(solid: Solid, camera: Camera) -> Front:
     """What the camera sees of a mesh in its frame."""
-    from materialist.procedural.thickness.ray_paths import Tracer, towards
+    from materialist.procedural.thickness.ray_paths import ShapeTracer, towards
 
     rays = pixel_rays(camera)
     shape = rays.shape[:2]
     # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
     direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
-    found = Tracer(solid).trace(np.zeros_like(direction), direction)
+    found = ShapeTracer(solid).trace(np.zeros_like(direction), direction)
     hit = np.isfinite(found.first)
     normal = towards(np.where(hit[:, None], found.normal, [0, 0, 1]), direction, -1)
     back = towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)

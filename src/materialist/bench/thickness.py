@@ -46,7 +46,7 @@ class ThicknessBench(Benchmark):
             raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
         from materialist.predict.refraction import WEIGHTS
         from materialist.predict.refraction.network import RefractionNet
-        from materialist.procedural.thickness.dataset import Plan, make_views
+        from materialist.procedural.thickness.dataset import ViewPlan, make_views
         from materialist.procedural.thickness.errors import of_meshes
         from materialist.render.variant import setup
 
@@ -56,7 +56,10 @@ class ThicknessBench(Benchmark):
         report = Report("Thickness and back of objects", NOTE, self.settings(data), COLUMNS, rows, ("solid", "back"))
         for k in range(self.shapes):
             rows += _rows(
-                "held-out", f"shape {k}", network, make_views(k, Plan(self.shapes, self.views, "heldout", self.seed))
+                "held-out",
+                f"shape {k}",
+                network,
+                make_views(k, ViewPlan(self.shapes, self.views, "heldout", self.seed)),
             )
         for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
             for name, found in of_meshes(group, self.mesh_views, self.seed).items():

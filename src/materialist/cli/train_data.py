@@ -48,10 +48,10 @@ def data(
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
     if sheet is not None:
         from materialist.io.image import ensure_image_writable
-        from materialist.procedural.sheet import write_sheet
+        from materialist.procedural.dataset import write_data_sheet
 
         ensure_image_writable(sheet, force=force)
-        shown = write_sheet(output, sheet, seed=seed)
+        shown = write_data_sheet(output, sheet, seed=seed)
         report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
     from materialist.cli.progress import StageProgress

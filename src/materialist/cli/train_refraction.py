@@ -51,11 +51,11 @@ def refraction(
     as_json: Json = False,
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
-    from materialist.procedural.thickness.dataset import Plan, produce
+    from materialist.procedural.thickness.dataset import ViewPlan, produce
 
     folder = data or output / "views"
     train, aside = folder / "train", folder / "heldout"
-    plans = {aside: Plan(heldout, min(views, 8), "heldout", seed), train: Plan(shapes, views, "train", seed)}
+    plans = {aside: ViewPlan(heldout, min(views, 8), "heldout", seed), train: ViewPlan(shapes, views, "train", seed)}
     if data_only:
         from materialist.cli.progress import StageProgress
 

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError
+import numpy as np
+
+from materialist.errors import InputError, OutputError
 from materialist.io.described import claim, described
-from materialist.io.samples import write_arrays
+from materialist.io.map_sheet import strip, write_sheet
+from materialist.io.samples import SampleFolder, write_arrays
 from materialist.procedural.objects import things
 from materialist.procedural.sample import KINDS, SPLITS, Options, make_sample
 
@@ -156,3 +159,19 @@ def identity(folder: str | Path) -> dict[str, Any]:
     """
     found = read_description(folder)
     return {name: found.get(name) for name in _IDENTITY}
+
+
+def write_data_sheet(folder: str | Path, path: str | Path, *, count: int = 24, seed: int = 0) -> int:
+    """Draw `count` samples of the set in `folder`, chosen by `seed`, as a PNG; returns how many.
+
+    Each row shows picture, albedo, roughness, metallic, normal and depth. Raises InputError where there are no samples,
+    OutputError when `path` cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png" or not path.parent.is_dir():
+        raise OutputError(f"{path} cannot be written; name a .png in a folder that exists.")
+    source = SampleFolder(folder)
+    chosen = sorted(np.random.default_rng(seed).permutation(len(source))[:count])
+    samples = [source.read(k) for k in chosen]
+    write_sheet([strip(sample.image, sample.truth()) for sample in samples], path)
+    return len(chosen)

@@ -12,10 +12,12 @@ from materialist.procedural.objects import things
 from materialist.procedural.objects.parts import Parts, block, placed
 from materialist.procedural.objects.shapes import Solid, grid_faces, smooth_normals
 from materialist.procedural.objects.things import Meshes
-from materialist.procedural.world import Part, World, look, look_down
+from materialist.procedural.world import ScenePart, World, look, look_down
 
-GROUNDS = ((0.2, m.wood), (0.13, m.stone), (0.13, m.fabric), (0.1, m.tiled), (0.1, m.plastic), (0.1, m.wall_paint),
-           (0.1, m.floor_boards), (0.1, m.ground), (0.04, m.metal))  # fmt: skip
+GROUNDS: tuple[tuple[float, m.Maker], ...] = (
+    (0.2, m.wood), (0.13, m.stone), (0.13, m.fabric), (0.1, m.tiled), (0.1, m.plastic), (0.1, m.wall_paint),
+    (0.1, m.floor_boards), (0.1, m.ground), (0.04, m.metal),
+)  # fmt: skip
 HORIZON = 150.0
 """Metres to the edge of a ground."""
 
@@ -32,12 +34,12 @@ def still_life(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wo
     if back < 0.35:
         wall = m.one_of(rng, m.wall_paint, m.wallpaper, m.brick, m.stone, m.tiled, m.fabric)
         sheet = s.sheet((-half, 0, -rng.uniform(0.35, 0.9)), (2 * half, 0, 0), (0, rng.uniform(0.6, 2.5), 0))
-        parts.append(Part(sheet, wall))
+        parts.append(ScenePart(sheet, wall))
     elif back < 0.45:  # a ground that bends up behind the things, as in a studio
         t = np.linspace(0, np.pi / 2, 16)
         bend = np.stack([-0.6 - 0.4 * np.sin(t), 0.4 * (1 - np.cos(t)), 0 * t], -1)
         sweep = s.strip(np.concatenate([bend, [[-1.0, 2.0, 0]]]), 2 * half, flip=True)
-        parts.append(Part(s.moved(sweep, turn=-np.pi / 2), ground))
+        parts.append(ScenePart(s.moved(sweep, turn=-np.pi / 2), ground))
     parts += things.scattered(rng, int(rng.integers(3, 10)), (0.42, 0.35), (0.07, 0.4), meshes, 0.45)
     target = np.array([rng.normal() * 0.06, rng.uniform(0.05, 0.18), rng.normal() * 0.06])
     up, turn, distance, fov = rng.uniform([np.radians(5), -0.7, 0.65, 25], [np.radians(60), 0.7, 1.4, 60])
@@ -55,8 +57,8 @@ def outdoor(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World
     return World(parts, skies.outdoors(rng, captures), view, kind="outdoor")
 
 
-def _flat(half: float, material: m.Material, n: int = 1) -> Part:
-    return Part(s.sheet((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half), n), material)
+def _flat(half: float, material: m.Material, n: int = 1) -> ScenePart:
+    return ScenePart(s.sheet((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half), n), material)
 
 
 def _houses(rng, start: float, end: float, gap: float) -> list[tuple[float, Parts]]:
@@ -90,7 +92,7 @@ def _street(rng, meshes) -> Parts:
     if rng.random() < 0.6:
         white = m.uniform(m.hsv(0.1, 0.05, 0.9), 0.7, grain=0.4)
         lines = [s.sheet((-0.07, 0.004, z + 2), (0.14, 0, 0), (0, 0, -2)) for z in np.arange(-50, 4, 4.0)]
-        parts += [Part(line, white) for line in lines]
+        parts += [ScenePart(line, white) for line in lines]
     if rng.random() < 0.5:
         parts += placed(street.car(rng), (rng.uniform(-0.5, 0.5) * half, 0, -rng.uniform(4, 20)), np.pi / 2)
     return parts
@@ -113,7 +115,7 @@ def _yard(rng, meshes) -> Parts:
 
 
 def _stone(rng) -> Parts:
-    return [Part(s.blob(rng, rng.uniform(0.2, 1.5) * rng.uniform(0.6, 1, 3), 0.25, 40), m.stone(rng))]
+    return [ScenePart(s.blob(rng, rng.uniform(0.2, 1.5) * rng.uniform(0.6, 1, 3), 0.25, 40), m.stone(rng))]
 
 
 def _strewn(rng, meshes, count: int, bounds) -> Parts:
@@ -139,9 +141,9 @@ def _land(rng, meshes) -> Parts:
     p, far = np.stack([x, 0 * x, z], -1), np.clip((np.hypot(x, z - 4) - 4) / 25, 0, 1)
     y = hills(p) * far**1.5 + bumps(p) * np.clip(far * 4, 0, 1)
     flat, faces = np.stack([x, y, z], -1).reshape(-1, 3), grid_faces(n, n, flip=True)
-    parts = [Part(Solid(flat, faces, smooth_normals(flat, faces), flat[:, [0, 2]]), m.ground(rng))]
+    parts = [ScenePart(Solid(flat, faces, smooth_normals(flat, faces), flat[:, [0, 2]]), m.ground(rng))]
     if rng.random() < 0.5:
-        parts.append(Part(s.sheet((-1.5, 0.01, 12), (rng.uniform(1, 3), 0, 0), (0, 0, -14)), m.ground(rng)))
+        parts.append(ScenePart(s.sheet((-1.5, 0.01, 12), (rng.uniform(1, 3), 0, 0), (0, 0, -14)), m.ground(rng)))
     for _ in range(int(rng.integers(4, 16))):
         at = np.array([rng.uniform(-20, 20), 0, rng.uniform(-40, -3)])
         at[1] = y.ravel()[np.argmin(((flat - at)[:, ::2] ** 2).sum(-1))] - 0.05

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +13,12 @@ from materialist.procedural.objects import solids as s
 from materialist.procedural.objects.parts import Parts, block, orb, placed, rod
 from materialist.procedural.objects.shapes import lathe
 from materialist.procedural.objects.things import Meshes
-from materialist.procedural.walls import Wall
-from materialist.procedural.world import Part, Portal, Viewpoint, World, look, look_down
+from materialist.procedural.walls import RoomWall
+from materialist.procedural.world import Portal, ScenePart, Viewpoint, World, look, look_down
 from materialist.types import Array
 
-Size = Sequence[float]
-"""Width, depth and height of a room, metres; its floor is centred on the origin."""
+Size = Array
+"""[3] width, depth and height of a room, metres; its floor is centred on the origin."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def shell(rng, size: Size, captures, ground: m.Material | None = None) -> tuple[
     x, y, z = np.eye(3)
     corners = ((-w / 2, -d / 2, x, w), (w / 2, -d / 2, z, d), (w / 2, d / 2, -x, w), (-w / 2, d / 2, -z, d))
     for k, (left, back, right, length) in enumerate(corners):  # back, right, front, left, seen from inside
-        wall = Wall(np.array([left, 0, back]), right, length, h)
+        wall = RoomWall(np.array([left, 0, back]), right, length, h)
         if is_open and k == 2:
             portals.append(Portal(wall.origin, wall.right * w, y * h))
             continue
@@ -100,8 +99,8 @@ def shell(rng, size: Size, captures, ground: m.Material | None = None) -> tuple[
         parts += walls.hangings(rng, wall, int(rng.integers(0, 5)))
     floor = m.one_of(rng, m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric)
     ceiling = m.floor_boards(rng) if rng.random() < 0.08 else m.white_paint(rng)
-    parts.append(Part(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), ground or floor))
-    parts.append(Part(s.sheet((-w / 2, h, -d / 2), w * x, d * z), ceiling))
+    parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), ground or floor))
+    parts.append(ScenePart(s.sheet((-w / 2, h, -d / 2), w * x, d * z), ceiling))
     if rng.random() < 0.12:
         beams = np.arange(-w / 2 + 0.4, w / 2, 0.9)
         parts += [block((0.14, 0.2, d), (at, h - 0.2, 0), m.wood(rng)) for at in beams]
@@ -171,7 +170,7 @@ def _panels(rng, size, power) -> Parts:
     glow, frame, parts = _glow(rng, power, n * a * b), m.metal(rng), []
     for z in np.linspace(-0.3, 0.3, n) * d if n > 1 else [rng.uniform(-0.2, 0.2) * d]:
         parts.append(block((a + 0.03, 0.03, b + 0.03), (0, h - 0.03, z), frame))
-        parts.append(Part(s.sheet((-a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow))
+        parts.append(ScenePart(s.sheet((-a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow))
     return parts
 
 
@@ -179,7 +178,7 @@ def _spots(rng, size, power) -> Parts:
     w, d, h = size
     n, a = int(rng.integers(2, 7)), rng.uniform(0.05, 0.12)
     glow, places = _glow(rng, power, n * a * a), rng.uniform(-0.42, 0.42, (n, 2)) * [w, d]
-    return [Part(s.sheet((x, h - 0.004, z), (a, 0, 0), (0, 0, a)), glow) for x, z in places]
+    return [ScenePart(s.sheet((x, h - 0.004, z), (a, 0, 0), (0, 0, a)), glow) for x, z in places]
 
 
 def _globes(rng, size, power) -> Parts:
@@ -201,7 +200,7 @@ def _shade(rng, size, power) -> Parts:
     glow, stand = _glow(rng, power, 2 * np.pi * r * height), m.metal(rng)
     shade = lathe(np.array([(r, 0), (r * rng.uniform(0.5, 1), height)]), 32)
     return [
-        Part(s.moved(shade, (x, tall, z)), glow),
+        ScenePart(s.moved(shade, (x, tall, z)), glow),
         rod([(x, 0, z), (x, tall + height / 2, z)], 0.012, stand),
         block((0.28, 0.03, 0.28), (x, 0, z), stand, 0.01),
     ]

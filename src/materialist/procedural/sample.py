@@ -71,10 +71,10 @@ def make_world(rng: np.random.Generator, options: Options) -> World:
 
 
 def _look(world: World, rng: np.random.Generator, options: Options):
-    from materialist.procedural.tracer import Tracer
+    from materialist.procedural.tracer import SampleTracer
 
     camera = Camera(options.size, options.size, world.view.fov)
-    tracer = Tracer(packing.pack(world, rng), camera, device=options.device)
+    tracer = SampleTracer(packing.pack(world, rng), camera, device=options.device)
     return tracer.probe(PROBE), tracer
 
 

@@ -40,7 +40,7 @@ def _bank(mi):
     return _BANK["tiles"]
 
 
-class Tracer:
+class SampleTracer:
     """One packed world, ready to be rendered."""
 
     def __init__(self, packed: Packed, camera: Camera, *, device: str = "auto"):

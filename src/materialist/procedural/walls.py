@@ -12,13 +12,13 @@ from materialist.procedural import materials as m
 from materialist.procedural.objects import solids as s
 from materialist.procedural.objects import things
 from materialist.procedural.objects.parts import Parts, block, placed, rod
-from materialist.procedural.world import Part, Portal
+from materialist.procedural.world import Portal, ScenePart
 from materialist.types import Array
 
 UP = np.array([0.0, 1.0, 0.0])
 
 
-class Hole(NamedTuple):
+class Opening(NamedTuple):
     """A rectangle cut out of a wall, metres on it."""
 
     left: float
@@ -28,14 +28,14 @@ class Hole(NamedTuple):
 
 
 @dataclass
-class Wall:
+class RoomWall:
     """A wall seen from inside: from `origin` [3] (lower left) `length` along `right` [3, unit], `height` up."""
 
     origin: Array
     right: Array
     length: float
     height: float
-    holes: list[Hole] = field(default_factory=list)
+    holes: list[Opening] = field(default_factory=list)
     """Apart from each other."""
     taken: list[tuple[float, float]] = field(default_factory=list)
     """Stretches (left, right) where nothing more may hang."""
@@ -58,12 +58,12 @@ class Wall:
         """Parts made to face +Z, put on the wall with their origin at that place."""
         return placed(parts, self.point(along, up, out), self.turn)
 
-    def bar(self, left: float, bottom: float, size: tuple[float, float, float], look, out: float = 0.0) -> Part:
+    def bar(self, left: float, bottom: float, size: tuple[float, float, float], look, out: float = 0.0) -> ScenePart:
         """A board of (width, height, depth) on the wall, its back `out` metres from it."""
         at = self.point(left + size[0] / 2, bottom, out + size[2] / 2)
         return block(size, at, look, min(0.006, size[2] / 4), turn=self.turn)
 
-    def frame(self, hole: Hole, wide: float, deep: float, look, sill: bool = False) -> Parts:
+    def frame(self, hole: Opening, wide: float, deep: float, look, sill: bool = False) -> Parts:
         """Boards around a rectangle, with one below it if `sill`."""
         left, right, bottom, top = hole
         low, width = bottom - wide * sill, right - left
@@ -89,7 +89,7 @@ class Wall:
         return list(zip(edges[::2], edges[1::2]))
 
 
-def surface(wall: Wall, material: m.Material, lower: m.Material | None = None, split: float = 1.0) -> Parts:
+def surface(wall: RoomWall, material: m.Material, lower: m.Material | None = None, split: float = 1.0) -> Parts:
     """The wall around its holes; with `lower`, another material up to `split` metres."""
     levels = sorted({0.0, wall.height, *([split] if lower else []), *(v for h in wall.holes for v in h[2:])})
     parts = []
@@ -98,17 +98,17 @@ def surface(wall: Wall, material: m.Material, lower: m.Material | None = None, s
         for x0, x1 in wall.stretches(y0, y1):
             if x1 - x0 > 1e-3:
                 piece = s.sheet(wall.point(x0, y0), wall.right * (x1 - x0), UP * (y1 - y0))
-                parts.append(Part(replace(piece, uv=piece.uv + np.array([x0, y0])), look))
+                parts.append(ScenePart(replace(piece, uv=piece.uv + np.array([x0, y0])), look))
     return parts
 
 
-def skirting(wall: Wall, look: m.Material, height: float, at: float = 0.0, depth: float = 0.015) -> Parts:
+def skirting(wall: RoomWall, look: m.Material, height: float, at: float = 0.0, depth: float = 0.015) -> Parts:
     """A strip along the wall, left out at doors."""
     stretches = wall.stretches(at, at + height)
     return [wall.bar(a, at, (b - a, height, depth), look) for a, b in stretches if b - a > 0.02]
 
 
-def windows(rng: np.random.Generator, wall: Wall, count: int) -> tuple[Parts, list[Portal]]:
+def windows(rng: np.random.Generator, wall: RoomWall, count: int) -> tuple[Parts, list[Portal]]:
     """Holes with frames, reveals, sills, at times curtains, blinds and a radiator; adds them to `wall`."""
     parts, portals = [], []
     frame = m.pick(rng, ((0.15, m.plastic), (0.25, m.wood), (0.6, m.white_paint)))(rng)
@@ -121,7 +121,7 @@ def windows(rng: np.random.Generator, wall: Wall, count: int) -> tuple[Parts, li
         middle = wall.free(rng, width + 0.2)
         if middle is None:
             break
-        hole = Hole(middle - width / 2, middle + width / 2, bottom, top)
+        hole = Opening(middle - width / 2, middle + width / 2, bottom, top)
         wall.holes.append(hole)
         parts += _window(rng, wall, hole, frame, panes)
         portals.append(Portal(wall.point(hole.left, bottom, -0.01), wall.right * width, UP * (top - bottom)))
@@ -133,13 +133,13 @@ def windows(rng: np.random.Generator, wall: Wall, count: int) -> tuple[Parts, li
     return parts, portals
 
 
-def _window(rng, wall: Wall, hole: Hole, frame, panes) -> Parts:
+def _window(rng, wall: RoomWall, hole: Opening, frame, panes) -> Parts:
     left, right, bottom, top = hole
     deep, t, w, h, look = rng.uniform(0.1, 0.3), rng.uniform(0.03, 0.07), right - left, top - bottom, m.white_paint(rng)
     out, up, along = -wall.inward * deep, UP * h, wall.right * w
     corner = wall.point(left, bottom)
     reveals = ((corner, up, out), (corner + along, out, up), (corner + up, along, out), (corner, out, along))
-    parts = [Part(s.sheet(*reveal), look) for reveal in reveals]
+    parts = [ScenePart(s.sheet(*reveal), look) for reveal in reveals]
     for k in range(panes[0] + 1):
         parts.append(wall.bar(left + k * (w - t) / panes[0], bottom, (t, h, 0.04), frame, -deep))
     for k in range(panes[1] + 1):
@@ -151,7 +151,7 @@ def _window(rng, wall: Wall, hole: Hole, frame, panes) -> Parts:
     return parts + (wall.frame(hole, rng.uniform(0.06, 0.12), 0.02, look) if rng.random() < 0.6 else [])
 
 
-def _blinds(rng, wall: Wall, hole: Hole, cloth) -> Parts:
+def _blinds(rng, wall: RoomWall, hole: Opening, cloth) -> Parts:
     """Slats, down to the sill or half way."""
     pitch, tilt, look = rng.uniform(0.05, 0.09), rng.uniform(0.1, 1.0), m.one_of(rng, m.plastic, m.white_paint)
     low = hole.bottom + (hole.top - hole.bottom) * rng.choice([0, rng.uniform(0.2, 0.8)])
@@ -160,14 +160,14 @@ def _blinds(rng, wall: Wall, hole: Hole, cloth) -> Parts:
     return [part for y in np.arange(low, hole.top, pitch) for part in wall.hung([slat], middle, y, -0.05)]
 
 
-def _curtains(rng, wall: Wall, hole: Hole, cloth) -> Parts:
+def _curtains(rng, wall: RoomWall, hole: Opening, cloth) -> Parts:
     """Folded cloth at both sides, on a rod."""
     left, right, bottom, top = hole
     drop = 0.02 if rng.random() < 0.6 else max(bottom - 0.15, 0.02)
     width, waves, phase, deep = rng.uniform([0.2, 4, 0, 0.02], [0.5, 9, 6, 0.05])
     flat = s.sheet((0, 0, 0), (width, 0, 0), (0, top + 0.12 - drop, 0), 48)
     fold = lambda p: deep * np.sin(p[:, 0] / width * 2 * np.pi * waves + phase + 0.3 * p[:, 1])  # noqa: E731
-    hang = Part(s.warped(flat, lambda p: p + fold(p)[:, None] * [0, 0, 1]), cloth)
+    hang = ScenePart(s.warped(flat, lambda p: p + fold(p)[:, None] * [0, 0, 1]), cloth)
     parts = wall.hung(
         [rod([(0, 0, 0), (right - left + 0.8, 0, 0)], 0.012, m.metal(rng), 6)], left - 0.4, top + 0.13, 0.1
     )
@@ -177,7 +177,7 @@ def _curtains(rng, wall: Wall, hole: Hole, cloth) -> Parts:
     return parts
 
 
-def door(rng: np.random.Generator, wall: Wall) -> Parts:
+def door(rng: np.random.Generator, wall: RoomWall) -> Parts:
     """A closed door with panels, frame and handle."""
     width, height = rng.uniform(0.75, 0.95), min(rng.uniform(1.95, 2.15), wall.height - 0.1)
     middle = wall.free(rng, width + 0.25)
@@ -186,7 +186,7 @@ def door(rng: np.random.Generator, wall: Wall) -> Parts:
     look, left = m.one_of(rng, m.white_paint, m.wood), middle - width / 2
     frame = look if rng.random() < 0.7 else m.wood(rng)
     parts = [wall.bar(left, 0.005, (width, height, 0.02), look)]
-    parts += wall.frame(Hole(left, left + width, 0, height), rng.uniform(0.05, 0.1), 0.04, frame)
+    parts += wall.frame(Opening(left, left + width, 0, height), rng.uniform(0.05, 0.1), 0.04, frame)
     rows, columns = int(rng.integers(0, 4)), int(rng.integers(1, 3))
     for r, k in np.ndindex(rows, columns):
         w, h = width / columns, height / rows
@@ -195,7 +195,7 @@ def door(rng: np.random.Generator, wall: Wall) -> Parts:
     return [*parts, wall.bar(handle, 1.0, (0.12, 0.02, 0.05), m.metal(rng), 0.02)]
 
 
-def hangings(rng: np.random.Generator, wall: Wall, count: int) -> Parts:
+def hangings(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
     """Pictures, mirrors, screens, wall shelves, round clocks and switches, as far as there is room."""
     parts = []
     for _ in range(count):
@@ -206,20 +206,20 @@ def hangings(rng: np.random.Generator, wall: Wall, count: int) -> Parts:
         height, left = width * rng.uniform(0.6, 1.5), middle - width / 2
         up = float(np.clip(rng.uniform(1.3, 1.7) - height / 2, 0.9, max(wall.height - height - 0.1, 0.9)))
         if kind < 0.65:
-            parts += _picture(rng, wall, Hole(left, left + width, up, up + height))
+            parts += _picture(rng, wall, Opening(left, left + width, up, up + height))
         elif kind < 0.8:
             on = things.scattered(rng, int(rng.integers(1, 6)), (width / 2, 0.09), (0.08, 0.3))
             parts += [wall.bar(left, up, (width, 0.03, 0.22), m.wood(rng)), *wall.hung(on, middle, up + 0.03, 0.11)]
         elif kind < 0.9:
             radius = min(width, 0.35) / 2
             flat = s.warped(s.ball(32), lambda p, r=radius: p * [r, r, 0.02])
-            parts += wall.hung([Part(flat, m.any_object(rng))], middle, up + width / 2, 0.02)
+            parts += wall.hung([ScenePart(flat, m.any_object(rng))], middle, up + width / 2, 0.02)
         else:
             parts.append(wall.bar(middle, 1.1, (0.08, 0.08, 0.01), m.white_paint(rng)))
     return parts
 
 
-def _picture(rng, wall: Wall, place: Hole) -> Parts:
+def _picture(rng, wall: RoomWall, place: Opening) -> Parts:
     """A framed picture, a mirror, a screen or a loose poster."""
     size = (place.right - place.left, place.top - place.bottom, 0.012)
     mirror, screen = m.uniform((0.9, 0.9, 0.9), 0.05, 1.0), m.uniform(m.hsv(0.6, 0.1, 0.08), 0.1)

@@ -12,7 +12,7 @@ from materialist.types import Array
 
 
 @dataclass(frozen=True)
-class Part:
+class ScenePart:
     """One surface of one material."""
 
     solid: Solid
@@ -49,7 +49,7 @@ class Viewpoint:
 class World:
     """Everything that is needed to render one sample."""
 
-    parts: list[Part]
+    parts: list[ScenePart]
     envmap: Array
     """[h, 2h, 3] float32 linear radiance in the scene frame, in the project's envmap convention."""
     view: Viewpoint

@@ -30,7 +30,7 @@ class Budget:
             raise InputError(f"The budget is {self.steps or self.minutes}; give more than 0.")
 
 
-class Schedule:
+class TrainingSchedule:
     """Where a run stands within its budget, and its learning rate there."""
 
     def __init__(self, budget: Budget, state: dict[str, Any] | None = None):

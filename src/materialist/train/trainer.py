@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from materialist.errors import InputError
 from materialist.train import checkpoint, stream
 from materialist.train.processes import Processes
-from materialist.train.schedule import Budget, Schedule, StopRequest
+from materialist.train.schedule import Budget, StopRequest, TrainingSchedule
 from materialist.train.task import Batch, Task
 
 Note = Callable[[str], None]
@@ -70,7 +70,7 @@ class Trainer:
             [{"params": decayed, "weight_decay": self.recipe.weight_decay}, {"params": others, "weight_decay": 0.0}],
             lr=self.recipe.rate, betas=self.recipe.betas, fused=True,
         )  # fmt: skip
-        self.schedule = Schedule(budget, state and state["schedule"])
+        self.schedule = TrainingSchedule(budget, state and state["schedule"])
         self.epoch, self.batch = 1, 0
         self.last_scores: dict[str, Any] = {}
         if state is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from materialist.procedural.objects import shapes, solids
-from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.ray_paths import ShapeTracer
 
 RADIUS = 0.5
 
@@ -28,7 +28,7 @@ def straight(x, y=0.0):
 
 def test_chords_of_a_ball():
     x = np.array([0.003, 0.1, 0.3, 0.45, 0.6])
-    found = Tracer(ball()).trace(*straight(x))
+    found = ShapeTracer(ball()).trace(*straight(x))
     chord = 2 * np.sqrt(np.maximum(RADIUS**2 - x**2, 0))
     np.testing.assert_allclose(found.solid, chord, atol=5e-3)
     np.testing.assert_allclose(found.material, chord, atol=5e-3)
@@ -41,7 +41,7 @@ def test_chords_of_a_ball():
 
 
 def test_rays_that_miss_have_no_place():
-    tracer = Tracer(ball())
+    tracer = ShapeTracer(ball())
     x = np.linspace(-2, 2, 4001)  # most miss
     for _ in range(3):
         distance, face, uv = tracer._nearest(*straight(x))
@@ -52,7 +52,7 @@ def test_rays_that_miss_have_no_place():
 
 def test_lengths_are_in_units_of_the_direction():
     origin, direction = straight([0.2])
-    tracer = Tracer(ball())
+    tracer = ShapeTracer(ball())
     one, two = tracer.trace(origin, direction), tracer.trace(origin, 2 * direction)
     assert one.solid[0] == pytest.approx(2 * two.solid[0], rel=1e-4)
 
@@ -60,7 +60,7 @@ def test_lengths_are_in_units_of_the_direction():
 def test_a_hollow_ball_has_walls():
     shell = solids.joined([ball(), inside_out(ball(0.4))])
     x = np.array([0.05, 0.35, 0.45])
-    found = Tracer(shell).trace(*straight(x))
+    found = ShapeTracer(shell).trace(*straight(x))
     outer, inner = (2 * np.sqrt(np.maximum(r * r - x * x, 0)) for r in (0.5, 0.4))
     np.testing.assert_allclose(found.solid, outer, atol=6e-3)
     np.testing.assert_allclose(found.material, outer - inner, atol=1e-2)  # the paper's sum of both walls
@@ -68,14 +68,14 @@ def test_a_hollow_ball_has_walls():
 
 def test_gaps_count_as_solid_and_not_as_material():
     pair = solids.joined([solids.moved(ball(0.2), at=(0, 0, z)) for z in (-0.4, 0.4)])
-    found = Tracer(pair).trace(*straight([0.01]))
+    found = ShapeTracer(pair).trace(*straight([0.01]))
     assert found.solid[0] == pytest.approx(1.2, abs=5e-3)
     assert found.material[0] == pytest.approx(0.8, abs=1e-2)
 
 
 def test_bodies_that_overlap_are_counted_once():
     pair = solids.joined([solids.moved(ball(0.3), at=(0, 0, z)) for z in (-0.1, 0.1)])
-    found = Tracer(pair).trace(*straight([0.01]))
+    found = ShapeTracer(pair).trace(*straight([0.01]))
     assert found.solid[0] == pytest.approx(0.8, abs=5e-3)
     assert found.material[0] == pytest.approx(0.8, abs=5e-3)
 
@@ -84,5 +84,5 @@ def test_slanting_rays_through_a_box():
     box = shapes.box(np.array([1.0, 2.0, 0.5]))
     angle = 0.4
     direction = np.array([[np.sin(angle), 0, -np.cos(angle)]])
-    found = Tracer(box).trace(np.array([[0.0, 1.0, 0.0]]) - 3 * direction, direction)
+    found = ShapeTracer(box).trace(np.array([[0.0, 1.0, 0.0]]) - 3 * direction, direction)
     assert found.solid[0] == pytest.approx(0.5 / np.cos(angle), rel=1e-4)

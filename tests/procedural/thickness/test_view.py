@@ -10,7 +10,7 @@ from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGI
 from materialist.procedural.objects import solids
 from materialist.procedural.objects.glassware import Shape, make_shape
 from materialist.procedural.thickness import dataset, view
-from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.ray_paths import ShapeTracer
 
 
 @pytest.mark.parametrize("index", range(20))
@@ -22,7 +22,7 @@ def test_every_kind_of_shape_is_usable(index):
     assert made.solid.faces.max() < len(vertices)
     # Level rays from the front meet it from outside, whatever it is, and run through material behind that.
     origin = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1).reshape(-1, 3)
-    found = Tracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
+    found = ShapeTracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
     hit = np.isfinite(found.first)
     assert hit.any() and (found.material <= found.solid + 1e-3).all()
     assert (found.material[hit] > 0).mean() > 0.95
@@ -41,7 +41,7 @@ def ball():
 
 
 def test_a_balls_view_is_consistent(ball):
-    lesson = view.draw_example(ball, Tracer(ball.solid), np.random.default_rng(1), exact=True)
+    lesson = view.draw_example(ball, ShapeTracer(ball.solid), np.random.default_rng(1), exact=True)
     maps, target = lesson.maps.astype(float), lesson.target.astype(float)
     assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (ANSWERS, SIDE, SIDE)
     inside = maps[MASK] > 0.5
@@ -63,7 +63,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
     """The network must not learn one exact frame: a window a few percent larger doubled its error."""
     sides = []
     for seed in range(16):
-        maps = view.draw_example(ball, Tracer(ball.solid), np.random.default_rng(seed)).maps
+        maps = view.draw_example(ball, ShapeTracer(ball.solid), np.random.default_rng(seed)).maps
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
     framed = SIDE / (1 + 2 * MARGIN)
@@ -78,8 +78,8 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
     stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
     plain = replace(pose, stretch=np.eye(3))
     rays = view.window_rays(stretched.vertices @ pose.to_camera.T + pose.centre)
-    a, normal_a, back_a = view.look(Tracer(ball.solid), pose, rays)
-    b, normal_b, back_b = view.look(Tracer(stretched), plain, rays)
+    a, normal_a, back_a = view.look(ShapeTracer(ball.solid), pose, rays)
+    b, normal_b, back_b = view.look(ShapeTracer(stretched), plain, rays)
     both = np.isfinite(a.first) & np.isfinite(b.first)
     assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
@@ -91,7 +91,7 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
 
 
 def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
-    plan = dataset.Plan(shapes=2, views=2)
+    plan = dataset.ViewPlan(shapes=2, views=2)
     dataset.produce(tmp_path / "set", plan)
     first = dataset.load(tmp_path / "set")
     assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
@@ -105,4 +105,4 @@ def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
     with pytest.raises(InputError, match="no views to learn from"):
         dataset.load(tmp_path)
     with pytest.raises(InputError, match="split is 'odd'"):
-        dataset.Plan(split="odd")
+        dataset.ViewPlan(split="odd")

@@ -10,7 +10,7 @@ from materialist.procedural import materials as m
 from materialist.procedural.objects import solids as s
 from materialist.procedural.objects import things
 from materialist.procedural.objects.parts import Parts, block, footprint, placed, rod
-from materialist.procedural.world import Part
+from materialist.procedural.world import ScenePart
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def table(rng, meshes=(), clutter: int | None = None) -> Piece:
     parts += _legs(rng, width, depth, height - thick, top if rng.random() < 0.5 else m.metal(rng))
     if rng.random() < 0.2:
         cloth = s.sheet((-width * 0.3, height + 0.003, depth / 2), (width * 0.6, 0, 0), (0, 0, -depth))
-        parts.append(Part(cloth, m.fabric(rng)))
+        parts.append(ScenePart(cloth, m.fabric(rng)))
     count = int(rng.integers(0, 7)) if clutter is None else clutter
     return Piece([*parts, *_cluttered(rng, width, depth, height, count, meshes)], width, depth, height)
 
@@ -152,7 +152,7 @@ def bed(rng, meshes=()) -> Piece:
         block((width, height * 0.6, length), (0, 0.05, 0), frame, 0.02),
         block((width, head, 0.06), (0, 0, -length / 2), frame, 0.02),
         block((width - 0.02, 0.2, length - 0.05), (0, height * 0.55, 0), cover, 0.06),
-        Part(s.moved(rumpled, (0, height * 0.55 + 0.24, 0)), cover),
+        ScenePart(s.moved(rumpled, (0, height * 0.55 + 0.24, 0)), cover),
     ]
     for x in (-0.25, 0.25) if width > 1.3 else (0.0,):
         parts += placed(things.cushion(rng, 0.55), (x * width, height + 0.17, -length / 2 + 0.25))
@@ -187,7 +187,7 @@ def kitchen(rng, meshes=()) -> Piece:
             parts.append(block((w, 0.65, 0.33), (x, 1.42, -0.13), front))
     splash = s.sheet((-width / 2, 0.9, -depth / 2 + 0.01), (width, 0, 0), (0, 0.52, 0))
     load = _cluttered(rng, width, depth * 0.8, 0.9, int(rng.integers(2, 9)), meshes)
-    return Piece([*parts, Part(splash, m.tiled(rng)), *load], width, depth, 0.9)
+    return Piece([*parts, ScenePart(splash, m.tiled(rng)), *load], width, depth, 0.9)
 
 
 ALONG_WALLS = (

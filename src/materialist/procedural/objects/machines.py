@@ -10,7 +10,7 @@ from materialist.procedural.objects import street_things, things
 from materialist.procedural.objects.parts import Parts, block, placed, rod, standing
 from materialist.procedural.objects.things import Meshes
 from materialist.procedural.objects.wheels import two_wheeler, wheel
-from materialist.procedural.world import Part
+from materialist.procedural.world import ScenePart
 
 
 def big_thing(rng: np.random.Generator, meshes: Meshes = ()) -> Parts:
@@ -48,7 +48,7 @@ def machine(rng, meshes=()) -> Parts:
             parts.append(block(part, at, look, 0.01))
         elif kind == 1:
             tip, turn = np.pi / 2 * rng.integers(2, size=2)
-            parts.append(Part(s.moved(s.drum(part[0] / 2, part[1]), at, turn, tip), look))
+            parts.append(ScenePart(s.moved(s.drum(part[0] / 2, part[1]), at, turn, tip), look))
         elif kind == 2:
             far = at + rng.normal(size=3) * 0.3 * size
             middle = (at + far) / 2 + [0, rng.normal() * 0.15, 0]
@@ -72,9 +72,9 @@ def ladder(rng, meshes=()) -> Parts:
 
 def bench(rng, meshes=()) -> Parts:
     """A seat of slats with a back."""
-    w, h, back, look = *rng.uniform([0.6, 0.4, 0.35], [1.6, 0.48, 0.55]), m.one_of(rng, m.wood, m.wood, m.lacquer)
+    (w, h, back), look = rng.uniform([0.6, 0.4, 0.35], [1.6, 0.48, 0.55]), m.one_of(rng, m.wood, m.wood, m.lacquer)
     ends = (-w / 2 + 0.04, w / 2 - 0.04)
-    slats = [((w, 0.02, 0.08), (0, h, z)) for z in np.arange(-0.2, 0.21, 0.1)]
+    slats: list[tuple] = [((w, 0.02, 0.08), (0, h, z)) for z in np.arange(-0.2, 0.21, 0.1)]
     slats += [((0.06, h, 0.06), (x, 0, z)) for x in ends for z in (-0.2, 0.2)]
     slats += [((0.06, back, 0.04), (x, h, -0.22)) for x in ends]
     if rng.random() < 0.5:

@@ -9,26 +9,26 @@ from numpy.typing import ArrayLike
 
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import solids as s
-from materialist.procedural.world import Part
+from materialist.procedural.world import ScenePart
 
-Parts = list[Part]
+Parts = list[ScenePart]
 
 
 def block(
     size: ArrayLike, at: ArrayLike, material: Material, radius: float = 0.0, *, turn: float = 0.0, tip: float = 0.0
-) -> Part:
+) -> ScenePart:
     """A slab of `size` [3] standing at `at` [3], its edges rounded by `radius`; tipped about X, turned about Y."""
-    return Part(s.moved(s.slab(size, radius), at, turn, tip), material)
+    return ScenePart(s.moved(s.slab(size, radius), at, turn, tip), material)
 
 
-def rod(points: ArrayLike, radius: ArrayLike, material: Material, n: int = 8) -> Part:
+def rod(points: ArrayLike, radius: ArrayLike, material: Material, n: int = 8) -> ScenePart:
     """A round rod along points [P, 3]."""
-    return Part(s.tube(points, radius, n), material)
+    return ScenePart(s.tube(points, radius, n), material)
 
 
-def orb(at: ArrayLike, radius: float, material: Material, n: int = 24) -> Part:
+def orb(at: ArrayLike, radius: float, material: Material, n: int = 24) -> ScenePart:
     """A ball about `at` [3]."""
-    return Part(s.moved(s.ball(n), at, scale=radius), material)
+    return ScenePart(s.moved(s.ball(n), at, scale=radius), material)
 
 
 def one_thing(parts: Parts) -> Parts:

@@ -7,7 +7,7 @@ import numpy as np
 from materialist.procedural import materials as m
 from materialist.procedural.objects import solids as s
 from materialist.procedural.objects.parts import Parts, block, orb, rod
-from materialist.procedural.world import Part
+from materialist.procedural.world import ScenePart
 
 
 def house(rng) -> Parts:
@@ -27,7 +27,7 @@ def house(rng) -> Parts:
     for side in (1, -1):
         run = np.array([0, -rise, side * (d / 2 + 0.5)])
         start = np.array([-side * (w / 2 + 0.3), h + rise, -d / 2])
-        parts.append(Part(s.sheet(start + run, (side * (w + 0.6), 0, 0), -run), roof))
+        parts.append(ScenePart(s.sheet(start + run, (side * (w + 0.6), 0, 0), -run), roof))
     return parts
 
 
@@ -40,12 +40,12 @@ def car(rng) -> Parts:
     upper = s.warped(s.slab((cabin, 0.62, width * 0.9), 0.25), taper)
     parts = [
         block((length, 0.6, width), (0, 0.28, 0), body, 0.2),
-        Part(s.moved(upper, (hood, 0.8, 0)), dark),
+        ScenePart(s.moved(upper, (hood, 0.8, 0)), dark),
         block((cabin * 0.72, 0.08, width * 0.78), (hood, 1.36, 0), body, 0.04),
     ]
     for x, z in ((x, z) for x in (-0.31 * length, 0.31 * length) for z in (0.1 - width / 2, width / 2 - 0.1)):
         for radius, thick, look in ((0.31, 0.2, rubber), (0.19, 0.22, rim)):
-            parts.append(Part(s.moved(s.drum(radius, thick), (x, 0.31, z), tip=np.pi / 2), look))
+            parts.append(ScenePart(s.moved(s.drum(radius, thick), (x, 0.31, z), tip=np.pi / 2), look))
     for x in (-length / 2 - 0.005, length / 2 + 0.005):
         lamp = m.uniform(m.shade(rng) if rng.random() < 0.5 else (0.8, 0.8, 0.8), 0.1)
         parts += [block((0.04, 0.14, 0.3), (x, 0.62, z * width), lamp, 0.02) for z in (-0.36, 0.36)]
@@ -67,11 +67,11 @@ def tree(rng, size: float) -> Parts:
     if kind < 0.55:
         n, length = int(rng.integers(400, 1500)), size * rng.uniform(0.04, 0.09)
         roots = np.array(tips)[rng.integers(len(tips), size=n)] + rng.normal(size=(n, 3)) * 0.11 * size
-        parts.append(Part(s.leaves(rng, roots, rng.normal(size=(n, 3)), length, 0.5 * length), leaf))
+        parts.append(ScenePart(s.leaves(rng, roots, rng.normal(size=(n, 3)), length, 0.5 * length), leaf))
     elif kind < 0.9:
         for tip in tips[:8]:
             mass = s.blob(rng, size * rng.uniform(0.25, 0.5, 3), 0.25, 32)
-            parts.append(Part(s.moved(mass, tip - [0, 0.12 * size, 0]), leaf))
+            parts.append(ScenePart(s.moved(mass, tip - [0, 0.12 * size, 0]), leaf))
     return parts
 
 
@@ -81,7 +81,7 @@ def bush(rng, size: float) -> Parts:
     core = s.blob(rng, size * np.array([1.0, 0.8, 1.0]), 0.2, 32)
     roots = core.vertices[rng.integers(len(core.vertices), size=n)] * 0.95
     leaves = s.leaves(rng, roots, rng.normal((0, 0.4, 0), 1, (n, 3)), length, 0.4 * length)
-    return [Part(core, leaf), Part(leaves, leaf)]
+    return [ScenePart(core, leaf), ScenePart(leaves, leaf)]
 
 
 def person(rng) -> Parts:
@@ -95,10 +95,10 @@ def person(rng) -> Parts:
         parts += [rod(leg, [0.06, 0.07, 0.1], trousers, 12), rod(arm, [0.06, 0.05, 0.035], shirt, 10)]
         parts.append(orb(arm[-1], 0.05, skin, 16))
     torso = s.warped(s.ball(32), lambda p: p * [0.21, 0.19 * tall, 0.13] * (1 + 0.15 * p[:, 1:2]))
-    parts.append(Part(s.moved(torso, (0, 0.66 * tall, 0)), shirt))
+    parts.append(ScenePart(s.moved(torso, (0, 0.66 * tall, 0)), shirt))
     head, hair = (0.078, 0.11, 0.092), (0.086, 0.1, 0.095)
     for half, y, z, look in ((head, 0.925, 0.01, skin), (hair, 0.95, -0.02, m.plastic(rng))):
-        parts.append(Part(s.moved(s.warped(s.ball(32), lambda p, h=half: p * h), (0, y * tall, z)), look))
+        parts.append(ScenePart(s.moved(s.warped(s.ball(32), lambda p, h=half: p * h), (0, y * tall, z)), look))
     return parts
 
 

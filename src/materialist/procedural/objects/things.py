@@ -14,7 +14,7 @@ from materialist.procedural.objects import shapes
 from materialist.procedural.objects import solids as s
 from materialist.procedural.objects.parts import Parts, block, footprint, one_thing, orb, placed, rod
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.world import Part
+from materialist.procedural.world import ScenePart
 
 Meshes = tuple[Path, ...]
 
@@ -31,7 +31,7 @@ def captured(rng: np.random.Generator, size: float, meshes: Meshes) -> Parts:
     solid = mesh(meshes[rng.integers(len(meshes))])
     solid = replace(solid, uv=solid.uv * [np.pi * 0.6, 1])
     tip = rng.choice([0, 0, 0, np.pi / 2, -np.pi / 2]) if rng.random() < 0.3 else 0.0
-    return [Part(s.grounded(s.moved(solid, tip=tip, scale=size)), m.any_object(rng))]
+    return [ScenePart(s.grounded(s.moved(solid, tip=tip, scale=size)), m.any_object(rng))]
 
 
 @lru_cache(maxsize=40)
@@ -59,7 +59,7 @@ def _box(rng, size) -> Parts:
 def _superquadric(rng, size) -> Parts:
     extent = size * rng.uniform(0.5, 1.1, 3)
     solid = shapes.superquadric(extent, rng.uniform(0.2, 1.4), rng.uniform(0.2, 1.4), 32)
-    return [Part(s.metric(solid, extent[0] * 1.5, extent[1] * 1.5), m.any_object(rng))]
+    return [ScenePart(s.metric(solid, extent[0] * 1.5, extent[1] * 1.5), m.any_object(rng))]
 
 
 def _ball(rng, size) -> Parts:
@@ -69,7 +69,7 @@ def _ball(rng, size) -> Parts:
 
 def _blob(rng, size) -> Parts:
     """Fruit, bread, stones, folded soft things."""
-    return [Part(s.blob(rng, size * rng.uniform(0.5, 1.0, 3), rng.uniform(0.03, 0.3), 40), m.any_object(rng))]
+    return [ScenePart(s.blob(rng, size * rng.uniform(0.5, 1.0, 3), rng.uniform(0.03, 0.3), 40), m.any_object(rng))]
 
 
 def vase(rng, size) -> Parts:
@@ -80,7 +80,7 @@ def vase(rng, size) -> Parts:
     widths[0] = max(widths[0], 0.5)
     control = np.stack([widths * radius, heights * size], -1)
     control = control[np.concatenate([[True], np.diff(control[:, 1]) > 0.04 * size])]
-    parts = [Part(s.pot(control, 0.04 * size), m.any_object(rng))]
+    parts = [ScenePart(s.pot(control, 0.04 * size), m.any_object(rng))]
     if rng.random() < 0.35:
         parts += _twigs(rng, size * 0.7, size * rng.uniform(0.7, 1.5), widths[-1] * radius * 0.6)
     return parts
@@ -95,7 +95,7 @@ def _twigs(rng, base, length, spread) -> Parts:
         parts.append(rod(line, 0.008 * length, stem, 5))
         count = int(rng.integers(4, 12))
         roots, way = line[rng.integers(2, 6, count)], rng.normal((0, 0.5, 0), 1, (count, 3))
-        parts.append(Part(s.leaves(rng, roots, way, 0.25 * length, 0.09 * length), leaf))
+        parts.append(ScenePart(s.leaves(rng, roots, way, 0.25 * length, 0.09 * length), leaf))
     return parts
 
 
@@ -104,26 +104,26 @@ def _cup(rng, size) -> Parts:
     radius, look, parts, lift = size * rng.uniform(0.4, 0.6), m.ceramic(rng), [], 0.0
     if rng.random() < 0.35:
         saucer = np.array([(0.5, 0), (0.6, 0.3), (0.95, 0.8), (1, 1)]) * size * [0.9, rng.uniform(0.14, 0.36)]
-        parts, lift = [Part(s.pot(saucer, 0.05 * size), look)], 0.12 * size
+        parts, lift = [ScenePart(s.pot(saucer, 0.05 * size), look)], 0.12 * size
     control = np.array([(0.65, 0), (0.85, 0.2), (1, 0.6), (1.02, 1)]) ** [rng.uniform(0.3, 1.3), 1] * [radius, size]
-    parts.append(Part(s.moved(s.pot(control, 0.05 * size), (0, lift, 0)), look))
+    parts.append(ScenePart(s.moved(s.pot(control, 0.05 * size), (0, lift, 0)), look))
     phi = np.linspace(-np.pi / 2, np.pi / 2, 12)
     loop = np.stack([np.cos(phi) * 0.35 * size + radius * 0.9, (np.sin(phi) * 0.3 + 0.5) * size + lift, 0 * phi], -1)
     drink = m.uniform(m.hsv(rng.uniform(0.03, 0.12), rng.uniform(0.2, 0.9), rng.uniform(0.1, 0.8)), 0.08)
     level = s.moved(s.disc(radius * 0.9), (0, size * rng.uniform(0.6, 0.85) + lift, 0))
-    return [*parts, rod(loop, 0.05 * size, look, 7), Part(level, drink)]
+    return [*parts, rod(loop, 0.05 * size, look, 7), ScenePart(level, drink)]
 
 
 def _bowl(rng, size) -> Parts:
     """Plate or bowl, at times with fruit."""
     r, height, t = size * rng.uniform(0.6, 1.0), size * rng.uniform(0.15, 0.6), np.linspace(0, 1, 6)
     control = np.stack([r * (0.4 + 0.6 * t ** rng.uniform(0.3, 0.8)), height * t], -1)
-    parts = [Part(s.pot(control, 0.03 * size), m.any_object(rng))]
+    parts = [ScenePart(s.pot(control, 0.03 * size), m.any_object(rng))]
     food = m.any_object(rng)
     for _ in range(int(rng.integers(2, 8)) if rng.random() < 0.5 else 0):
         piece = s.blob(rng, size * rng.uniform(0.25, 0.45, 3), 0.08, 24)
         place = rng.uniform([-0.4, 0.15, -0.4], [0.4, 0.45, 0.4]) * [r, height, r]
-        parts.append(Part(s.moved(piece, place), food if rng.random() < 0.6 else m.any_object(rng)))
+        parts.append(ScenePart(s.moved(piece, place), food if rng.random() < 0.6 else m.any_object(rng)))
     return parts
 
 
@@ -133,13 +133,13 @@ def _bottle(rng, size) -> Parts:
     profile = np.array([(1e-3, 0), (0.95, 0), (1, 0.03), (1, shoulder), (neck + 0.1, shoulder + 0.15), (neck, 0.92),
                         (neck * 1.1, 0.93), (neck * 1.1, 1), (1e-3, 1)]) * [r, size]  # fmt: skip
     look = m.plastic(rng) if rng.random() < 0.7 else m.metal(rng)
-    parts = [Part(s.metric(shapes.lathe(profile, 40), np.pi * r, size), look)]
+    parts = [ScenePart(s.metric(shapes.lathe(profile, 40), np.pi * r, size), look)]
     if rng.random() < 0.7:
         low, high = sorted(rng.uniform(0.08, shoulder - 0.03, 2) * size)
         high = max(high, low + 0.1 * size)
         band = shapes.lathe(np.array([(1.012 * r, low), (1.012 * r, high)]), 40)
         label = replace(m.printed(rng, np.pi * r, high - low), offset=None)
-        parts.append(Part(s.metric(band, np.pi * r, high - low), label))
+        parts.append(ScenePart(s.metric(band, np.pi * r, high - low), label))
     return parts
 
 
@@ -160,18 +160,18 @@ def plant(rng, size) -> Parts:
     """Pot plant: a pot, stems, leaves."""
     pot, leaf, n = size * rng.uniform(0.25, 0.4), m.foliage(rng), int(rng.integers(20, 120))
     control, height = np.array([(0.75, 0), (0.9, 0.5), (1, 1)]) * [pot * 0.5, pot], size - pot
-    soil = Part(s.moved(s.disc(pot * 0.46), (0, 0.85 * pot, 0)), m.uniform(m.hsv(0.07, 0.5, 0.25), 0.9, grain=0.8))
-    parts = [Part(s.pot(control, 0.05 * pot), m.any_object(rng)), soil]
+    soil = ScenePart(s.moved(s.disc(pot * 0.46), (0, 0.85 * pot, 0)), m.uniform(m.hsv(0.07, 0.5, 0.25), 0.9, grain=0.8))
+    parts = [ScenePart(s.pot(control, 0.05 * pot), m.any_object(rng)), soil]
     if rng.random() < 0.4:  # blades from the soil
         roots = rng.normal(size=(n, 3)) * [pot * 0.12, 0, pot * 0.12] + [0, pot * 0.85, 0]
         way = rng.normal(size=(n, 3)) * [0.5, 0, 0.5] + [0, 1, 0]
-        return [*parts, Part(s.leaves(rng, roots, way, height * 1.1, height * rng.uniform(0.04, 0.12)), leaf)]
+        return [*parts, ScenePart(s.leaves(rng, roots, way, height * 1.1, height * rng.uniform(0.04, 0.12)), leaf)]
     t, angle = rng.random(n), rng.uniform(0, 2 * np.pi, n)
     out = rng.uniform(0, 0.35, n) * height * np.sin(np.pi * (0.2 + 0.7 * t))
     roots = np.stack([out * np.cos(angle), pot * 0.9 + t * height * 0.8, out * np.sin(angle)], -1)
     way = np.stack([np.cos(angle), rng.uniform(0, 1.2, n), np.sin(angle)], -1)
     length = height * rng.uniform(0.2, 0.4)
-    leaves = Part(s.leaves(rng, roots, way, length, length * rng.uniform(0.25, 0.6)), leaf)
+    leaves = ScenePart(s.leaves(rng, roots, way, length, length * rng.uniform(0.25, 0.6)), leaf)
     return [
         *parts,
         rod([(0, y, 0) for y in (0.8 * pot, size, pot + 0.8 * height)], 0.015 * size, m.wood(rng), 6),
@@ -183,7 +183,7 @@ def _ring(rng, size) -> Parts:
     """Ring, wheel, roll of tape, lying or standing."""
     major = size * rng.uniform(0.3, 0.5)
     solid = s.torus(major, major * rng.uniform(0.12, 0.4), 16)
-    return [Part(s.grounded(s.moved(solid, tip=float(rng.choice([0, np.pi / 2])))), m.any_object(rng))]
+    return [ScenePart(s.grounded(s.moved(solid, tip=float(rng.choice([0, np.pi / 2])))), m.any_object(rng))]
 
 
 def _stacked(rng, size) -> Parts:
@@ -197,7 +197,7 @@ def _stacked(rng, size) -> Parts:
             solid = s.moved(s.ball(32), (0, height / 2, 0), scale=height / 2)
         else:
             solid = s.slab((2 * r, height, 2 * r), 0.1 * r)
-        parts.append(Part(s.moved(solid, (0, top, 0)), look if rng.random() < 0.6 else m.any_object(rng)))
+        parts.append(ScenePart(s.moved(solid, (0, top, 0)), look if rng.random() < 0.6 else m.any_object(rng)))
         top += height * 0.97
     return parts
 
@@ -207,7 +207,7 @@ def cushion(rng, size) -> Parts:
     base = shapes.superquadric(size * np.array([1, rng.uniform(0.7, 1), 0.3]), 0.35, 0.35, 24)
     bump = s.lumps(rng, 0.05 * size, 2 / size)
     solid = s.warped(base, lambda p: p + bump(p)[:, None] * [0, 0, 1])
-    return [Part(s.moved(s.metric(solid, size, size), tip=-rng.uniform(0.1, 0.5)), m.fabric(rng))]
+    return [ScenePart(s.moved(s.metric(solid, size, size), tip=-rng.uniform(0.1, 0.5)), m.fabric(rng))]
 
 
 KINDS = (

@@ -13,7 +13,7 @@ from materialist.errors import InputError
 from materialist.io.described import claim
 from materialist.io.samples import read_arrays, write_arrays
 from materialist.procedural.objects.glassware import SPLITS, make_shape
-from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.procedural.thickness.view import draw_example
 from materialist.types import Array
 
@@ -23,7 +23,7 @@ FORMAT = 3
 
 
 @dataclass(frozen=True)
-class Plan:
+class ViewPlan:
     """What a set holds."""
 
     shapes: int = 640
@@ -42,7 +42,7 @@ class Plan:
             raise InputError(f"The split is {self.split!r}; choose one of {', '.join(SPLITS)}.")
 
 
-def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> float:
+def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) -> float:
     """Make the views that FOLDER lacks; shape i depends on the plan's split and seed and on i alone. Returns seconds.
 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
@@ -57,10 +57,10 @@ def produce(folder: Path, plan: Plan, progress: Progress = lambda *_: None) -> f
     return time.monotonic() - start
 
 
-def make_views(index: int, plan: Plan) -> dict[str, Array]:
+def make_views(index: int, plan: ViewPlan) -> dict[str, Array]:
     """Views of shape `index`: maps [V, CHANNELS, S, S] and target [V, 5, S, S] float16, hollow [V] bool."""
     chosen = make_shape(index, plan.split, plan.seed)
-    tracer = Tracer(chosen.solid)
+    tracer = ShapeTracer(chosen.solid)
     rng = np.random.default_rng([plan.seed, SPLITS[plan.split], index, 1])
     found = [draw_example(chosen, tracer, rng) for _ in range(plan.views)]
     return {

@@ -10,7 +10,7 @@ from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
-from materialist.procedural.thickness.ray_paths import Tracer
+from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.procedural.thickness.view import draw_example
 from materialist.types import Array
 
@@ -85,7 +85,7 @@ def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str
     found: dict[str, dict[str, Array]] = {}
     for file in files:
         shape = Shape(centred(mesh(file)), False, file.stem, True)
-        tracer, rng = Tracer(shape.solid), np.random.default_rng([seed, len(found)])
+        tracer, rng = ShapeTracer(shape.solid), np.random.default_rng([seed, len(found)])
         examples = [draw_example(shape, tracer, rng, exact=True) for _ in range(views)]
         found[file.stem] = {
             "maps": np.stack([x.maps for x in examples]),

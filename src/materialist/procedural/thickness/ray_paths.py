@@ -46,7 +46,7 @@ def towards(normal: Array, direction: Array, sign: int) -> Array:
     return np.where(sign * np.sum(normal * direction, -1, keepdims=True) < 0, -normal, normal)
 
 
-class Tracer:
+class ShapeTracer:
     """One mesh to be shot at."""
 
     def __init__(self, solid: Solid):

@@ -12,11 +12,11 @@ import numpy as np
 
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
 from materialist.procedural.objects.glassware import Shape
-from materialist.procedural.thickness.ray_paths import Paths, Tracer, towards
+from materialist.procedural.thickness.ray_paths import Paths, ShapeTracer, towards
 from materialist.types import Array
 
 LEAST_PIXELS = 0.02
-"""Part of the window that an object must cover; thinner views are drawn anew."""
+"""ScenePart of the window that an object must cover; thinner views are drawn anew."""
 SIDES = (24, 160)
 """Pixels on a side of the picture from which the window is cut."""
 OFF = (0.03, 0.015)
@@ -36,7 +36,7 @@ class ThicknessExample:
 
 
 @dataclass(frozen=True)
-class Pose:
+class CameraPose:
     """The camera, in the frame of a stretched and sheared shape."""
 
     stretch: Array
@@ -47,7 +47,9 @@ class Pose:
     """[3] the shape's middle in the camera frame."""
 
 
-def draw_example(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exact: bool = False) -> ThicknessExample:
+def draw_example(
+    shape: Shape, tracer: ShapeTracer, rng: np.random.Generator, *, exact: bool = False
+) -> ThicknessExample:
     """A random view of the shape, cut from a picture of any size as `Window` does at prediction.
 
     `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise.
@@ -67,7 +69,7 @@ def draw_example(shape: Shape, tracer: Tracer, rng: np.random.Generator, *, exac
     return ThicknessExample(features(view).astype(np.float16), target, shape.hollow)
 
 
-def _cut(rng: np.random.Generator, tracer: Tracer, pose: Pose, vertices: Array) -> View:
+def _cut(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, vertices: Array) -> View:
     """A window of a larger or smaller picture, with maps as imperfect as predicted ones."""
     side = round(float(np.exp(rng.uniform(*np.log(SIDES)))))
     seen = _imperfect(rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15))))
@@ -78,7 +80,7 @@ def _cut(rng: np.random.Generator, tracer: Tracer, pose: Pose, vertices: Array) 
     return window.cut(seen.photo, seen.inside, seen.normal, seen.depth, seen.rays)
 
 
-def _seen(rng: np.random.Generator, tracer: Tracer, pose: Pose, rays: Array) -> View:
+def _seen(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, rays: Array) -> View:
     """What rays [S, S, 3] see of the shape."""
     paths, normal, _ = look(tracer, pose, rays)
     inside = np.isfinite(paths.first).reshape(rays.shape[:2])
@@ -87,7 +89,7 @@ def _seen(rng: np.random.Generator, tracer: Tracer, pose: Pose, rays: Array) -> 
     return View(_photo(rng, normal, rays, point) * inside[..., None], inside, normal, depth, rays)
 
 
-def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> Pose:
+def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> CameraPose:
     """A camera that looks at the shape, from above if it stands; `plain` leaves the shape in its own form."""
     stretch = np.eye(3)
     if not plain:
@@ -98,7 +100,7 @@ def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -
     to_camera = _about(2, roll) @ _about(0, tilt) @ _about(1, turn)
     distance = np.exp(rng.uniform(np.log(1.4), np.log(6)))
     aside = rng.uniform(-0.35, 0.35, 2) * distance * rng.uniform(0, 1)
-    return Pose(stretch, to_camera, np.array([*aside, -distance]))
+    return CameraPose(stretch, to_camera, np.array([*aside, -distance]))
 
 
 def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Array:
@@ -113,7 +115,7 @@ def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Ar
     return rays
 
 
-def look(tracer: Tracer, pose: Pose, rays: Array) -> tuple[Paths, Array, Array]:
+def look(tracer: ShapeTracer, pose: CameraPose, rays: Array) -> tuple[Paths, Array, Array]:
     """Paths of the rays through the shape; normals [S, S, 3] of the first and of the last surface, unit, camera frame.
 
     The rays are brought into the shape's own frame; lengths along them are the same there.
