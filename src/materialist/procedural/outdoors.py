@@ -83,7 +83,7 @@ def _street(rng, meshes) -> Parts:
             parts += placed(house, (side * (half + wide + 0.1), 0, -along), -side * np.pi / 2)
         for _ in range(int(rng.integers(0, 5))):
             if rng.random() < 0.35:
-                at, one, turn = (side * (half - 0.95), 0, rng.uniform(-22, 1.5)), street.car(rng), np.pi / 2
+                at, one, turn = (side * (half - 0.95), 0.0, rng.uniform(-22, 1.5)), street.car(rng), np.pi / 2
             else:
                 one = m.one_of(rng, street.post, street.person, lambda r: street.tree(r, r.uniform(3, 7)))
                 at = (side * (half + rng.uniform(0.3, wide - 0.3)), 0.14, rng.uniform(-22, 1.5))
