@@ -106,7 +106,7 @@ def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
     import materialist.edits.recipe as recipe
 
     asked = []
-    monkeypatch.setattr(recipe, "without", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "remove", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
     monkeypatch.setattr(recipe, "glass", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
     monkeypatch.setattr(recipe, "settle", lambda scene, *given: asked.append(given[-1].seed) or scene)
     (folder / "edits.yaml").write_text(

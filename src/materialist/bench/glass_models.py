@@ -23,13 +23,13 @@ def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[P
 def inpainted_background(
     scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0, ends: tuple[PlaneExtent, ...] = ()
 ) -> Background:
-    """What the photo [H, W, 3] linear shows around the object, continued behind it as `edit.background` does.
+    """What the photo [H, W, 3] linear shows around the object, continued behind it as `edits.remove` does.
 
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
     albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
-    from materialist.edits.remove.background import filled, looks, sources
     from materialist.edits.remove.behind import SKY, behind
+    from materialist.edits.remove.filling import filled, filling_plan
 
     hole = _grown(scene.mask)
     depth = np.where(hole, 0, scene.behind.depth)
@@ -43,7 +43,7 @@ def inpainted_background(
         grey = _paint(scene._mi, scene.item.albedo)
         things = {"object": _mesh(scene._mi, body(scene, found, depth), grey)}
     albedo = albedo_of(scene, depth, normal, photo, envmap, ends, things)
-    plan = sources(looks(albedo, np.clip(photo * gain, 0, 1)), hole, label, depth, scene.camera)
+    plan = filling_plan(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
     exposed, albedo = (filled(plan, x, hole) for x in (photo * gain, albedo))
     return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 

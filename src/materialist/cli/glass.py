@@ -79,12 +79,11 @@ def glass(
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
-    from materialist.edits.glass.glass import OPEN, check_glass
     from materialist.edits.glass.glass import glass as change
-    from materialist.edits.remove.hole import told_shadow
     from materialist.errors import InputError
     from materialist.io.package import load_scene
     from materialist.option_kinds import parse_colour
+    from materialist.options import Glass
 
     if model is Model.two_interface and full_render:
         raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
@@ -93,12 +92,13 @@ def glass(
         raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
     r, g, b = (float(c) for c in parse_colour(tint, "tint"))
     look: dict[str, Any] = {"ior": ior, "transmission": transmission, "tint": (r, g, b), "roughness": roughness}
-    check_glass(**look)
+    Glass(**look)
     loaded = load_scene(scene)
     region = chosen_region(loaded, click, box, mask, method, device.value)
     options: dict[str, Any] = {
-        "hollow": OPEN if open_top else hollow, "model": model.value, "thickness": thickness, "background": background,
-        "inpaint": chosen_inpainter(inpaint, seed, device.value), "shadow": told_shadow(shadow), "seed": seed,
+        "hollow": "open" if open_top else hollow, "model": model.value, "thickness": thickness,
+        "background": background, "inpaint": chosen_inpainter(inpaint, seed, device.value),
+        "shadow": shadow, "seed": seed,
     }  # fmt: skip
     if preview:
         _preview(loaded, region, look, options, output, spp, device.value, as_json, force)

@@ -53,15 +53,14 @@ def remove(
     force: Force = False,
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
-    from materialist.edits.remove.background import without
-    from materialist.edits.remove.hole import told_shadow
+    from materialist.edits.remove.remove import remove as take_away
     from materialist.io.package import load_scene
 
     check_before(output, save, spp, force, device=device.value, full_render=full_render)
     loaded = load_scene(scene)
     region = chosen_region(loaded, click, box, mask, method, device.value)
     inpainter = chosen_inpainter(inpaint, seed, device.value)
-    edited = without(loaded, region, background=background, inpaint=inpainter, shadow=told_shadow(shadow), seed=seed)
+    edited = take_away(loaded, region, background=background, inpaint=inpainter, shadow=shadow, seed=seed)
     write_result(
         "remove", loaded, edited, output, save=save, spp=spp, seed=seed, denoise=denoise, full_render=full_render,
         device=device.value, as_json=as_json, force=force, lines=[f"{int(region.sum())} pixels taken away."],

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from materialist.edits.drop.drop_rest import settle
-from materialist.edits.glass.glass import OPEN, glass
+from materialist.edits.glass.glass import glass
 from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
-from materialist.edits.remove.background import without
-from materialist.edits.remove.hole import told_shadow
+from materialist.edits.remove.remove import remove
 from materialist.edits.select.select import select
 from materialist.errors import InputError, OutputError
 from materialist.option_kinds import OFF, ON, OperationOptions, declarations, numbers, parse_colour, several
@@ -234,7 +233,7 @@ def _seed(step: Step) -> int:
 
 
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return without(edited, _left(scene, edited, region_of(scene, step)), **_removal(step), fitted=scene)
+    return remove(edited, _left(scene, edited, region_of(scene, step)), **_removal(step), fitted=scene)
 
 
 def _removal(step: Step) -> dict[str, Any]:
@@ -244,7 +243,7 @@ def _removal(step: Step) -> dict[str, Any]:
     if "grow" in given:
         options["grow"] = _number(given["grow"], "grow")
     if "shadow" in given:
-        options["shadow"] = told_shadow(given["shadow"])
+        options["shadow"] = given["shadow"]
     if "background" in given:
         options["background"] = _file(step, "background")
     if "inpaint" in given:
@@ -269,8 +268,8 @@ def glass_arguments(scene: Scene, step: Step):
             float(c) for c in parse_colour(tint if isinstance(tint, str) else numbers(tint, 3, "tint"), "tint")
         )
     if "hollow" in given:
-        open_top = str(given["hollow"]).lower() == OPEN
-        options["hollow"] = OPEN if open_top else _switch(given["hollow"], "hollow", f", or {OPEN}")
+        open_top = str(given["hollow"]).lower() == "open"
+        options["hollow"] = "open" if open_top else _switch(given["hollow"], "hollow", ", or open")
     if "model" in given:
         options["model"] = str(given["model"])
     if "thickness" in given:

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.glass.glass import check_glass
 from materialist.edits.recipe import REGION, Step, apply, glass_arguments
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
+from materialist.options import Glass
 from materialist.studio import SETTINGS
 from materialist.types import Array, Scene
 
@@ -72,8 +72,7 @@ def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
     Raises InputError for values out of range, and for a region without a surface.
     """
     region, options = glass_arguments(scene, step)
-    tint = options.get("tint", (1.0, 1.0, 1.0))
-    check_glass(options.get("ior", 1.5), options.get("transmission", 1.0), tint, options.get("roughness", 0.0))
+    tint = Glass(**options).tint
     if not (region & (scene.depth > 0)).any():
         raise InputError("The selection covers only sky; select a surface.")
     return region, tint

@@ -150,12 +150,12 @@ def test_what_stands_where_something_was_removed_or_glows_has_its_own_outline(bo
 
     from materialist.edits.composite.native_layer import new_bodies
     from materialist.edits.glass.glass import glass
-    from materialist.edits.remove.background import without
+    from materialist.edits.remove.remove import remove
 
     scene = rendered_scene()
     mask = block_mask(36, 48)
     assert new_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
-    gone = without(scene, mask)
+    gone = remove(scene, mask)
     there = insert(gone, box, (18.0, 20.0), scale=2)
     assert new_bodies(scene, there) == ["body0"]
     (body,) = there.bodies

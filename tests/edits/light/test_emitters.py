@@ -200,18 +200,18 @@ def spot(rows=slice(22, 26), columns=slice(14, 20)):
 def test_lights_glass_and_removals_meet():
     """Dimmed once, whatever stands in the photo; not over glass; not where the light was taken away."""
     from materialist.edits.glass.glass import glass
-    from materialist.edits.remove.background import without
+    from materialist.edits.remove.remove import remove
 
     _, fit = rooms()
     window, core = spot(slice(2, 14), slice(6, 34)), (slice(5, 10), slice(12, 28))
-    removed = without(fit, spot(), shadow=0)
+    removed = remove(fit, spot(), shadow=0)
     plain = composite(fit, relight(fit, dim=0.1), spp=16)[core]
     np.testing.assert_allclose(composite(fit, relight(removed, dim=0.1, fitted=fit), spp=16)[core], plain, rtol=0.02)
-    bare = without(fit, window, shadow=0)
+    bare = remove(fit, window, shadow=0)
     with pytest.raises(InputError, match="taken away"):
         relight(bare, dim=0.0, fitted=fit)
     with pytest.raises(InputError, match="dim afterwards"):
-        without(relight(fit, dim=0.3), window, fitted=fit)
+        remove(relight(fit, dim=0.3), window, fitted=fit)
     pane = spot(slice(5, 20), slice(10, 20))
     before = glass(fit, pane, roughness=0.5, tint=(0.2, 0.9, 0.2), thickness="symmetry")
     shown = composite(fit, relight(before, dim=0.5, fitted=fit), spp=16)[7:9, 13:17]

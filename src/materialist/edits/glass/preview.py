@@ -11,6 +11,7 @@ from materialist.edits.composite.fireflies import without_fireflies
 from materialist.edits.composite.layers import focused
 from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
+from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
 PATHS = 600_000
@@ -31,48 +32,46 @@ class GlassPreview:
     are not shown: around the object stands the photo with the object gone.
 
     Args:
-        scene, mask, options: as for `glass.glass`; options that change the body or the background (`thickness`,
-            `hollow`, `background`, ...). `model` must be `closed`.
+        scene, mask, options, fitted, values: as for `glass.glass`; `model` must be `closed`.
 
     Raises:
         InputError: as `glass.glass`, and for another model.
     """
 
-    def __init__(self, scene: Scene, mask: Array, *, device: str = "auto", **options: Any):
+    def __init__(
+        self, scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None, **values: Any
+    ):
         from materialist.edits.core.sky import sky_maps
         from materialist.render.variant import setup
 
-        if options.get("model", "closed") != "closed":
-            raise InputError(f"The preview traces the closed body; model is '{options['model']}', leave it 'closed'.")
-        setup(device)
-        self.scene, self._device = scene, device
+        self._options = options = Glass.given(options, **values)
+        if options.model != "closed":
+            raise InputError(f"The preview traces the closed body; model is '{options.model}', leave it 'closed'.")
+        setup(options.device)
+        self.scene = scene
         # The glass itself is exchanged for every picture.
-        self._edited = glass(scene, mask, **{**options, "ior": 1.5, "transmission": 1.0})
+        self._edited = glass(scene, mask, options, fitted=fitted, ior=1.5, transmission=1.0)
         self._targets: dict[str, tuple[Any, Any]] = {}
-        as_photographed = np.array_equal((options.get("fitted") or scene).envmap, scene.envmap)
+        as_photographed = np.array_equal((fitted or scene).envmap, scene.envmap)
         self._sky = sky_maps(self._edited) if as_photographed else None
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._look()
 
-    def picture(
-        self, *, ior: float = 1.5, transmission: float = 1.0, tint: tuple[float, float, float] = (1.0, 1.0, 1.0),
-        roughness: float = 0.0, spp: int = 16, seed: int = 0,
-    ) -> Array:  # fmt: skip
-        """[H, W, 3] float32 linear at working size: the photo with the object as this glass; values as for `glass`.
+    def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
+        """[H, W, 3] float32 linear at working size: the photo with the object as glass.
 
-        `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS.
+        `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS;
+        `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
         from materialist.edits.composite.native_layer import spread
         from materialist.edits.core.renderer import denoised
         from materialist.edits.core.sky import traced
-        from materialist.edits.glass.glass import check_glass
         from materialist.render.native import radiance
         from materialist.render.scene import GLASS_DEPTH
 
-        check_glass(ior, transmission, tint, roughness)
         if spp < 1:
             raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
-        surface = glass_surface(self.scene, ior=ior, transmission=transmission, tint=tint, roughness=roughness)
+        surface = glass_surface(self.scene, Glass.given(self._options, **values))
         size, box = self._size(spp)
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
@@ -163,7 +162,7 @@ class GlassPreview:
         edited = self._edited
         bodies = (*edited.bodies[:-1], replace(edited.bodies[-1], surface=surface))
         target = RenderScene(
-            edited.geometry, edited.camera, bodies=bodies, lamps=edited.lamps, device=self._device
+            edited.geometry, edited.camera, bodies=bodies, lamps=edited.lamps, device=self._options.device
         )  # fmt: skip
         target.set_materials(edited.materials)
         target.set_envmap(edited.envmap)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from materialist.color import srgb_levels, srgb_to_linear
-from materialist.edits.remove.background import Inpaint
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict.weights import INSTEAD
 from materialist.types import Array
 
+Inpaint = Callable[[Array, Array], Array]
+"""inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
 DEFAULT = "stable-diffusion-v1-5/stable-diffusion-inpainting"
 PROMPT = "empty background, nothing there"
 LONGEST = 768

@@ -1,7 +1,114 @@
-"""An object taken out of the photo."""
+"""The scene without one of its objects (paper, Background Inpainting): what was behind it, in maps, depth and photo."""
 
 from __future__ import annotations
 
-from materialist.edits.remove.background import without as remove
+from dataclasses import replace
+from typing import Any
 
-__all__ = ["remove"]
+import numpy as np
+
+from materialist.edits.core.notes import noted, warned
+from materialist.edits.core.region import body_coverage
+from materialist.edits.core.renderer import EditRenderer, denoised
+from materialist.edits.remove.behind import Behind, behind
+from materialist.edits.remove.filling import filled, filled_materials, filling_plan
+from materialist.edits.remove.given import given_picture, matched, with_picture
+from materialist.edits.remove.hole import Hole, make_hole
+from materialist.edits.remove.native import laid, with_hole
+from materialist.options import Removal
+from materialist.types import Array, Geometry, Scene
+
+
+def remove(
+    scene: Scene, mask: Array, options: Removal | None = None, *, fitted: Scene | None = None, **values: Any
+) -> Scene:
+    """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
+
+    In the result `photo` and `rerender` are filled alike, from the same places: their difference is what the fit
+    misses of the surroundings. `composite` takes both as they are.
+
+    Args:
+        mask: [H, W] bool, or weights in [0, 1], at working size.
+        options, values: `Removal`, or single fields of it.
+        fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
+
+    Raises:
+        InputError: an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all of the
+            photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
+    """
+    options, fitted = Removal.given(options, **values), fitted or scene
+    hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow)
+    front = np.where(hole.object, scene.depth, 0)
+    found = behind(scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera)
+    photographed = replace(scene, bodies=fitted.bodies)  # what an edit puts there is not in the photo
+    usable = body_coverage(photographed) == 0 if photographed.bodies else None
+    plan = filling_plan(
+        scene.materials.albedo, scene.photo.linear, hole.painted, found.label, found.depth, scene.camera,
+        seed=options.seed, usable=usable,
+    )  # fmt: skip
+    picture, warnings = given_picture(scene, options, hole)
+    if picture is not None:
+        materials, photo, rerender = with_picture(scene, plan, hole, picture)
+    else:
+        shown = denoised(scene.rerender, scene.materials.albedo, scene.normal)
+        materials = filled_materials(plan, scene.materials, hole.painted)
+        photo = with_hole(scene.photo, filled(plan, scene.photo.linear, hole.painted), hole.painted, plan, found.label)
+        rerender = filled(plan, shown, hole.painted).astype(np.float32)
+    removed = replace(
+        scene, materials=materials, depth=found.depth, normal=found.normal, geometry=_geometry(scene, found),
+        photo=photo, rerender=rerender,
+    )  # fmt: skip
+    if photographed.bodies:
+        removed = _with_bodies(removed, photographed, hole)
+    if picture is not None:
+        removed = matched(removed, hole, picture, fitted)
+    how = "background" if options.background is not None else ("inpainter" if options.inpaint else "patches")
+    what = {
+        "filled_by": how, "pixels": int(hole.object.sum()), "grow": options.grow,
+        "shadow": "auto" if options.shadow is None else options.shadow, "at": _middle(hole),
+    }  # fmt: skip
+    return noted(warned(removed, *warnings), "remove", what)
+
+
+def _middle(hole: Hole) -> list[int]:
+    """[x, y] a pixel of the hole, as far from its border as there is one: it tells this hole from others."""
+    from scipy.ndimage import distance_transform_edt
+
+    far = distance_transform_edt(np.pad(hole.painted, 1))[1:-1, 1:-1]
+    y, x = np.unravel_index(int(far.argmax()), far.shape)
+    return [int(x), int(y)]
+
+
+def _geometry(scene: Scene, found: Behind) -> Geometry:
+    """The scene's geometry, built anew from what is behind the object."""
+    from materialist.geometry.build import build_geometry, completion_of
+    from materialist.geometry.extents import read_extents
+
+    options = scene.provenance
+    return build_geometry(
+        found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
+        completion=completion_of(scene.geometry, options.get("completion")), extents=read_extents(options),
+        seed=int(options.get("seed", 0) or 0),
+    )  # fmt: skip
+
+
+def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
+    """The scene with its bodies in the filled photo and re-rendering again: they stand before what was taken away."""
+    share = body_coverage(scene)
+    before = hole.painted & (share > 0)
+    if not before.any():
+        return removed
+    photo, native = scene.photo, scene.photo.original.shape[:2]
+    large = share
+    if native != share.shape:
+        rows, columns = (
+            (max(0, int((v[0] - 1) * n / m)), min(n, int(np.ceil((v[-1] + 2) * n / m))))
+            for v, n, m in zip((np.flatnonzero(before.any(1)), np.flatnonzero(before.any(0))), native, share.shape)
+        )
+        large = np.zeros(native, np.float32)
+        large[slice(*rows), slice(*columns)] = EditRenderer(scene).body_coverage_in(scene, native, (*rows, *columns))
+    filled_photo = replace(
+        removed.photo, linear=laid(photo.linear, share, removed.photo.linear),
+        original=laid(photo.original, large, removed.photo.original),
+    )  # fmt: skip
+    return replace(removed, photo=filled_photo, rerender=laid(scene.rerender, share, removed.rerender))

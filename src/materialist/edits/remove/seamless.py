@@ -6,51 +6,54 @@ gradients, and the hole's borders give the level (Perez et al. 2003, Poisson Ima
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from materialist.edits.remove.behind import THING
-from materialist.edits.remove.exemplar import Plan
+from materialist.edits.remove.patches import Plan
 from materialist.types import Array
 
-LEAST = 0.05
-"""Added to radiance before its logarithm is taken: below, levels change by a sum, not by a factor."""
-ALIKE = 0.25
-"""Logarithms by which what is known beside a hole may differ from a piece that goes on there; what differs more is
-another thing, and says nothing about the level."""
-MOST = 0.5
-"""Logarithms by which a level is changed at most. Where pieces do not fit each other, their gradients contradict."""
-HELD, KNOWN = 1e-4, 1.0
-"""Weight of a piece's own level beside that of one gradient: borders reach about a hundred pixels into a hole, but
-hardly where a pattern tells what is hidden (`Plan.told`): there the level is known better than the border knows it."""
+
+@dataclass(frozen=True)
+class BlendSettings:
+    """How levels follow the hole's borders; logarithms of radiance, tuned by eye on six photos."""
+
+    floor: float = 0.05  # radiance added before the logarithm; below it levels change by a sum, not by a factor
+    alike: float = 0.25  # largest step to what is known beside a piece; more: other things set the level, too
+    most: float = 0.5  # largest change of a level; more: pieces that do not fit each other turn dark or bright
+    held: float = 1e-4  # weight of a piece's own level beside one gradient; less: borders reach farther in
+    exact: float = 1.0  # the same where a symmetric plane gives the level, which the border knows less well
 
 
-def seamless(plan: Plan, radiance: Array) -> Array:
+def seamless(plan: Plan, radiance: Array, settings: BlendSettings = BlendSettings()) -> Array:
     """Radiance or albedo [H, W, C] with the plan's hole filled by its pieces, their levels as the hole's borders say.
 
     Gradients are those of logarithms, so that light changes a pattern as a factor. None is kept where two surfaces
     meet. float32, the rest as it was.
     """
     hole = plan.hole
-    values = np.log(np.maximum(np.asarray(radiance, np.float64), 0) + LEAST)
+    values = np.log(np.maximum(np.asarray(radiance, np.float64), 0) + settings.floor)
     filled = plan.fill(values).astype(np.float64)
     where = np.full(hole.shape, -1)
     where[plan.rows, plan.columns] = plan.source
     where[~hole] = -1
-    pairs = [_pairs(plan, values, filled, where, along) for along in (0, 1)]
+    pairs = [_pairs(plan, values, filled, where, along, settings.alike) for along in (0, 1)]
     first, second, step = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
-    held = np.full(hole.shape, HELD)
-    held[plan.rows[: plan.told], plan.columns[: plan.told]] = KNOWN
+    held = np.full(hole.shape, settings.held)
+    held[plan.rows[: plan.exact], plan.columns[: plan.exact]] = settings.exact
     solved = _solved(hole, filled, held[hole], first, second, step)
-    off = np.clip(solved - filled[hole], -MOST, MOST)
+    off = np.clip(solved - filled[hole], -settings.most, settings.most)
     out = np.asarray(radiance, np.float32).copy()
-    out[hole] = np.maximum(np.exp(filled[hole] + off) - LEAST, 0)
+    out[hole] = np.maximum(np.exp(filled[hole] + off) - settings.floor, 0)
     return out
 
 
-def _pairs(plan: Plan, values: Array, filled: Array, where: Array, along: int) -> tuple[Array, Array, Array]:
+def _pairs(
+    plan: Plan, values: Array, filled: Array, where: Array, along: int, alike: float
+) -> tuple[Array, Array, Array]:
     """Neighbours of which one at least is in the hole: row-major first [N] and second [N], and second - first [N, C].
 
-    `where` [H, W]: the source of each pixel of the hole, -1 elsewhere; `along`: the axis.
+    `where` [H, W]: the source of each pixel of the hole, -1 elsewhere; `along`: the axis; `alike`: of `BlendSettings`.
     """
     hole, width = plan.hole.ravel(), plan.hole.shape[1]
     label = np.zeros(hole.size, int) if plan.label is None else plan.label.ravel()
@@ -76,8 +79,8 @@ def _pairs(plan: Plan, values: Array, filled: Array, where: Array, along: int) -
         expected = np.where(sound[:, None], flat[beside], own[here])
         off = np.where(hole[here] & ~hole[there], np.abs(expected - flat[there]).max(-1), off)
     step = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own[second] - own[first])
-    alike = (off <= ALIKE) | (label[first] <= THING)  # of one thing, whatever it looks like
-    return first[alike], second[alike], step[alike]
+    same = off <= alike  # what differs more is another thing, and says nothing about the level
+    return first[same], second[same], step[same]
 
 
 def _solved(hole: Array, filled: Array, held: Array, first: Array, second: Array, step: Array) -> Array:

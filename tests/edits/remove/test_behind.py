@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays
-from materialist.edits.remove.behind import LOOSE, SKY, THING, behind
+from materialist.edits.remove.behind import LOOSE, SKY, behind
 from materialist.types import Camera
 
 CAMERA = Camera(80, 60, 45.0)
@@ -103,34 +103,3 @@ def test_the_face_of_a_box_beside_the_hole_ends_there_a_picture_around_it_goes_o
     found = behind(depth, normal, np.where(hole, -1, plane), hole, np.where(hole, 2.0, 0), Camera(100, 80, 40.0))
     assert (found.label[hole] == (0 if beside else 1)).mean() > 0.9
     np.testing.assert_allclose(np.median(found.depth[hole]), 4.0 if beside else 3.5, rtol=1e-3)
-
-
-def test_a_thing_that_was_hidden_in_part_goes_on():
-    """In its own depth, before the planes, as a surface of its own; and not where no plane is the background."""
-    depth, normal, plane = room()
-    y, x = np.mgrid[:60, :80]
-    thing, hole = np.hypot(y - 36, x - 30) < 10, disc(36, 44, 11)
-    depth, plane = np.where(thing, 1.7, depth), np.where(thing, LOOSE, plane)
-    hidden = thing & hole
-    given = np.where(hole, 1.2, depth), normal, np.where(hole, LOOSE, plane), hole, np.where(hole, 1.2, 0), CAMERA
-    without = behind(*given)
-    found = behind(*given, [(thing & ~hole, hidden)])
-    assert hidden.sum() > 40 and (found.label[thing] == THING).all()
-    np.testing.assert_allclose(found.depth[hidden], 1.7, rtol=0.01)
-    rest = hole & ~hidden
-    np.testing.assert_array_equal(found.label[rest], without.label[rest])
-    np.testing.assert_allclose(found.depth[rest], without.depth[rest], rtol=0.02)
-    nothing = behind(given[0], normal, np.full_like(plane, LOOSE), *given[3:], [(thing & ~hole, hidden)])
-    assert (nothing.label[hole] == LOOSE).all()
-
-
-def test_planes_part_where_they_are_seen_to_meet_far_from_the_hole():
-    """Things beside a hole hide where floor and wall meet near it: the line is taken from beyond them."""
-    depth, normal, plane = room()
-    y, x = np.mgrid[:60, :80]
-    hole = disc(40, 40, 10)
-    beside = ((np.abs(x - 28) < 5) & (y > 36) & (y < 50) | (np.abs(x - 52) < 5) & (y > 26) & (y < 43)) & ~hole
-    shown = np.where(beside, LOOSE, plane)
-    found = behind(depth, normal, np.where(hole, LOOSE, shown), hole, np.zeros_like(depth), CAMERA)
-    assert (plane[hole] == 1).sum() > 40
-    assert (found.label != plane)[hole].mean() < 0.05

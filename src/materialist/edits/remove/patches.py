@@ -14,23 +14,22 @@ import numpy as np
 from materialist.geometry.membrane import membrane
 from materialist.types import Array
 
-RADIUS = 3
-"""Patches reach so many pixels to each side, at the size at which they are compared."""
-FINEST = 256
-"""Longer side of the hole's surroundings at which patches are compared last; beyond, pieces keep together."""
-SMALLEST = 24
-"""Least shorter side of the picture at the first size: in a smaller one there are too few patches, and what is nowhere
-near is brought in."""
-ROUNDS = (6, 5, 4, 3, 2)
-"""Rounds of matching and averaging, coarsest size first (the last entry goes on)."""
-OTHER = 0.1
-"""Price of a patch from another surface (label), squared sRGB difference a pixel; as much again where all of it is."""
-FAR = 0.004
-"""Price of a patch from as far away as the picture is long: nearby things look alike, in perspective too."""
-STRANGE = 1e-4
-"""Weight of what a patch shows of another surface."""
-DECAY = 0.9
-"""A pixel of the hole counts by this power of its distance to what is known."""
+
+@dataclass(frozen=True)
+class PatchSettings:
+    """How patches are compared; tuned by eye on photos, and on the 19 rooms of `bench glass`."""
+
+    radius: int = 3  # pixels to each side of a patch's middle; more: larger structures are kept, fewer patches fit
+    finest: int = 256  # longest side, pixels, at which patches are compared last; beyond, pieces keep together
+    smallest: int = 24  # least shorter side, pixels, at the first size; less: patches come from farther away
+    rounds: tuple[int, ...] = (6, 5, 4, 3, 2)  # of matching and averaging, coarsest size first; the last one goes on
+    other: float = 0.1  # squared sRGB a pixel that a patch of another surface costs; as much again if all of it is
+    far: float = 0.004  # what a patch costs from as far as the picture is long; more: perspective is kept
+    decay: float = 0.9  # a hidden pixel counts by this power of its distance to what is known
+
+
+OTHER_SURFACE = 1e-4
+"""Weight of what a patch shows of another surface: only where nothing else is said."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +47,11 @@ class Plan:
     hole: Array
     """[H, W] bool"""
     reach: int = 1
-    """Pixels around a patch's middle that it speaks for."""
-    told: int = 0
-    """The first so many entries speak for their middle alone, and nothing else does there."""
+    """Pixels around a patch's middle for which the patch gives values."""
+    exact: int = 0
+    """The first so many entries give the value of their own pixel, and nothing else does there."""
     label: Array | None = None
-    """[H, W] int: surfaces; what a patch shows of another one counts only where nothing else is said."""
+    """[H, W] int: surfaces; what a patch shows of another one counts only where no other patch gives a value."""
 
     def fill(self, maps: Array) -> Array:
         """`maps` [H, W, C] with the hole filled; float32, the rest as it was."""
@@ -64,23 +63,24 @@ class Plan:
             for dx in range(-self.reach, self.reach + 1):
                 y, x = self.rows + dy, self.columns + dx
                 use = (y >= 0) & (y < height) & (x >= 0) & (x < width)
-                use[: self.told] &= dy == dx == 0
+                use[: self.exact] &= dy == dx == 0
                 # No two patches have one middle, so that this sum meets no place twice.
                 part = self.weight[use, None]
                 from_y, from_x = np.clip(row[use] + dy, 0, height - 1), np.clip(column[use] + dx, 0, width - 1)
                 if self.label is not None:
                     own = self.label[y[use], x[use]] == self.label[from_y, from_x]
-                    part = part * np.where(own, 1, STRANGE)[:, None].astype(np.float32)
+                    part = part * np.where(own, 1, OTHER_SURFACE)[:, None].astype(np.float32)
                 total[y[use], x[use]] += part * values[from_y, from_x]
                 norm[y[use], x[use]] += part
         total = np.where(self.hole[..., None] & (norm > 0), total / np.maximum(norm, 1e-12), values)
-        total[self.rows[: self.told], self.columns[: self.told]] = values[row[: self.told], column[: self.told]]
+        total[self.rows[: self.exact], self.columns[: self.exact]] = values[row[: self.exact], column[: self.exact]]
         return total
 
 
-def exemplar_plan(
-    features: Array, hole: Array, source: Array, label: Array, *, told: Array | None = None, seed: int = 0
-) -> Plan | None:
+def patch_plan(
+    features: Array, hole: Array, source: Array, label: Array, *, known: Array | None = None, seed: int = 0,
+    settings: PatchSettings = PatchSettings(),
+) -> Plan | None:  # fmt: skip
     """Find what to fill a hole with.
 
     Args:
@@ -88,61 +88,51 @@ def exemplar_plan(
         hole: [H, W] bool.
         source: [H, W] bool: what may be copied; the hole never is.
         label: [H, W] int: surfaces, known in the hole too; patches of another one are avoided.
-        told: [H, W] int row-major sources that are known already (see `regular.regular_sources`), -1 for none; patches
-            are sought for the rest of the hole, and fit to these.
+        known: [H, W] int row-major sources that are known already (see `symmetry.repeated_sources`), -1 for none;
+            patches are sought for the rest of the hole, and fit to these.
 
     Returns:
         None where there is no whole patch to copy from.
     """
-    use = np.zeros_like(hole) if told is None else hole & (told >= 0)
-    if told is None or not use.any():
-        return _by_patches(features, hole, source, label, seed)
+    exact = np.zeros_like(hole) if known is None else hole & (known >= 0)
+    if known is None or not exact.any():
+        return _matched(features, hole, source, label, seed, settings)
     filled = features.copy()
-    filled[use] = features.reshape(-1, features.shape[-1])[told[use]]
-    rows, columns = np.nonzero(use)
-    plan = Plan(rows, columns, told[use], np.ones(len(rows), np.float32), hole, told=len(rows))
-    if not (hole & ~use).any():
-        return plan
-    rest = _by_patches(filled, hole & ~use, source & ~hole, label, seed)
+    filled[exact] = features.reshape(-1, features.shape[-1])[known[exact]]
+    rest = _matched(filled, hole & ~exact, source & ~hole, label, seed, settings) if (hole & ~exact).any() else None
+    if rest is None:  # no patch fits: what is left takes the source of the nearest pixel that has one
+        from scipy.ndimage import distance_transform_edt
+
+        near = distance_transform_edt(~exact, return_distances=False, return_indices=True)
+        known, exact = np.where(hole, known[tuple(near)], -1), hole
+    rows, columns = np.nonzero(exact)
+    plan = Plan(rows, columns, known[exact], np.ones(len(rows), np.float32), hole, exact=len(rows), label=label)
     if rest is None:
-        return _nearest(told, use, hole)
-    own = ~use[rest.rows, rest.columns]
-    with_rest = lambda name: np.concatenate([getattr(plan, name), getattr(rest, name)[own]])  # noqa: E731
-    rows, columns, sources, weight = (with_rest(name) for name in ("rows", "columns", "source", "weight"))
-    return Plan(rows, columns, sources, weight, hole, told=plan.told, label=label)
+        return plan
+    own = ~exact[rest.rows, rest.columns]
+    joined = lambda name: np.concatenate([getattr(plan, name), getattr(rest, name)[own]])  # noqa: E731
+    return replace(
+        plan, rows=joined("rows"), columns=joined("columns"), source=joined("source"), weight=joined("weight")
+    )  # fmt: skip
 
 
-def _nearest(told: Array, use: Array, hole: Array) -> Plan:
-    """The plan of what is told, [H, W] sources where `use`, for a hole whose rest no patch fits: that takes the source
-    of the nearest such pixel.
-    """
-    from scipy.ndimage import distance_transform_edt
-
-    near = distance_transform_edt(~use, return_distances=False, return_indices=True)
-    rows, columns = np.nonzero(hole)
-    source = told[near[0][rows, columns], near[1][rows, columns]]
-    return Plan(rows, columns, source, np.ones(len(rows), np.float32), hole, told=len(rows))
-
-
-def _by_patches(features: Array, hole: Array, source: Array, label: Array, seed: int) -> Plan | None:
-    """`exemplar_plan` where nothing is told."""
+def _matched(
+    features: Array, hole: Array, source: Array, label: Array, seed: int, settings: PatchSettings
+) -> Plan | None:
+    """`patch_plan` where no source is known."""
     rng = np.random.default_rng(seed)
-    sizes = [1]
-    while max(hole.shape) / sizes[-1] > FINEST:
-        sizes.append(sizes[-1] * 2)
-    finest = sizes[-1]
-    levels = [finest]
-    while min(hole.shape) / levels[-1] >= 2 * SMALLEST and np.sqrt(hole.sum()) / levels[-1] > 5:
-        levels.append(levels[-1] * 2)
+    finest = 1
+    while max(hole.shape) / finest > settings.finest:
+        finest *= 2
+    factors = [finest]
+    while min(hole.shape) / factors[-1] >= 2 * settings.smallest and np.sqrt(hole.sum()) / factors[-1] > 5:
+        factors.append(factors[-1] * 2)
     found: _Match | None = None
-    for depth, factor in enumerate(reversed(levels)):
-        level = _Level(features, hole, source, label, factor)
-        if not level.candidates.size or not level.targets.size:  # a thin hole is none in a small picture
-            continue
-        found = level.match(found, ROUNDS[min(depth, len(ROUNDS) - 1)], rng)
-    if found is None:
-        return None
-    return replace(_enlarged(found, hole, finest), label=label)
+    for number, factor in enumerate(reversed(factors)):
+        level = _Level(features, hole, source, label, factor, settings)
+        if level.candidates.size and level.targets.size:  # a thin hole is none in a small picture
+            found = level.match(found, settings.rounds[min(number, len(settings.rounds) - 1)], rng)
+    return None if found is None else replace(_enlarged(found, hole, finest), label=label)
 
 
 @dataclass(frozen=True)
@@ -164,9 +154,9 @@ class _Match:
 class _Level:
     """The problem at one size."""
 
-    def __init__(self, features: Array, hole: Array, source: Array, label: Array, factor: int):
+    def __init__(self, features: Array, hole: Array, source: Array, label: Array, factor: int, settings: PatchSettings):
         known = _shrunk((~hole)[..., None].astype(np.float32), factor)[..., 0]
-        self.factor, self.hole = factor, known < 0.5
+        self.factor, self.hole, self.settings = factor, known < 0.5, settings
         weighted = _shrunk(np.where(hole[..., None], 0, features).astype(np.float32), factor)
         self.features = weighted / np.maximum(known, 1e-6)[..., None]
         self.shape = self.hole.shape
@@ -174,7 +164,7 @@ class _Level:
         self.label = label[rows[:, None], columns[None]]
         allowed = (_shrunk((source & ~hole)[..., None].astype(np.float32), factor)[..., 0] > 0.99) & ~self.hole
         height, width = self.shape
-        r = self.radius = min(RADIUS, (min(height, width) - 1) // 4)
+        r = self.radius = min(settings.radius, (min(height, width) - 1) // 4)
         whole = _eroded(allowed, r)
         whole[:r], whole[height - r :], whole[:, :r], whole[:, width - r :] = False, False, False, False
         self.whole = whole
@@ -197,7 +187,7 @@ class _Level:
         from scipy.ndimage import distance_transform_edt
 
         away = distance_transform_edt(self.hole) if not self.hole.all() else np.ones(self.shape)
-        return np.maximum(DECAY**away, 0.02).astype(np.float32).ravel()
+        return np.maximum(self.settings.decay**away, 0.02).astype(np.float32).ravel()
 
     def match(self, before: _Match | None, rounds: int, rng: np.random.Generator) -> _Match:
         """Alternate matching and averaging; starts from the next coarser size."""
@@ -224,10 +214,10 @@ class _Level:
         square = ((self._patch - other) ** 2).mean(-1)
         width = self.shape[1]
         far = np.hypot(source // width - self.rows, source % width - self.columns) / max(self.shape)
-        cost = (square * trust).sum(-1) / trust.sum(-1) + FAR * far.astype(np.float32)
+        cost = (square * trust).sum(-1) / trust.sum(-1) + self.settings.far * far.astype(np.float32)
         if self.several:
             strange = self.surface[source[:, None] + self.around] != self.surfaces
-            cost += OTHER * (strange.mean(-1, dtype=np.float32) + strange[:, strange.shape[1] // 2])
+            cost += self.settings.other * (strange.mean(-1, dtype=np.float32) + strange[:, strange.shape[1] // 2])
         return cost
 
     def _searched(self, best: Array, cost: Array, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from materialist.edits.composite import upsample
-from materialist.edits.remove.exemplar import Plan
-from materialist.edits.remove.filled import outline, with_hole
+from materialist.edits.remove.native import outline, with_hole
+from materialist.edits.remove.patches import Plan
 from materialist.types import Camera, Photo
 
 
@@ -27,19 +27,6 @@ def test_the_outline_is_smooth_and_thin_holes_are_kept():
     lines = np.zeros((40, 40), bool)
     lines[10], lines[20:22] = True, True
     assert outline(lines, (320, 320))[84].all() and outline(lines, (320, 320))[168].all(), "thin ones are kept"
-
-
-def test_slanted_outlines_have_no_stairs_on_either_side():
-    """Every border of a slanted hole is as smooth as the others."""
-    rows, columns = np.mgrid[:60, :60]
-    mask = (np.abs(columns - 30 - 0.3 * (rows - 30)) < 12) & (np.abs(rows - 30) < 20)
-    share = outline(mask, (480, 480))
-    y, x = np.mgrid[:480, :480] + 0.5
-    across = x / 8 - 30.5 - 0.3 * (y / 8 - 30.5)
-    middle = np.abs(y / 8 - 30) < 14
-    for side in (across < 0, across > 0):
-        rim = (share > 0.3) & (share < 0.7) & side & middle
-        assert rim.sum() > 200 and across[rim].std() < 0.25
 
 
 def test_surfaces_part_along_smooth_lines_in_the_hole():

@@ -1,0 +1,83 @@
+"""Backgrounds and inpainters: what they show is seen where the object was."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene
+
+from materialist.edits.composite.composite import composite
+from materialist.edits.remove.remove import remove
+from materialist.errors import InputError
+
+MASK = block_mask(36, 48)
+
+
+def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
+    from materialist.io.exr import write_exr
+
+    scene = rendered_scene()
+    hdr = replace(scene, photo=replace(scene.photo, hdr=True, stops=7))
+    write_exr(tmp_path / "behind.exr", scene.photo.original / 128)
+    plain = remove(scene, block_mask(36, 48), background=scene.photo.linear)
+    told = remove(hdr, block_mask(36, 48), background=tmp_path / "behind.exr")
+    np.testing.assert_array_equal(told.photo.linear, plain.photo.linear)
+
+
+def test_a_true_background_is_what_is_seen():
+    scene = rendered_scene()
+    y, x = np.mgrid[:36, :48]
+    truth = np.stack([0.2 + 0.2 * (x % 6 < 3), 0.3 + 0.1 * (y % 8 < 4), 0.25 + 0 * x], -1).astype(np.float32)
+    removed = remove(scene, MASK, background=truth)
+    np.testing.assert_allclose(removed.photo.linear[MASK], truth[MASK], rtol=1e-5)
+    picture = composite(scene, removed, spp=48, denoise=False)
+    assert np.sqrt(((picture - truth) ** 2)[MASK].mean()) < 0.04
+
+
+def test_a_background_in_one_place_changes_no_other():
+    """What is filled from its surroundings keeps their light, whatever is given elsewhere."""
+    scene = rendered_scene()
+    other = np.zeros((36, 48), bool)
+    other[4:9, 38:44] = True
+    first = remove(scene, MASK)
+    alone, patches, given = (
+        composite(scene, edited, spp=16, denoise=False)
+        for edited in (first, remove(first, other), remove(first, other, background=0.5 * scene.photo.linear))
+    )
+    near = np.abs(patches - alone)[MASK].mean()  # another scene has other noise
+    assert np.abs(given - alone)[MASK].mean() < 2 * near + 1e-3
+    assert np.abs(given - patches)[other].mean() > 0.05
+
+
+def test_what_is_odd_about_a_background_is_told(tmp_path):
+    from PIL import Image
+
+    picture = np.full((36, 48, 4), 120, np.uint8)
+    picture[:, 20:, 3] = 0
+    Image.fromarray(picture).save(tmp_path / "cut.png")
+    (note,) = remove(flat_scene(), MASK, background=tmp_path / "cut.png").report.warnings
+    assert "cut.png" in note and "white" in note
+
+
+def test_options_out_of_range_and_backgrounds_of_another_aspect():
+    scene = flat_scene()
+    for options, message in (
+        ({"grow": -1}, "rim is -1"), ({"shadow": np.nan}, "shadow is nan"),
+        ({"background": np.ones((20, 20, 3))}, "same proportions"),
+        ({"background": -np.ones((36, 48, 3))}, "negative"),
+        ({"background": np.ones((36, 48, 3)), "inpaint": lambda photo, hole: photo}, "not both"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=message):
+            remove(scene, MASK, **options)
+
+
+def test_an_inpainter_gets_the_photo_and_the_hole():
+    scene, seen = flat_scene(), []
+
+    def paint(photo, hole):
+        seen.append(hole)
+        return np.where(hole[..., None], 0.4, photo)
+
+    removed = remove(rendered_scene(), MASK, inpaint=paint)
+    assert seen[0].shape == scene.depth.shape
+    np.testing.assert_allclose(removed.photo.linear[MASK], 0.4)

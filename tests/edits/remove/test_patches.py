@@ -1,0 +1,196 @@
+"""Filling by patches: what repeats is found again, other surfaces are left alone, and levels follow the border."""
+
+import numpy as np
+import pytest
+
+from materialist.edits.remove.filling import filling_plan
+from materialist.edits.remove.patches import Plan, patch_plan
+from materialist.edits.remove.seamless import BlendSettings, seamless
+from materialist.types import Camera
+
+SHAPE = (40, 80)
+HOLE = np.zeros(SHAPE, bool)
+HOLE[12:28, 20:40] = True
+
+
+def stripes(height=72, width=96, period=8):
+    x = np.arange(width) + 0 * np.arange(height)[:, None]
+    one = ((x // (period // 2)) % 2).astype(np.float32)
+    return np.stack([0.2 + 0.6 * one, 0.5 - 0.3 * one, 0.3 + 0 * one], -1)
+
+
+def hole_in(shape, top=24, left=30, height=20, width=24):
+    hole = np.zeros(shape, bool)
+    hole[top : top + height, left : left + width] = True
+    return hole
+
+
+def test_stripes_go_on_through_the_hole():
+    picture = stripes()
+    hole = hole_in(picture.shape[:2])
+    broken = np.where(hole[..., None], 0.9, picture)
+    everywhere, one = np.ones_like(hole), np.zeros(hole.shape, int)
+    plan = patch_plan(broken, hole, everywhere, one, seed=1)
+    found = plan.fill(broken)
+    np.testing.assert_array_equal(found[~hole], broken[~hole].astype(np.float32))
+    assert np.abs(found - picture)[hole].mean() < 0.05  # the mean colour alone is 0.26 off
+    other = plan.fill(np.arange(hole.size, dtype=np.float32).reshape(*hole.shape, 1))
+    assert not np.isin(other[hole], np.flatnonzero(hole)).all(), "other maps come from the same places"
+
+
+def test_nothing_is_copied_from_another_surface():
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0.4, 0.6, (64, 80, 3)).astype(np.float32)
+    label = np.zeros((64, 80), int)
+    label[:, 40:] = 1
+    picture[..., 0] = np.where(label, 0.1, 0.9)
+    hole = hole_in(label.shape, 20, 28, 22, 26)
+    plan = patch_plan(np.where(hole[..., None], 0.5, picture), hole, np.ones_like(hole), label)
+    red = plan.fill(picture)[..., 0]
+    deep = hole & (np.abs(np.arange(80) - 39.5) > 3)
+    assert np.abs(red - picture[..., 0])[deep].max() < 0.1
+
+
+def test_the_same_seed_gives_the_same_plan_and_no_source_gives_none():
+    picture, hole = stripes(), hole_in((72, 96))
+    one = np.zeros(hole.shape, int)
+    a, b = (patch_plan(picture, hole, np.ones_like(hole), one, seed=3) for _ in range(2))
+    np.testing.assert_array_equal(a.source, b.source)
+    assert patch_plan(picture, hole, np.zeros_like(hole), one) is None
+
+
+def test_large_pictures_are_matched_small_and_keep_their_pieces():
+    picture = np.tile(stripes(64, 80, 16), (5, 5, 1))  # above the finest size at which patches are compared
+    hole = hole_in(picture.shape[:2], 120, 150, 60, 70)
+    plan = patch_plan(np.where(hole[..., None], 0, picture), hole, np.ones_like(hole), np.zeros(hole.shape, int))
+    found = plan.fill(np.where(hole[..., None], 0, picture))
+    assert np.abs(found - picture)[hole].mean() < 0.1
+
+
+def test_a_slanting_border_of_surfaces_stays_where_it_is():
+    """A patch across the border is only right where both have it in the same place."""
+    rows, columns = np.indices((72, 96))
+    label = (rows > 40 - columns / 12).astype(int)
+    wall = np.where(((rows + columns) % 10 < 4)[..., None], [0.3, 0.4, 0.6], [0.7, 0.7, 0.9])
+    hole = (np.abs(columns - 46) < 0.45 * (rows - 10)) & (rows < 62)
+    strange = []
+    for seed in range(3):  # the search is by chance
+        rng = np.random.default_rng(seed)
+        dots = np.zeros((72, 96), bool)
+        dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
+        floor = np.where(dots[..., None], [0.9, 0.9, 0.3], [0.4, 0.05, 0.1])
+        picture = np.where(label[..., None] == 1, floor, wall).astype(np.float32)
+        plan = patch_plan(np.where(hole[..., None], 0.5, picture), hole, ~hole, label, seed=seed)
+        blue = plan.fill(picture)[..., 2]
+        # The wall's paler blue on the floor, the floor's red on the wall.
+        strange.append(((label == 1) & (blue > 0.55) | (label == 0) & (blue < 0.3))[hole].mean())
+    assert max(strange) < 0.004, strange
+
+
+@pytest.mark.parametrize("width", [1, 4])
+@pytest.mark.parametrize("left", [31, 201])
+def test_a_thin_hole_is_filled(width, left):
+    """A pole is none at a quarter of the size."""
+    picture = np.tile(stripes(200, 512, 40).mean(1, keepdims=True), (1, 512, 1)) + 0.1
+    picture[100:] = [0.2, 0.5, 0.4]
+    hole = hole_in(picture.shape[:2], 30, left, 150, width)
+    broken = np.where(hole[..., None], 0.9, picture)
+    plan = patch_plan(broken, hole, np.ones_like(hole), np.zeros(hole.shape, int))
+    if plan is not None:  # the caller has a membrane for where nothing can be copied
+        np.testing.assert_allclose(plan.fill(broken), picture, atol=0.1)
+
+
+def test_what_no_patch_fits_takes_what_is_next_to_it():
+    """A pattern tells all of a hole but a line."""
+    picture = stripes(200, 512)
+    hole = hole_in(picture.shape[:2], 60, 200, 80, 41)
+    told = np.full(hole.shape, -1)
+    rows, columns = np.nonzero(hole)
+    told[rows, columns] = rows * 512 + columns - 80
+    told[60:140, 220] = -1
+    plan = patch_plan(np.where(hole[..., None], 0.9, picture), hole, np.ones_like(hole), 0 * told, known=told)
+    found = plan.fill(np.where(hole[..., None], 0.9, picture))
+    others = hole & (np.arange(512) != 220)
+    np.testing.assert_allclose(found[others], picture[others], atol=1e-6)
+    assert found[hole].max() < 0.85, "nothing of the object is left"
+
+
+def test_parts_of_a_plane_that_do_not_reach_the_hole_are_other_surfaces():
+    """A strip behind the wall has the wall's label by accident, and is not copied."""
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0.4, 0.6, (64, 80, 3)).astype(np.float32)
+    label = np.zeros((64, 80), int)
+    label[:, 50:56] = 1
+    picture[:, 50:] = [0.9, 0.1, 0.1]
+    hole = hole_in(label.shape, 20, 26, 22, 20)
+    plan = filling_plan(picture, picture, hole, label, np.full(label.shape, 2.0), Camera(80, 64, 40.0))
+    assert np.abs(plan.fill(picture)[hole] - 0.5).max() < 0.15
+
+
+def plan_from(shift, label=None, hole=HOLE):
+    """Every pixel of the hole takes what is `shift` (rows, columns) away."""
+    rows, columns = np.nonzero(hole)
+    source = (rows + shift[0]) * hole.shape[1] + columns + shift[1]
+    return Plan(rows, columns, source, np.ones(len(rows), np.float32), hole, reach=0, label=label)
+
+
+def colours(picture):
+    return np.repeat(np.asarray(picture, float)[..., None], 3, -1)
+
+
+def test_flat_pieces_take_the_level_of_the_border():
+    picture = np.full(SHAPE, 0.6)
+    picture[:, 41:] = 0.5
+    found = seamless(plan_from((0, 22)), colours(picture))  # its pieces are 0.5
+    np.testing.assert_allclose(found[HOLE], 0.6, atol=0.01)
+    np.testing.assert_array_equal(found[~HOLE], colours(picture).astype(np.float32)[~HOLE])
+
+
+def test_light_that_falls_off_is_a_factor_of_the_pattern():
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    light = np.exp(-0.01 * x - 0.005 * y)
+    truth = colours(light * np.where((x // 2 + y // 2) % 2, 0.8, 0.4) - BlendSettings().floor)
+    plan = plan_from((0, 20))
+    plain, found = plan.fill(truth), seamless(plan, truth)
+    error = lambda v: np.sqrt(((v - truth)[HOLE] ** 2).mean())  # noqa: E731
+    assert error(plain) > 0.05 and error(found) < 0.1 * error(plain)
+
+
+def test_levels_do_not_cross_from_surface_to_surface():
+    picture = np.full(SHAPE, 0.5)
+    picture[:20], label = 0.55, np.zeros(SHAPE, int)
+    label[:20] = 1
+    picture[:, 41:] = 0.5  # what both halves are made of
+    found = seamless(plan_from((0, 22), label), colours(picture))
+    np.testing.assert_allclose(found[HOLE & (label == 1)], 0.55, atol=0.01)
+    np.testing.assert_allclose(found[HOLE & (label == 0)], 0.5, atol=1e-3)
+
+
+def test_another_thing_beside_the_hole_gives_no_level():
+    picture = np.full(SHAPE, 0.5)
+    picture[10:30, 15:20] = 0.05  # a dark post at its left
+    found = seamless(plan_from((0, 20)), colours(picture))
+    np.testing.assert_allclose(found[HOLE], 0.5, atol=1e-3)
+
+
+@pytest.mark.parametrize("place", [np.s_[:10, :10], np.s_[30:, 50:], np.s_[:, 25:35]])
+def test_holes_at_the_frame_are_solved_too(place):
+    rng = np.random.default_rng(0)
+    picture = rng.uniform(0, 1, (*SHAPE, 3))
+    hole = np.zeros(SHAPE, bool)
+    hole[place] = True
+    plan = patch_plan(picture, hole, np.ones(SHAPE, bool), np.zeros(SHAPE, int))
+    found = seamless(plan, picture)
+    assert np.isfinite(found).all() and (found >= 0).all() and found[hole].max() < 3
+
+
+def test_pieces_that_contradict_each_other_stay_near_their_own_levels():
+    """Sources at random over a picture of harsh steps: gradients that belong to no picture."""
+    rng = np.random.default_rng(1)
+    picture = np.where(rng.random((*SHAPE, 1)) < 0.5, 0.0, 50.0) * np.ones(3)
+    rows, columns = np.nonzero(HOLE)
+    known = np.flatnonzero(~HOLE)
+    plan = Plan(rows, columns, rng.choice(known, len(rows)), np.ones(len(rows), np.float32), HOLE, reach=0)
+    found, plain = seamless(plan, picture), plan.fill(picture)
+    off = np.abs(np.log(found + BlendSettings().floor) - np.log(plain + BlendSettings().floor))
+    assert off.max() <= BlendSettings().most + 1e-4 and off[HOLE].max() > 0.3

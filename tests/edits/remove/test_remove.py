@@ -1,0 +1,138 @@
+"""Objects taken away: maps, depth and photo continue, and the composite shows it."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
+from scipy import ndimage
+
+from materialist.edits.composite.composite import composite
+from materialist.edits.remove.remove import remove
+from materialist.errors import InputError
+
+MASK = block_mask(36, 48)
+
+
+def far_from(mask, pixels):
+    import cv2
+
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, np.uint8)) == 0
+
+
+def test_the_wall_goes_on_behind_the_block():
+    scene = flat_scene()
+    removed = remove(scene, MASK)
+    np.testing.assert_allclose(removed.depth[MASK], 3.0, rtol=1e-3)
+    wall = scene.materials.albedo[far_from(MASK, 2)]
+    assert np.abs(removed.materials.albedo[MASK].mean(0) - wall.mean(0)).max() < 0.03
+    assert np.abs(removed.photo.linear[MASK].mean(0) - wall.mean(0)).max() < 0.05
+    outside = far_from(MASK, 2)
+    for old, new in ((scene.depth, removed.depth), (scene.materials.albedo, removed.materials.albedo),
+                     (scene.photo.original, removed.photo.original)):  # fmt: skip
+        np.testing.assert_array_equal(new[outside], old[outside])
+    assert removed.geometry.mesh.vertices[:, 2].max() < -2.9, "the block's surface is gone from the mesh"
+    assert removed.provenance["edits"][-1]["kind"] == "remove"
+
+
+def test_the_native_photo_is_filled_with_native_detail():
+    scene = flat_scene(native=3)
+    removed = remove(scene, MASK)
+    native = np.kron(MASK, np.ones((3, 3), bool))
+    filled, wall = removed.photo.original[native], scene.photo.original[np.kron(far_from(MASK, 3), np.ones((3, 3)) > 0)]
+    assert np.abs(filled.mean(0) - wall.mean(0)).max() < 0.05
+    fine = removed.photo.original - np.kron(removed.photo.linear, np.ones((3, 3, 1)))
+    assert fine[native].std() > 0.3 * fine[~native].std()
+
+
+def test_the_composite_shows_the_wall_and_keeps_the_rest():
+    scene = rendered_scene()
+    removed = remove(scene, MASK)
+    picture = composite(scene, removed, spp=48, denoise=False)
+    wall = scene.photo.linear[far_from(MASK, 4)].mean(0)
+    assert np.abs(picture[MASK].mean(0) / wall - 1).max() < 0.08
+    far = far_from(MASK, 8)
+    same = (picture == scene.photo.original).all(-1)
+    assert same[far].mean() > 0.5 and np.abs(picture - scene.photo.original)[far].max() < 0.1
+
+
+def test_what_was_put_before_it_stays_whole():
+    """A mask that lies on a thing before the object takes nothing of the thing away, nor copies it."""
+    from materialist.edits.composite.composite import developed
+    from materialist.edits.core.renderer import EditRenderer
+
+    scene = rendered_scene(3)
+    red = replace(scene, bodies=(tetrahedron(),))
+    saved = developed(scene, red, composite(scene, red, spp=16))
+    studio, size = EditRenderer(saved), saved.photo.original.shape[:2]
+    here, there = studio.body_coverage(saved), studio.body_coverage_in(saved, size, (0, size[0], 0, size[1]))
+    mask = block_mask(36, 48)
+    mask |= (here > 0) & (np.arange(48) < np.median(np.nonzero(here)[1]))
+    assert (here[mask] == 1).sum() > 10
+    gone = remove(saved, mask, shadow=0)
+    np.testing.assert_array_equal(gone.photo.linear[here == 1], saved.photo.linear[here == 1])
+    np.testing.assert_array_equal(gone.photo.original[there == 1], saved.photo.original[there == 1])
+    out = composite(saved, gone, spp=16)
+    assert np.abs(out - saved.photo.original)[there == 1].max() < 0.06
+    red_here = lambda picture: picture[..., 0] > 2 * picture[..., 1]  # noqa: E731
+    assert not (red_here(out) & ~red_here(saved.photo.original) & (there == 0)).any(), "nor is it copied"
+
+
+@pytest.mark.parametrize(
+    ("mask", "message"),
+    [
+        (np.zeros((36, 48), bool), "empty"),
+        (np.ones((36, 48), bool), "covers 100% of what"),
+        (np.ones((10, 10), bool), "the photo at working size"),
+    ],
+)
+def test_masks_that_cannot_be_removed(mask, message):
+    with pytest.raises(InputError, match=message):
+        remove(flat_scene(), mask)
+
+
+def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
+    scene = flat_scene(sky=12)
+    mask = np.zeros((36, 48), bool)
+    mask[8:30, :14] = True
+    mask[16:22, 4:8] = False
+    mask[30:34, 40:46] = True
+    removed = remove(scene, mask)
+    assert np.isfinite(removed.depth).all() and np.isfinite(removed.photo.original).all()
+    assert (removed.depth[mask & (np.arange(36)[:, None] > 18)] > 1.99).all()
+    only_sky_behind = replace(scene, depth=np.where(mask, scene.depth, 0))
+    with pytest.raises(InputError, match="around the mask is sky"):
+        remove(only_sky_behind, mask)
+
+
+def test_a_wall_ends_without_the_object_where_it_ended_with_it():
+    from materialist.geometry.build import build_geometry
+    from materialist.geometry.completion import walls_of
+    from materialist.geometry.planes import find_planes
+
+    scene = flat_scene()
+    (wall, *_) = walls_of(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
+    ends = replace(wall.usual, up=wall.seen.up + 4.0)
+    completed = build_geometry(scene.depth, scene.normal, scene.camera, ends=[ends])
+    provenance = {**scene.provenance, "completion": "planes", "ends": [asdict(ends)]}
+    empty = remove(replace(scene, geometry=completed, provenance=provenance), MASK)
+    assert float(empty.geometry.mesh.vertices[:, 1].max()) == pytest.approx(ends.up, abs=0.2)
+    usual = remove(replace(scene, geometry=completed, provenance={**provenance, "ends": []}), MASK)
+    assert float(usual.geometry.mesh.vertices[:, 1].max()) < ends.up - 1
+
+
+def test_what_was_removed_leaves_no_ghost_of_its_pattern():
+    """The composite of a patterned block that goes is the filled photo."""
+    scene = rendered_scene()
+    mask = block_mask(36, 48)
+    pattern = np.where((np.indices(mask.shape).sum(0) % 6 < 3)[..., None], 0.05, 0.9).astype(np.float32)
+    albedo = np.where(mask[..., None], pattern, scene.materials.albedo).astype(np.float32)
+    linear = np.where(mask[..., None], 0.6 * pattern, scene.photo.linear).astype(np.float32)
+    scene = replace(
+        scene, materials=replace(scene.materials, albedo=albedo),
+        photo=replace(scene.photo, linear=linear, original=linear),
+    )  # fmt: skip
+    gone = remove(scene, mask, shadow=0)
+    out = composite(scene, gone, spp=32)
+    inner = ndimage.binary_erosion(mask, iterations=2)
+    np.testing.assert_allclose(out[inner], gone.photo.original[inner], atol=0.03)
