@@ -23,6 +23,6 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
     base = np.full_like(grey.linear, 0.6)
     edited = np.where(inside[..., None] > 0, 5, 0.3).astype(np.float32)  # all in shade, but for the body
-    layers = Layers(base, edited, everywhere, changed, edited, native=NativeLayer(inside, share, 0 * grey.original))
+    layers = Layers(base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original))
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
