@@ -74,7 +74,7 @@ def test_a_slanting_border_of_surfaces_stays_where_it_is():
     wall = np.where(((rows + columns) % 10 < 4)[..., None], [0.3, 0.4, 0.6], [0.7, 0.7, 0.9])
     hole = (np.abs(columns - 46) < 0.45 * (rows - 10)) & (rows < 62)
     strange = []
-    for seed in range(3):  # the search is by chance
+    for seed in range(8):  # the search is by chance
         rng = np.random.default_rng(seed)
         dots = np.zeros((72, 96), bool)
         dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
@@ -84,7 +84,7 @@ def test_a_slanting_border_of_surfaces_stays_where_it_is():
         blue = plan.fill(picture)[..., 2]
         # The wall's paler blue on the floor, the floor's red on the wall.
         strange.append(((label == 1) & (blue > 0.55) | (label == 0) & (blue < 0.3))[hole].mean())
-    assert max(strange) < 0.004, strange
+    assert np.mean(strange) < 0.0018 and max(strange) < 0.003, strange
 
 
 @pytest.mark.parametrize("width", [1, 4])

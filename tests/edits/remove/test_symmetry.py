@@ -122,17 +122,17 @@ def test_shadows_beside_the_hole_are_not_copied():
     seen = np.where(shadow[..., None], 0.5 * picture, picture)
     found = sources(np.where(HOLE[..., None], 0.9, seen), depth)
     told = found >= 0
-    assert told[HOLE].mean() > 0.95 and shadow.ravel()[found[told]].mean() < 0.03
+    assert told[HOLE].mean() > 0.97 and shadow.ravel()[found[told]].mean() < 0.03
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
 def test_a_large_tile_that_is_seen_three_times_goes_on(seed):
     """A hidden place has one or two repeats in the picture, a known one hardly more."""
     depth, picture = slanted(wallpaper(seed))
     torn = np.where(HOLE[..., None], 0.5, picture)
     found = sources(torn, depth)
     told = found >= 0
-    assert told[HOLE].mean() > 0.6
+    assert told[HOLE].mean() > 0.7
     error = np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean()
     assert error < 0.5 * np.abs(picture[told] - np.median(picture, (0, 1))).mean()
 
