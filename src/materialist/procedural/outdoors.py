@@ -10,7 +10,7 @@ from materialist.procedural.objects import solids as s
 from materialist.procedural.objects import street_things as street
 from materialist.procedural.objects import things
 from materialist.procedural.objects.parts import Parts, block, placed
-from materialist.procedural.objects.shapes import Solid, grid_faces, smooth_normals
+from materialist.procedural.objects.shapes import Solid, grid_faces
 from materialist.procedural.objects.things import Meshes
 from materialist.procedural.world import ScenePart, World, look, look_down
 
@@ -141,7 +141,7 @@ def _land(rng, meshes) -> Parts:
     p, far = np.stack([x, 0 * x, z], -1), np.clip((np.hypot(x, z - 4) - 4) / 25, 0, 1)
     y = hills(p) * far**1.5 + bumps(p) * np.clip(far * 4, 0, 1)
     flat, faces = np.stack([x, y, z], -1).reshape(-1, 3), grid_faces(n, n, flip=True)
-    parts = [ScenePart(Solid(flat, faces, smooth_normals(flat, faces), flat[:, [0, 2]]), m.ground(rng))]
+    parts = [ScenePart(Solid(flat, faces, s.smooth_normals(flat, faces), flat[:, [0, 2]]), m.ground(rng))]
     if rng.random() < 0.5:
         parts.append(ScenePart(s.sheet((-1.5, 0.01, 12), (rng.uniform(1, 3), 0, 0), (0, 0, -14)), m.ground(rng)))
     for _ in range(int(rng.integers(4, 16))):

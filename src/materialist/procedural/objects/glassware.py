@@ -216,7 +216,7 @@ def _figure(rng: np.random.Generator) -> tuple[Solid, bool]:
             limb = solids.moved(solids.ball(24), turn=rng.uniform(0, 3), tip=rng.uniform(0, 3))
             parts.append(replace(limb, vertices=limb.vertices * extent + at * [side, 1, 1]))
     body = solids.joined(parts)
-    return replace(body, normals=shapes.smooth_normals(body.vertices, body.faces)), False
+    return replace(body, normals=solids.smooth_normals(body.vertices, body.faces)), False
 
 
 def _creature(rng: np.random.Generator) -> tuple[Solid, bool]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from materialist.procedural.objects import shapes, solids
+from materialist.procedural.objects import solids
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
@@ -83,7 +83,7 @@ def surface(field: Field, low: Array, high: Array, points: int = POINTS) -> Soli
     vertices = low + (index + within) * (high - low) / cells
     a, b, c, d = corner.reshape(-1, 4).T
     faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).astype(np.int32)
-    return Solid(vertices, faces, shapes.smooth_normals(vertices, faces), vertices[:, :2].copy())
+    return Solid(vertices, faces, solids.smooth_normals(vertices, faces), vertices[:, :2].copy())
 
 
 def _bounds(field: Field) -> tuple[Array, Array]:

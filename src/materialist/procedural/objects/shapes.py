@@ -112,7 +112,7 @@ def load(path: Path) -> Solid:
     faces = np.array(params["faces"], np.int32).reshape(-1, 3)
     low, high = vertices.min(0), vertices.max(0)
     vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (high - low).max()
-    normals = smooth_normals(vertices, faces)
+    normals = _smooth_normals(vertices, faces)
     # Each face gets corners of its own, so that the texture can close around the axis without a seam.
     corners = vertices[faces]  # [F, 3, 3]
     u = np.arctan2(corners[..., 2], corners[..., 0]) / (2 * np.pi) + 0.5
@@ -135,10 +135,10 @@ def _grid(points: Array) -> Solid:
     n, m = points.shape[:2]
     faces = grid_faces(n, m)
     vertices = points.reshape(-1, 3).astype(np.float64)
-    area = np.linalg.norm(_face_normals(vertices, faces), axis=-1)
+    area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
     faces = faces[area > 1e-12]  # the triangles at poles that have no area
     u, v = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n))
-    return Solid(vertices, faces, smooth_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2))
+    return Solid(vertices, faces, _smooth_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2))
 
 
 def grid_faces(n: int, m: int, flip: bool = False) -> Array:
@@ -149,22 +149,22 @@ def grid_faces(n: int, m: int, flip: bool = False) -> Array:
     return (faces[:, ::-1] if flip else faces).astype(np.int32)
 
 
-def _face_normals(vertices: Array, faces: Array) -> Array:
+def face_normals(vertices: Array, faces: Array) -> Array:
     """[F, 3] normals of triangles, of length twice their area."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
 
-def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -> Array:
-    """[V, 3] area-weighted unit normals, shared by the vertices that lie at one of `places` [V, 3].
+def _smooth_normals(vertices: Array, faces: Array) -> Array:
+    """[V, 3] area-weighted unit normals, shared by vertices at one place (seams and poles stay invisible)."""
+    scale = np.ptp(vertices, axis=0).max()
+    _, place = np.unique(np.round(vertices / scale * 1e6).astype(np.int64), axis=0, return_inverse=True)
+    flat, corners = np.tile(face_normals(vertices, faces), (3, 1)), place.reshape(-1)[faces].T.ravel()
+    return vertex_normals(corners, flat)[place.reshape(-1)]
 
-    Seams and poles stay invisible: `places` are the vertices themselves by default.
-    """
-    places = vertices if places is None else places
-    scale = max(float(np.ptp(places, axis=0).max()), 1e-9)
-    keys = np.round(places / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
-    _, place = np.unique(keys, return_inverse=True)
-    flat, corners = np.tile(_face_normals(vertices, faces), (3, 1)), place[faces].T.ravel()
-    total = np.stack([np.bincount(corners, flat[:, k], place.max() + 1) for k in range(3)], -1)
+
+def vertex_normals(corners: Array, normals: Array) -> Array:
+    """[N, 3] unit sums of the normals [C, 3] of faces at their corners [C], which are numbers of places."""
+    total = np.stack([np.bincount(corners, normals[:, k]) for k in range(3)], -1)
     length = np.linalg.norm(total, axis=-1, keepdims=True)
-    return np.where(length > 0, total / np.maximum(length, 1e-30), [0, 1, 0])[place]
+    return np.where(length > 0, total / np.maximum(length, 1e-30), [0, 1, 0])
