@@ -249,7 +249,7 @@ def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
     script = (
         "import sys, time\nimport numpy as np\nimport typer\n"
         "from materialist.cli.outcome import run_to_exit_code\n"
-        "from materialist.edits.light.frames import write_frames\n"
+        "from materialist.io.video import write_frames\n"
         "app = typer.Typer()\n"
         "def pictures():\n    yield np.full((16, 16, 3), 0.5, np.float32)\n"
         "    sys.stderr.write('writing\\n'); sys.stderr.flush(); time.sleep(30)\n"

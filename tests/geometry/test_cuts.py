@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from geometry_scenes import plane_depth, room, sphere_depth
+from geometry_scenes import plane_depth, sphere_depth
 from scipy import ndimage
 
 from materialist.geometry.cuts import find_cuts
@@ -62,16 +62,6 @@ def test_the_criterion_switches_at_tau(tau):
         cuts = find_cuts(depth, camera, tau)
         assert cuts.cut_x[15, 19] == cut
         assert cuts.cut_x.sum() == (30 if cut else 0) and not cuts.cut_y.any()
-
-
-def test_the_far_edge_of_a_grazing_box_top_is_cut():
-    camera = Camera(128, 96, 60.0)  # seen at 3 degrees, four rows high, with a wall 2 behind it
-    depth, normal, label = room(camera)
-    cuts = find_cuts(depth, camera, 6.0)
-    top = (label == 2) & (normal[..., 1] > 0.5)
-    edge = top[1:] & (label[:-1] == 1)
-    assert edge.any() and cuts.cut_y[edge].all()
-    assert cuts.link_y[top[1:] & top[:-1]].all()
 
 
 def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
