@@ -1,9 +1,9 @@
 """The pages name what exists: commands and options, functions, tests, files."""
 
 import ast
-import inspect
 import re
 import shlex
+from dataclasses import fields
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -71,9 +71,12 @@ def _parsed(words, whole):
             return
         raise AssertionError(f"{name} {' '.join(words)}: {error}") from error
     if name == "materialist bench":
-        taken = inspect.signature(import_module(f"materialist.bench.{context.params['name']}").run).parameters
-        unknown = set(parse_extra(context.args)) - {*taken, "force"}
+        unknown = set(parse_extra(context.args)) - {*_bench_options(context.params["name"]), "data", "force"}
         assert not unknown, f"{name} {context.params['name']} does not take {unknown}"
+
+
+def _bench_options(name):
+    return [field.name for field in fields(getattr(import_module(f"materialist.bench.{name}"), BENCHMARKS[name]))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_page_id)
@@ -109,8 +112,7 @@ def _options():
         found.update(name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts))
         waiting.extend(getattr(command, "commands", {}).values())
     for name in BENCHMARKS:
-        taken = inspect.signature(import_module(f"materialist.bench.{name}").run).parameters
-        found.update(f"--{parameter.replace('_', '-')}" for parameter in taken)
+        found.update(f"--{option.replace('_', '-')}" for option in _bench_options(name))
     return found
 
 
