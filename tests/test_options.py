@@ -52,7 +52,7 @@ def test_texts_mean_what_the_values_do(tmp_path):
         (Glass, {"ior": 0.9}, "The index of refraction is 0.9; it must lie in [1, 3] (water 1.33"),
         (Glass, {"tint": "#88ccf"}, "The tint '#88ccf' must look like"),
         (Glass, {"hollow": "maybe"}, "The hollow must be true or false, or open, not 'maybe'."),
-        (Glass, {"model": "thin"}, "The model is 'thin'; choose one of 'closed', 'two-interface'."),
+        (Glass, {"model": "thin"}, "The model is 'thin'; choose one of closed, two-interface."),
         (Removal, {"seed": -2}, "The seed is -2; it must lie in [0, 2147483647]."),
         (Removal, {"seed": 1.5}, "The seed is 1.5; give a whole number."),
         (Removal, {"shadow": "yes"}, "The shadow must be a number, or auto, not 'yes'."),

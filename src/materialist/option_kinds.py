@@ -240,7 +240,8 @@ def _switch(declared: Option, called: str, value: Any) -> bool | str:
 
 
 def _word(declared: Option, called: str, value: Any) -> str:
-    raise InputError(f"The {called} is '{value}'; choose one of {', '.join(map(repr, declared.choices))}.")
+    known = ", ".join(repr(word) if "," in word else word for word in declared.choices)
+    raise InputError(f"The {called} is '{value}'; choose one of {known}.")
 
 
 def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
@@ -277,5 +278,6 @@ _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
     "lamp": _lamp,
     "file": _anything,
     "any": _anything,
+    "name": lambda declared, called, value: value if callable(value) else str(value),
 }
 """Kind of an option -> (option, its name in messages, value) -> checked value."""

@@ -53,7 +53,7 @@ class Removal(OperationOptions):
         None, "The same view without the object, in place of inpainting.", kind="file", metavar="PNG")
     """[h, w, 3] linear at working or native size and the exposure of the photo, or a file of the photo's aspect."""
     inpaint: str | Callable[[Array, Array], Array] | None = option(
-        None, "A diffusion model: a folder, or owner/name.", kind="any", metavar="sd:MODEL")
+        None, "A diffusion model: a folder, or owner/name.", kind="name", metavar="sd:MODEL")
     """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
     shadow: float | None = option(
         None,

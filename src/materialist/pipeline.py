@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from hashlib import sha256
 from pathlib import Path
@@ -16,138 +16,94 @@ from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.photo import HDR_CLIP
+from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
 
 if TYPE_CHECKING:
     from materialist.fit.invert import FitResult
 
-STRATEGIES = ("default", "white-light-first")
-ENGINES = ("transport", "path")
 SMALL = 0.05
 """Least median depth for which the path tracer's offsets are small."""
 
 
 def invert(
-    photo: str | Path | Photo,
-    *,
-    predictor: str = "auto",
-    albedo: str | None = None,
-    roughness: str | None = None,
-    metallic: str | None = None,
-    normal: str | None = None,
-    depth: str | None = None,
-    engine: str = "transport",
-    preset: str = "default",
-    fov: float | str | None = "auto",
-    size: int = 512,
-    envmap_size: tuple[int, int] = (512, 256),
-    completion: str = "auto",
-    tau: float = 6.0,
-    mask: Array | None = None,
-    strategy: str = "default",
-    seed: int = 0,
-    device: str = "auto",
-    progress=None,
-    **overrides: Any,
-) -> Scene:
+    photo: str | Path | Photo, options: InvertOptions | None = None, *,
+    progress: Callable[[str, int, int], Any] | None = None, on_stage: Callable[[str, Any], Any] | None = None,
+    **values: Any,
+) -> Scene:  # fmt: skip
     """Decompose a photograph into geometry, materials and light.
 
     Args:
         photo: a file, `example:NAME`, or a Photo already read.
-        predictor: `auto`, `bundled`, `matnet`, `maps:DIR`, ...; see docs/predictors.md.
-        albedo, roughness, metallic, normal, depth: another predictor for this map alone.
-        engine: `transport` (cached transport) or `path` (Mitsuba PRB, as the paper).
-        preset: `default` or `paper`; the path engine always follows the paper.
-        fov: horizontal field of view in degrees, or `auto`: from the predictor of the depth where it knows one
-            (MoGe), else from EXIF, else 35.
-        size: longer side of the working image, pixels; a Photo keeps the size that it was read at.
-        envmap_size: (width, height) of the environment map; width = 2 * height.
-        completion: `planes` continues dominant planes beyond what the photo shows, `floors` ends walls at the frame,
-            `none` adds nothing; `planes,backs` and `floors,backs` are accepted for `planes` and `floors`. `auto` is
-            `planes` with walls that end where light explains the photo best.
-        tau: grazing angle of the boundary duplication, degrees.
-        mask: [H, W] bool at working size: roughness and metallic take one value inside.
-        strategy: `default`, or `white-light-first` (paper, Material Editing Settings).
-        seed: equal seeds give equal scenes on one machine.
+        options, values: see `options.InvertOptions`; `values` are fields of it, as in `invert(photo, size=256)`.
         progress: called as progress(stage, done, total).
-        overrides: `settings=FitSettings(...)` replaces the preset; `prior=Prediction(...)` replaces the predictor;
-            `spp=N` sets the samples of the final re-rendering; `found(name, value)` is called with "prior" (a
-            Prediction), "light" ([h, 2h, 3]) and "materials" as soon as each is there.
+        on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
+            soon as each is there.
 
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
     start = time.perf_counter()
-    check_overrides(overrides)
-    preset = "paper" if engine == "path" else preset
-    tick = progress or (lambda *_: None)
-    found = overrides.get("found") or (lambda *_: None)
-    _check(engine, strategy, completion, envmap_size, seed)
+    wanted = InvertOptions.given(options, **values)
+    preset = "paper" if wanted.engine == "path" else wanted.preset
+    tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
     tick("read", 0, 1)
-    picture = _read(photo, size=size, fov=fov)
+    picture = _read(photo, size=wanted.size, fov=wanted.fov)
+    mask = _mask(wanted.mask, picture)
     tick("predict", 0, 1)
-    stages: list[dict] = []
-    prior = overrides.get("prior")
-    if prior is None:
-        parts = {"albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal, "depth": depth}
-        source = _predictor(predictor, parts, device)
-        picture = _seen_by(source, picture)
-        begun = time.perf_counter()
-        prior = _predict(picture, source, seed)
-        stages.append({"name": "predict", "seconds": round(time.perf_counter() - begun, 3)})
-    _check_mask(mask, picture)
+    picture, prior, stages = _prior(picture, wanted)
     if mask is not None and not (mask & (prior.depth > 0)).any():
         raise InputError("The mask lies wholly where there is no surface (sky); mark an object.")
-    found("prior", prior)
+    tell("prior", prior)
 
     from materialist.render.variant import setup
 
-    setup(device)
+    setup(wanted.device)
     from materialist.fit.invert import AUTO, FULL, FitSetup, Inversion
     from materialist.fit.settings import preset as named
     from materialist.geometry.build import SYNONYMS
 
-    settings = overrides.get("settings") or named(preset, hdr=picture.hdr)
-    if engine == "path" and (settings.corrections or settings.materials.second_metallic is not None):
+    settings = wanted.settings or named(preset, hdr=picture.hdr)
+    if wanted.engine == "path" and (settings.corrections or settings.materials.second_metallic is not None):
         raise InputError(
             "The path engine fits as the paper does; give it settings with corrections=0 and second_metallic=None."
         )
-    chosen = FULL if completion == AUTO and preset == "paper" else SYNONYMS.get(completion, completion)
+    completion = SYNONYMS.get(wanted.completion, wanted.completion)
     fit_setup = FitSetup(
-        picture, prior, settings, chosen, engine, envmap_height=envmap_size[1], tau=tau, mask=mask, strategy=strategy,
-        seed=seed, device=device, spp=overrides.get("spp"),
+        picture, prior, settings, FULL if completion == AUTO and preset == "paper" else completion, wanted.engine,
+        envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
+        device=wanted.device, spp=wanted.spp,
     )  # fmt: skip
-    best = Inversion(fit_setup, progress=progress, found=found).run()
+    best = Inversion(fit_setup, progress=progress, found=tell).run()
     prepared = best.prepared
     report = _report(picture, prior, best, (*stages, *best.stages), prepared.notes, start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
         depth=prior.depth, geometry=prepared.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
-            "predictor": prior.predictor, "sources": prior.sources, "engine": engine, "preset": preset,
-            "completion": prepared.completion, "completion_asked": completion,
-            "ends": [asdict(e) for e in prepared.ends],
-            "tau": tau, "strategy": strategy, "mask": _named(mask),
-            "settings": asdict(settings) if overrides.get("settings") else None,
-            "seed": seed, "spp": best.spp, "size": size,
-            "envmap_size": list(envmap_size), "fov": picture.camera.fov, "fov_source": picture.fov_source,
+            "predictor": prior.predictor, "sources": prior.sources, "engine": wanted.engine, "preset": preset,
+            "completion": prepared.completion, "completion_asked": wanted.completion,
+            "ends": [asdict(e) for e in prepared.ends], "tau": wanted.tau, "strategy": wanted.strategy,
+            "mask": _named(mask), "settings": asdict(settings) if wanted.settings else None, "seed": wanted.seed,
+            "spp": best.spp, "size": wanted.size, "envmap_size": list(wanted.envmap_size), "fov": picture.camera.fov,
+            "fov_source": picture.fov_source,
         },
     )  # fmt: skip
 
 
-OVERRIDES = ("settings", "prior", "spp", "found")
-"""Further keywords of `invert`."""
+def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction, tuple[dict, ...]]:
+    """(the photo as the predictor sees it, the prior, what the report says of it)."""
+    if wanted.prior is not None:
+        return picture, wanted.prior, ()
+    from materialist.predict import get_predictor
 
-
-def check_overrides(given: Iterable[str]) -> None:
-    """Raises InputError for a keyword that `invert` does not know: a misspelt one would change nothing."""
-    import inspect
-
-    known = [name for name in inspect.signature(invert).parameters if name not in ("photo", "overrides", "progress")]
-    unknown = [name for name in given if name not in (*known, *OVERRIDES)]
-    if unknown:
-        raise InputError(f"invert has no option '{unknown[0]}'; it takes {', '.join([*known, *OVERRIDES])}.")
+    parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
+    source = get_predictor(wanted.predictor, device=wanted.device, **parts)
+    picture = _seen_by(source, picture)
+    start = time.perf_counter()
+    prior = _predict(picture, source, wanted.seed)
+    return picture, prior, ({"name": "predict", "seconds": round(time.perf_counter() - start, 3)},)
 
 
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
@@ -231,12 +187,6 @@ def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> P
     return read_photo(photo, size=size, fov=fov)
 
 
-def _predictor(spec: str, parts: dict[str, str | None], device: str):
-    from materialist.predict import get_predictor
-
-    return get_predictor(spec, device=device, **parts)
-
-
 def _seen_by(source, picture: Photo) -> Photo:
     """The photo with the field of view of the predictor whose depth is used, unless the caller chose one."""
     angle = getattr(source, "field_of_view", None)
@@ -262,35 +212,22 @@ def _predict(picture: Photo, source, seed: int) -> Prediction:
     return prediction
 
 
-def _check(engine: str, strategy: str, completion: str, envmap_size: tuple[int, int], seed: int) -> None:
-    if engine not in ENGINES:
-        raise InputError(f"Engine is '{engine}'; choose one of {', '.join(ENGINES)}.")
-    if strategy not in STRATEGIES:
-        raise InputError(f"Strategy is '{strategy}'; choose one of {', '.join(STRATEGIES)}.")
-    from materialist.geometry.build import COMPLETIONS, SYNONYMS
+def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
+    """[H, W] bool of an array or a file. Raises InputError for one of another size or type, or empty."""
+    if given is None:
+        return None
+    shape = picture.linear.shape[:2]
+    if isinstance(given, str | Path):
+        from materialist.io.image import read_mask
 
-    if completion not in ("auto", *COMPLETIONS, *SYNONYMS):
-        raise InputError(f"Completion is '{completion}'; choose one of 'auto', {', '.join(map(repr, COMPLETIONS))}.")
-    width, height = envmap_size
-    if width != 2 * height or not 8 <= height <= 4096:
-        raise InputError(
-            f"Envmap size is {width}x{height}; the width must be twice the height, and the height 8 to 4096."
-        )
-    if not 0 <= seed < 2**31:
-        raise InputError(f"Seed is {seed}; give 0 to {2**31 - 1}.")
-
-
-def _check_mask(mask: Array | None, picture: Photo) -> None:
-    if mask is None:
-        return
-    if mask.shape != picture.linear.shape[:2]:
-        raise InputError(
-            f"Mask is {mask.shape}, the photo at working size is {picture.linear.shape[:2]} (rows, columns)."
-        )
-    if mask.dtype != bool:
-        raise InputError(f"Mask holds {mask.dtype}; give truth values, for example mask > 0.5.")
-    if not mask.any():
+        given = read_mask(given, shape, picture.original.shape[:2])
+    if given.shape != shape:
+        raise InputError(f"Mask is {given.shape}, the photo at working size is {shape} (rows, columns).")
+    if given.dtype != bool:
+        raise InputError(f"Mask holds {given.dtype}; give truth values, for example mask > 0.5.")
+    if not given.any():
         raise InputError("The mask is empty; mark at least one pixel.")
+    return given
 
 
 __all__ = ["invert", "render_scene"]

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from made_pipeline import install
 from PIL import Image
 
 from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.package import load_scene, save_scene
+from materialist.option_kinds import declarations
+from materialist.options import Drop, Glass, InvertOptions, Relight
 
 
 @pytest.fixture
@@ -24,66 +26,28 @@ def photo(tmp_path):
     return tmp_path / "photo.png"
 
 
-@pytest.fixture
-def run(capsys):
-    """Run a command line; returns (exit code, stdout, stderr)."""
-
-    def call(*arguments):
-        code = run_to_exit_code(app, [str(argument) for argument in arguments])
-        shown = capsys.readouterr()
-        return code, shown.out, shown.err
-
-    return call
-
-
 def test_invert_passes_every_option_on_and_writes_the_scene(run, photo, tmp_path, monkeypatch):
     calls = install(monkeypatch)
-    mask = tmp_path / "mask.png"
-    Image.fromarray(np.pad(np.full((8, 8), 255, np.uint8), ((8, 16), (10, 30)))).save(mask)
     place = tmp_path / "a.scene"
     options = "--predictor maps:x --engine path --preset paper --fov 50 --size 24 --envmap-size 64x32 --completion none"
-    more = f"--tau 8 --mask {mask} --strategy white-light-first --seed 7 --device cpu"
+    more = "--tau 8 --mask mask.png --strategy white-light-first --seed 7 --device cpu"
     code, out, err = run("invert", photo, "-o", place, *options.split(), *more.split())
     assert code == 0, err
     (call,) = calls
-    given, region, progress = call.pop("photo"), call.pop("mask"), call.pop("progress")
-    assert call == {
-        "predictor": "maps:x",
-        "engine": "path",
-        "preset": "paper",
-        "fov": "50",
-        "size": 24,
-        "envmap_size": (64, 32),
-        "completion": "none",
-        "tau": 8.0,
-        "strategy": "white-light-first",
-        "seed": 7,
-        "device": "cpu",
-    }
-    assert given.camera.fov == 50 and given.linear.shape == (16, 24, 3) and callable(progress)
-    assert region.shape == (16, 24) and region.dtype == bool and region[4:8, 5:9].all() and region.sum() == 16
+    assert call["options"] == InvertOptions(
+        predictor="maps:x", engine="path", preset="paper", fov=50, size=24, envmap_size=(64, 32), completion="none",
+        tau=8, mask=Path("mask.png"), strategy="white-light-first", seed=7, device="cpu",
+    )  # fmt: skip
+    given = call["photo"]
+    assert given.camera.fov == 50 and given.linear.shape == (16, 24, 3) and callable(call["progress"])
     assert load_scene(place).camera == given.camera
     assert str(place / "overview.png") in out
 
 
-def test_invert_defaults_are_the_contract(run, photo, tmp_path, monkeypatch):
+def test_defaults_of_the_command_line_are_those_of_python(run, photo, tmp_path, monkeypatch):
     calls = install(monkeypatch)
     assert run("invert", photo, "-o", tmp_path / "a.scene")[0] == 0
-    defaults = {key: calls[0][key] for key in calls[0] if key not in ("photo", "progress")}
-    assert defaults == {
-        "predictor": "auto",
-        "engine": "transport",
-        "preset": "default",
-        "fov": "auto",
-        "size": 512,
-        "envmap_size": (512, 256),
-        "completion": "auto",
-        "tau": 6.0,
-        "mask": None,
-        "strategy": "default",
-        "seed": 0,
-        "device": "auto",
-    }
+    assert calls[0]["options"] == InvertOptions()
 
 
 def test_json_success_is_the_last_line(run, photo, tmp_path, monkeypatch):
@@ -146,7 +110,6 @@ def test_exit_codes(run, photo, tmp_path, monkeypatch, failure, code):
         (["invert", "PHOTO", "-o", "OUT", "--envmap-size", "512"], "512x256"),
         (["invert", "PHOTO", "-o", "OUT", "--envmap-size", "512x512"], "twice as wide"),
         (["invert", "PHOTO", "-o", "OUT", "--tau", "90"], "tau"),
-        (["invert", "PHOTO", "-o", "OUT", "--mask", "none.png"], "none.png"),
         (["invert", "nothing.jpg", "-o", "OUT"], "nothing.jpg"),
         (["invert", "PHOTO", "-o", "PHOTO"], "--force"),
         (["invert", "PHOTO", "-o", "PHOTO", "--force"], "not a scene package"),
@@ -187,24 +150,16 @@ def test_bench_dispatches_with_extra_options(run, tmp_path, monkeypatch):
     assert seen == {**expected, "size": 64, "rate": 0.5}
 
 
-@pytest.mark.parametrize("command", [[], ["invert"], ["render"], ["doctor"], ["bench"]])
-def test_help_of_every_command(run, command):
-    code, out, _ = run(*command, "--help")
+@pytest.mark.parametrize(
+    ("command", "kind"), [("invert", InvertOptions), ("glass", Glass), ("relight", Relight), ("drop", Drop)]
+)
+def test_help_names_a_flag_for_every_option(run, command, kind):
+    code, out, _ = run(command, "--help")
     assert code == 0 and "Usage: materialist" in out
-    if command == ["invert"]:
-        for option in (
-            "--predictor",
-            "--engine",
-            "--fov",
-            "--size",
-            "--envmap-size",
-            "--preset",
-            "--completion",
-            "--mask",
-        ):
-            assert option in out
-        for option in ("--strategy", "--seed", "--device", "--json", "--force"):
-            assert option in out
+    flags = {
+        flag for name, (told, _) in declarations(kind).items() if told.flag is not None for flag in told.spells(name)
+    }
+    assert all(flag in out for flag in flags | {"--seed", "--device", "--json", "--force"})
 
 
 def test_version(run):
@@ -231,7 +186,7 @@ def test_an_interrupt_from_the_keyboard_is_130_and_leaves_nothing(photo, tmp_pat
         "import materialist\n"
         "from materialist.cli import app\nfrom materialist.cli.outcome import run_to_exit_code\n"
         "pipeline = types.ModuleType('materialist.pipeline')\n"
-        "def invert(photo, **options):\n    sys.stderr.write('fitting\\n'); sys.stderr.flush(); time.sleep(30)\n"
+        "def invert(photo, *_, **options):\n    sys.stderr.write('fitting\\n'); sys.stderr.flush(); time.sleep(30)\n"
         "pipeline.invert = invert\nsys.modules['materialist.pipeline'] = pipeline\nmaterialist.pipeline = pipeline\n"
         f"sys.exit(run_to_exit_code(app, ['invert', {str(photo)!r}, '-o', {str(tmp_path / 'a.scene')!r}]))"
     )

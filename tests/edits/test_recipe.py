@@ -10,6 +10,7 @@ from materialist.edits.material.material import edit
 from materialist.edits.recipe import apply, glass_arguments, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
+from materialist.options import Glass
 
 SCENE = flat_scene()
 MASK = block_mask(36, 48)
@@ -74,7 +75,7 @@ def test_click_box_and_sun(folder):
         ("- paint: {}", "is 'paint'; it must be one of edit,"),
         ("- glass: {mask: block.png, hollow: maybe}", "hollow must be true or false, or open, not 'maybe'"),
         ("- glass: {mask: block.png, tint: '#88ccf'}", "The tint '#88ccf' must look like"),
-        ("- glass: {mask: block.png, thickness: gone.exr}", "There is no file"),
+        ("- glass: {mask: block.png, thickness: gone.exr}", "gone.exr"),
         ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
         ("- edit: {mask: block.png, shininess: 1}", "shininess"),
         ("- edit: {mask: block.png, hue: blue}", "hue"),
@@ -106,8 +107,8 @@ def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
     import materialist.edits.recipe as recipe
 
     asked = []
-    monkeypatch.setattr(recipe, "remove", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
-    monkeypatch.setattr(recipe, "glass", lambda scene, *_, **options: asked.append(options["seed"]) or scene)
+    monkeypatch.setattr(recipe, "remove", lambda scene, *given, fitted: asked.append(given[-1].seed) or scene)
+    monkeypatch.setattr(recipe, "glass", lambda scene, *given, fitted: asked.append(given[-1].seed) or scene)
     monkeypatch.setattr(recipe, "settle", lambda scene, *given: asked.append(given[-1].seed) or scene)
     (folder / "edits.yaml").write_text(
         "- remove: {mask: block.png}\n- remove: {mask: block.png, seed: 4}\n- glass: {mask: block.png}\n"
@@ -122,8 +123,9 @@ def test_tints_are_spelled_as_on_the_command_line(folder):
         glass_arguments(SCENE, read_step(folder, f"- glass: {{mask: block.png, hollow: yes, tint: {tint}}}"))[1]
         for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
     )
-    assert one["hollow"] is True and other == {"hollow": True, "seed": 0, "tint": pytest.approx(one["tint"], abs=1e-6)}
-    assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1]["hollow"] == "open"
+    assert one.hollow is True and other == Glass(hollow=True, tint=other.tint)
+    assert other.tint == pytest.approx(one.tint, abs=1e-6)
+    assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1].hollow == "open"
 
 
 def read_step(folder, text):

@@ -6,25 +6,7 @@ import sys
 
 import typer
 
-from materialist.cli import (
-    apply,
-    batch,
-    bench,
-    doctor,
-    drop,
-    edit,
-    export,
-    glass,
-    insert,
-    invert,
-    models,
-    relight,
-    remove,
-    render,
-    select,
-    studio,
-    train,
-)
+from materialist.cli import batch, bench, edits, films, scenes, setup, studio, train
 from materialist.cli.outcome import run_to_exit_code
 
 app = typer.Typer(
@@ -35,25 +17,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (
-    invert,
-    render,
-    doctor,
-    models,
-    bench,
-    train,
-    export,
-    select,
-    edit,
-    relight,
-    glass,
-    remove,
-    insert,
-    drop,
-    apply,
-    batch,
-    studio,
-):
+for module in (scenes, setup, bench, train, edits, films, batch, studio):
     module.register(app)
 
 

@@ -1,15 +1,15 @@
-"""Options that several commands share, and the values they may take."""
+"""Flags that several commands share, and groups of them."""
 
 from __future__ import annotations
 
-import re
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from materialist.errors import InputError
+from materialist.options import InvertOptions
 
 
 class Device(StrEnum):
@@ -18,38 +18,6 @@ class Device(StrEnum):
     auto = "auto"
     cpu = "cpu"
     cuda = "cuda"
-
-
-class Engine(StrEnum):
-    """How the fit renders."""
-
-    transport = "transport"
-    path = "path"
-
-
-class Preset(StrEnum):
-    """Which schedule the fit follows."""
-
-    default = "default"
-    paper = "paper"
-
-
-class Completion(StrEnum):
-    """How what the picture does not show is continued."""
-
-    auto = "auto"
-    planes = "planes"
-    floors = "floors"
-    none = "none"
-    planes_backs = "planes,backs"
-    floors_backs = "floors,backs"
-
-
-class Strategy(StrEnum):
-    """The paper's per-image strategies."""
-
-    default = "default"
-    white_light_first = "white-light-first"
 
 
 class Method(StrEnum):
@@ -65,7 +33,11 @@ def output_option(metavar: str, help: str) -> Any:
     return typer.Option("-o", "--output", metavar=metavar, help=help)
 
 
-# Every command.
+def help_of(name: str) -> str:
+    """The help of an option of `invert`, for other commands that take it."""
+    return str(InvertOptions.__dataclass_fields__[name].metadata["option"].help)
+
+
 Seed = Annotated[
     int,
     typer.Option(min=0, max=2**31 - 1, help="Random seed: the same seed on the same machine gives the same result."),
@@ -73,66 +45,80 @@ Seed = Annotated[
 DeviceOption = Annotated[Device, typer.Option(help="Where to compute; auto takes the GPU when there is one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace the output when it exists.")]
-
-# A photo, or a scene.
-FieldOfView = Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")]
-WorkingSize = Annotated[int, typer.Option(help="Working size: longer side, pixels.")]
+FieldOfView = Annotated[str, typer.Option(help=help_of("fov"))]
+WorkingSize = Annotated[int, typer.Option(help=help_of("size"))]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
-
-# A region of the photo.
-Clicks = Annotated[
-    list[str] | None,
-    typer.Option("--click", metavar="X,Y", help="A pixel of the object, at working size; more than one helps."),
-]
-Box = Annotated[str | None, typer.Option("--box", metavar="X0,Y0,X1,Y1", help="A box around the object.")]
-MaskFile = Annotated[Path | None, typer.Option("--mask", metavar="PNG", help="The region: white inside.")]
-With = Annotated[
-    Method, typer.Option("--with", help="network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights.")
-]
-
-# What was behind it.
-Background = Annotated[
-    Path | None, typer.Option(metavar="PNG", help="The same view without the object, in place of inpainting.")
-]
-Inpainter = Annotated[
-    str | None, typer.Option("--inpaint", metavar="sd:MODEL", help="A diffusion model: a folder, or owner/name.")
-]
-Shadow = Annotated[
-    str,
-    typer.Option(
-        metavar="auto|S",
-        help="Fill its shadow and reflection on the ground, too: where they are found, or by this share of its size.",
-    ),
-]
-
-# A mesh that joins the scene.
-MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
-MeshMaterial = Annotated[str, typer.Option(help="as-is, glass, mirror, R,G,B (linear) or #rrggbb.")]
-
-# An edited picture, or a film of them.
 PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
-Spp = Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")]
-Denoise = Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")]
-FullRender = Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")]
-Save = Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")]
 FramesPerSecond = Annotated[int, typer.Option(help="Frames per second.")]
 
-# Training.
-ResumeRun = Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")]
-Steps = Annotated[int | None, typer.Option(help="Train this many steps more.")]
-Batch = Annotated[int, typer.Option(help="Samples a step.")]
-Rate = Annotated[float, typer.Option(help="Peak learning rate.")]
-Bfloat16 = Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")]
-Minutes = Annotated[float | None, typer.Option(help="Train this many minutes more.")]
-CheckpointSeconds = Annotated[float, typer.Option(help="Seconds between checkpoints.")]
+
+@dataclass(frozen=True)
+class Run:
+    """What every command that writes a result takes."""
+
+    seed: Seed = 0
+    device: DeviceOption = Device.auto
+    as_json: Json = False
+    force: Force = False
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """An envmap size such as 512x256 as (width, height). Raises InputError unless it is 2:1 and at least 16x8."""
-    match = re.fullmatch(r"(\d+)\s*[xX×]\s*(\d+)", text.strip())
-    if match is None:
-        raise InputError(f"The envmap size must look like 512x256, not {text!r}.")
-    width, height = int(match[1]), int(match[2])
-    if width != 2 * height or not 8 <= height <= 4096:
-        raise InputError(f"The envmap must be twice as wide as high, from 16x8 to 8192x4096, not {width}x{height}.")
-    return width, height
+@dataclass(frozen=True)
+class Place:
+    """A region of the photo."""
+
+    mask: Annotated[Path | None, typer.Option("--mask", metavar="PNG", help="The region: white inside.")] = None
+    click: Annotated[
+        list[str] | None,
+        typer.Option("--click", metavar="X,Y", help="A pixel of the object, at working size; more than one helps."),
+    ] = None
+    box: Annotated[str | None, typer.Option("--box", metavar="X0,Y0,X1,Y1", help="A box around the object.")] = None
+
+    @property
+    def named(self) -> list[str]:
+        """The flags that were given."""
+        return [f"--{name}" for name in ("click", "box", "mask") if getattr(self, name)]
+
+
+@dataclass(frozen=True)
+class Region(Place):
+    """A region of the photo, found as one likes."""
+
+    method: Annotated[
+        Method,
+        typer.Option("--with", help="network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights."),
+    ] = Method.network
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """How an edited scene becomes a picture."""
+
+    spp: Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")] = 256
+    denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")] = True
+    full_render: Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")] = False
+    save: Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")] = (
+        None
+    )
+
+
+@dataclass(frozen=True)
+class Training:
+    """How long a network is trained, and where the run goes on."""
+
+    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None
+    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False
+    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 180
+    seed: Seed = 0
+    device: DeviceOption = Device.auto
+    as_json: Json = False
+
+
+@dataclass(frozen=True)
+class Learning:
+    """How a network learns."""
+
+    batch: Annotated[int, typer.Option(help="Samples a step.")] = 16
+    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 1.5e-3
+    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False
+    init: Annotated[Path | None, typer.Option(help="Weights of an earlier run to begin from.")] = None

@@ -1,4 +1,4 @@
-"""What the editing commands share: the way from their options to a region, and from an edited scene to a file."""
+"""What the editing commands share: the way from their flags to a region, and from an edited scene to a file."""
 
 from __future__ import annotations
 
@@ -7,104 +7,68 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from materialist.cli.options import Method
+from materialist.cli.options import Method, Place, Region, Rendering, Run
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
+from materialist.option_kinds import numbers
 
 
-def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
+def flag_numbers(text: str, count: int, flag: str) -> tuple[float, ...]:
     """`count` numbers from a text such as 310,220. Raises InputError."""
     try:
-        values = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count:
-        raise InputError(f"{option} takes {count} numbers with commas between them, not {text!r}.")
-    return values
+        return numbers(text, count, flag)
+    except InputError as error:
+        raise InputError(f"{flag} takes {count} numbers with commas between them, not {text!r}.") from error
 
 
-def chosen_region(
-    scene: Any, clicks: list[str] | None, box: str | None, mask: Path | None, method: Method, device: str = "auto"
-) -> Any:
-    """[H, W] bool from the options of the command line."""
+def chosen_region(scene: Any, region: Place, run: Run) -> Any:
+    """[H, W] bool from the flags of the command line."""
     from materialist.edits.select.select import select
 
     return select(
         scene,
-        click=[numbers(click, 2, "--click") for click in clicks] if clicks else None,
-        box=numbers(box, 4, "--box") if box else None,
-        mask=mask,
-        method=method.value,
-        device=device,
+        click=[flag_numbers(click, 2, "--click") for click in region.click] if region.click else None,
+        box=flag_numbers(region.box, 4, "--box") if region.box else None,
+        mask=region.mask,
+        method=region.method if isinstance(region, Region) else Method.network,
+        device=run.device,
     )
 
 
-def chosen_inpainter(text: str | None, seed: int, device: str) -> Any:
-    """What --inpaint names, or None for patches."""
-    if text is None:
-        return None
-    from materialist.edits.remove.inpaint import inpainter
+def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | None = None) -> None:
+    """Everything about the output that can be wrong, before the work starts; `video`: frames a second of a film.
 
-    return inpainter(text, seed=seed, device=device)
-
-
-def check_paths(spp: int) -> None:
-    """Raises InputError unless two renderings of `spp` paths a pixel can be compared."""
-    if not 2 <= spp <= 1_000_000:
-        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {spp}.")
-
-
-def check_video(output: Path, fps: int, force: bool, device: str) -> None:
-    """Everything about a video that can be wrong, before the work starts; renderings are done on `device`."""
+    All renderings of the command are then done on its device, also those that ask for `auto`.
+    """
+    from materialist.io.atomic import ensure_writable
+    from materialist.io.image import ensure_image_writable
     from materialist.io.video import ensure_video_writable
 
-    if not 1 <= fps <= 120:
-        raise InputError(f"--fps is a number from 1 to 120, not {fps}.")
-    ensure_video_writable(output, force=force)
-    _choose(device)
-
-
-def check_before(
-    output: Path, save: Path | None, spp: int, force: bool, *, device: str, full_render: bool = False
-) -> None:  # fmt: skip
-    """Everything about the output that can be wrong, before the work starts; renderings are done on `device`."""
-    from materialist.io.image import ensure_image_writable
-
-    check_paths(spp)
-    check_saved(output, save, force, full_render)
-    ensure_image_writable(output, force=force)
-    _choose(device)
-
-
-def check_saved(output: Path, save: Path | None, force: bool, full_render: bool) -> None:
-    """Everything about --save that can be wrong, before the work starts."""
-    from materialist.io.atomic import ensure_writable
-
-    if save is None:
-        return
-    if full_render:
-        raise InputError(
-            "--save keeps the photograph with the edit in it, and --full-render writes the rendering alone; leave one "
-            "of them out."
-        )
-    if output.resolve().is_relative_to(save.resolve()):
-        raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
-    ensure_writable(save, force)
-
-
-def _choose(device: str) -> None:
-    """Let everything of this command render on the device, also what asks for `auto`."""
-    if device != "auto":
+    save = rendering.save
+    if not 2 <= rendering.spp <= 1_000_000:
+        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {rendering.spp}.")
+    if save is not None:
+        if rendering.full_render:
+            raise InputError(
+                "--save keeps the photograph with the edit in it, and --full-render writes the rendering alone; leave "
+                "one of them out."
+            )
+        if output.resolve().is_relative_to(save.resolve()):
+            raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
+        ensure_writable(save, run.force)
+    if video is not None and not 1 <= video <= 120:
+        raise InputError(f"--fps is a number from 1 to 120, not {video}.")
+    (ensure_image_writable if video is None else ensure_video_writable)(output, force=run.force)
+    if run.device != "auto":
         from materialist.render.variant import setup
 
-        setup(device)
+        setup(run.device)
 
 
 def write_result(
-    command: str, scene: Any, edited: Any, output: Path, *, save: Path | None, spp: int, seed: int, denoise: bool,
-    full_render: bool, device: str, as_json: bool, force: bool, lines: Sequence[str] = (), unseen: str = "",
-    **facts: Any,
+    command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = (),
+    unseen: str = "",
 ) -> None:  # fmt: skip
     """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
     from materialist.edits.composite.composite import composite, developed
@@ -113,24 +77,24 @@ def write_result(
     from materialist.edits.core.renderer import is_relit
     from materialist.io.package import save_scene
 
-    start = time.monotonic()
-    with StageProgress(quiet=as_json) as progress:
+    start, save = time.monotonic(), rendering.save
+    with StageProgress(quiet=run.as_json) as progress:
         picture = composite(
-            scene, edited, spp=spp, seed=seed, full_render=full_render, denoise=denoise, device=device,
-            progress=progress,
+            scene, edited, spp=rendering.spp, seed=run.seed, full_render=rendering.full_render,
+            denoise=rendering.denoise, device=run.device, progress=progress,
         )  # fmt: skip
-    write_composite(output, picture, scene.photo, force=force)
+    write_composite(output, picture, scene.photo, force=run.force)
     if save is not None:
-        save_scene(developed(scene, edited, picture, seed=seed, device=device), save, force=force)
+        save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
     warnings = warnings_since(scene, edited)
-    if not full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
+    if not rendering.full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
         warnings.append(f"The picture looks like the photo: nothing of the edit is to be seen. {unseen}".rstrip())
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]
     if save is not None:
         shown.append(f"The edited scene is {save}")
     report_success(
-        command, as_json, shown, image=str(output), scene=str(save) if save else None, spp=spp,
-        seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings, **facts,
+        command, run.as_json, shown, image=str(output), scene=str(save) if save else None, spp=rendering.spp,
+        seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings,
     )  # fmt: skip
 
 

@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
 import typer
 
-from materialist.cli import train_clicks, train_data, train_matnet, train_refraction
+from materialist.cli import train_data
+from materialist.cli.generate import add_command
+from materialist.cli.options import Force, Json, Learning, Training, output_option
+from materialist.cli.outcome import report_success
+from materialist.cli.progress import StageProgress
+from materialist.errors import Interrupted
+
+if TYPE_CHECKING:
+    from materialist.train.trainer import Progress
 
 train = typer.Typer(
     name="train",
@@ -13,10 +27,193 @@ train = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-for module in (train_data, train_matnet, train_refraction, train_clicks):
-    module.register(train)
+
+
+class Config(StrEnum):
+    """Which network and recipe."""
+
+    bundled = "bundled"
+    paper = "paper"
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What differs from the recipe of the network."""
+
+    config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled
+    batch: Annotated[int | None, typer.Option(help="Pictures a step, on each device; default: the recipe's.")] = None
+    size: Annotated[
+        int | None, typer.Option(help="Side of all crops, pixels; default: the recipe's, small ones first.")
+    ] = None
+    rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None
+    init: Annotated[
+        Path | None,
+        typer.Option(help="Weights to begin from; bundled: those of `train export`, paper: Depth Anything or DINOv2."),
+    ] = None
+
+
+@dataclass(frozen=True)
+class Views:
+    """The views that RefractionNet learns from."""
+
+    data: Annotated[
+        Path | None, typer.Option(help="Folder for the views, used again by later runs; default: RUN/views.")
+    ] = None
+    data_only: Annotated[bool, typer.Option("--data-only", help="Make the views, do not train.")] = False
+    shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640
+    views: Annotated[int, typer.Option(help="Views of each.")] = 24
+    heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64
 
 
 def register(app: typer.Typer) -> None:
     """Add the command group."""
+    train_data.register(train)
+    add_command(train, matnet)
+    add_command(train, export)
+    add_command(train, refraction)
+    add_command(train, clicks)
     app.add_typer(train)
+
+
+def matnet(
+    data: Annotated[
+        list[Path],
+        typer.Option(
+            help="A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
+        ),
+    ],
+    output: Annotated[Path, output_option("RUN", "Folder of the run.")],
+    recipe: Recipe,
+    training: Training = Training(every=300),  # noqa: B008
+    score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
+    workers: Annotated[int, typer.Option(help="Processes that load data, for each training process.")] = 1,
+) -> None:
+    """Train a network; several GPUs: torchrun --nproc-per-node N -m materialist train matnet ..."""
+    from materialist.io.datasets import open_sources
+    from materialist.train import bundled
+    from materialist.train import matnet as paper
+
+    make: Any
+    make, base = {
+        Config.bundled: (bundled.BundledTask, bundled.RECIPE), Config.paper: (paper.PaperTask, paper.RECIPE)
+    }[recipe.config]  # fmt: skip
+    chosen = base.changed(batch=recipe.batch, side=recipe.size, rate=recipe.rate)
+    task = lambda begin, _: make(open_sources(data), chosen, init=begin, score_samples=score_samples)  # noqa: E731
+    _train("matnet", task, output, training, init=recipe.init, workers=workers)
+
+
+def export(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run of `train matnet`.")],
+    output: Annotated[Path, output_option("FILE", "A .safetensors file.")],
+    average_with: Annotated[
+        Path | None, typer.Option(help="Exported weights, such as the run began from: the mean of both is written.")
+    ] = None,
+    as_json: Json = False,
+    force: Force = False,
+) -> None:
+    """Write the averaged weights of a run as float16 with everything needed to load them."""
+    from materialist.train.export import export_run
+
+    facts = export_run(run, output, average_with=average_with, force=force)
+    lines = [f"{output}: {facts['megabytes']:.1f} MB after {facts['step']} steps."]
+    report_success("train export", as_json, lines, output=str(output), **facts)
+
+
+def refraction(
+    output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
+    views: Views,
+    training: Training,
+    learning: Learning = Learning(batch=32, rate=2e-3),  # noqa: B008
+) -> None:
+    """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
+    from materialist.procedural.thickness.dataset import ViewPlan, produce
+
+    folder = views.data or output / "views"
+    lessons, aside = folder / "train", folder / "heldout"
+    plans = {
+        aside: ViewPlan(views.heldout, min(views.views, 8), "heldout", training.seed),
+        lessons: ViewPlan(views.shapes, views.views, "train", training.seed),
+    }
+    if views.data_only:
+        with StageProgress(quiet=training.as_json) as progress:
+            seconds = sum(produce(place, plan, progress) for place, plan in plans.items())
+        lines = [f"{views.shapes} x {views.views} views in {lessons} ({seconds:.0f} s)"]
+        report_success("train refraction", training.as_json, lines, data=str(folder), seconds=seconds)
+        return
+    from materialist.predict.refraction.network import RefractionNet
+    from materialist.train.refraction import RECIPE, RefractionTask
+
+    recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
+
+    def task(begin: Path | None, progress: Progress) -> Any:
+        if begin is not None:
+            RefractionNet.load(begin)  # views take long: refuse other weights before they are made
+        for place, plan in plans.items():
+            produce(place, plan, progress)
+        return RefractionTask(lessons, aside, recipe, init=begin)
+
+    _train("refraction", task, output, training, init=learning.init, minutes=30)
+
+
+def clicks(
+    output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
+    data: Annotated[Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")],
+    training: Training,
+    learning: Learning,
+) -> None:
+    """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
+    from materialist.train.click_views import produce
+    from materialist.train.clicks import RECIPE, ClickTask
+
+    recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
+
+    def task(begin: Path | None, progress: Progress) -> Any:
+        produce(data, output / "views", progress)
+        return ClickTask(output / "views", recipe, init=begin)
+
+    _train("clicks", task, output, training, init=learning.init, minutes=40)
+
+
+def _train(
+    kind: str, make_task: Callable[[Path | None, Progress], Any], output: Path, training: Training, *,
+    init: Path | None, minutes: float | None = None, workers: int = 0,
+) -> None:  # fmt: skip
+    """Train the task that `make_task` makes of (weights to begin from, progress), in the folder `output`.
+
+    `minutes` are those of a run that names neither steps nor minutes. Errors that make a run impossible are raised
+    before `make_task` is called, which may take long.
+    """
+    from materialist.train import checkpoint
+    from materialist.train.processes import join
+    from materialist.train.schedule import Budget
+    from materialist.train.trainer import RunOptions, Trainer
+
+    unlimited = training.steps is None and training.minutes is None
+    budget = Budget(training.steps, minutes if unlimited else training.minutes)
+    options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
+    processes = join(training.device)
+    quiet = training.as_json or not processes.first
+    note = (lambda _: None) if quiet else lambda text: typer.echo(text, err=True)
+    checkpoint.resumed(output, kind, resume=training.resume)
+    if init is not None and training.resume and checkpoint.exists(output):
+        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
+        init = None
+    try:
+        with StageProgress(quiet=quiet) as progress:
+            trainer = Trainer(
+                make_task(init, progress), output, budget=budget, options=options, processes=processes,
+                resume=training.resume, note=note,
+            )  # fmt: skip
+            scores = trainer.fit(progress)
+    finally:
+        processes.leave()
+    if not processes.first:
+        return
+    step, sheet = trainer.schedule.step, output / "sheet.png"
+    if trainer.interrupted:
+        raise Interrupted(f"Interrupted at step {step}; the same command with --resume goes on.")
+    lines = [f"{output / checkpoint.WEIGHTS}: step {step}.", *([f"Look at {sheet}"] if sheet.is_file() else [])]
+    if "of" in scores:
+        lines.insert(1, f"The figures are of {scores['of']}.")
+    facts = {"run": str(output), "step": step, "scored_on": scores.pop("of", None)}
+    report_success(f"train {kind}", training.as_json, lines, **facts, **scores)

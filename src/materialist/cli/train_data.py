@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from materialist.cli.generate import add_command
 from materialist.cli.options import Device, DeviceOption, Json, Seed, output_option
 from materialist.cli.outcome import report_success
 
@@ -19,29 +21,36 @@ class Split(StrEnum):
     heldout = "heldout"
 
 
+@dataclass(frozen=True)
+class DataSet:
+    """What a data set holds."""
+
+    count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000
+    size: Annotated[int, typer.Option(help="Pixels on a side.")] = 256
+    workers: Annotated[int, typer.Option(help="Processes that render.")] = 1
+    spp: Annotated[int, typer.Option(help="Samples per pixel, before denoising.")] = 16
+    meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None
+    envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None
+    split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train
+    only: Annotated[
+        str, typer.Option(metavar="KIND", help="Only room, table, still-life, outdoor or workshop scenes.")
+    ] = ""
+    resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("data")(data)
+    add_command(app, data)
 
 
 def data(
     output: Annotated[Path, output_option("DIR", "Folder of the data set.")],
-    count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
-    size: Annotated[int, typer.Option(help="Pixels on a side.")] = 256,
-    seed: Seed = 0,
-    workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
-    spp: Annotated[int, typer.Option(help="Samples per pixel, before denoising.")] = 16,
-    meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None,
-    envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None,
-    split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train,
-    only: Annotated[
-        str, typer.Option(metavar="KIND", help="Only room, table, still-life, outdoor or workshop scenes.")
-    ] = "",
-    resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False,
+    wanted: DataSet,
     sheet: Annotated[
         Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="With --sheet: replace PNG when it exists.")] = False,
+    seed: Seed = 0,
     device: DeviceOption = Device.auto,
     as_json: Json = False,
 ) -> None:
@@ -58,17 +67,13 @@ def data(
     from materialist.procedural.dataset import options_for, produce
 
     options = options_for(
-        size=size,
-        seed=seed,
-        spp=spp,
-        split=split.value,
-        meshes=meshes,
-        envmaps=envmaps,
-        device=device.value,
-        only=only,
-    )
+        size=wanted.size, seed=seed, spp=wanted.spp, split=wanted.split, meshes=wanted.meshes, envmaps=wanted.envmaps,
+        device=device, only=wanted.only,
+    )  # fmt: skip
     with StageProgress(quiet=as_json) as progress:
-        made = produce(output, options, count=count, workers=workers, resume=resume, progress=progress)
+        made = produce(
+            output, options, count=wanted.count, workers=wanted.workers, resume=wanted.resume, progress=progress
+        )
     lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
     report_success(
         "train data", as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,

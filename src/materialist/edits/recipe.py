@@ -8,14 +8,13 @@ from typing import Any
 
 from materialist.edits.drop.drop_rest import settle
 from materialist.edits.glass.glass import glass
-from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.remove.remove import remove
 from materialist.edits.select.select import select
 from materialist.errors import InputError, OutputError
-from materialist.option_kinds import OFF, ON, OperationOptions, declarations, numbers, parse_colour, several
+from materialist.option_kinds import OFF, ON, OperationOptions, beside, declarations, numbers, several
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 from materialist.types import Array, Scene
 
@@ -100,10 +99,8 @@ def _step(entry: Any, number: int, path: Path) -> Step:
     unknown = sorted(set(options) - {*KINDS[kind], "skip"})
     if unknown:
         raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
-    try:
-        _switch(options.get("skip", "false"), "skip")
-    except InputError as error:
-        raise InputError(f"Step {number} of {path}: {error}") from error
+    if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
+        raise InputError(f"Step {number} of {path}: The skip must be true or false, not {options['skip']!r}.")
     return Step(kind, options, path.parent)
 
 
@@ -224,60 +221,18 @@ def _places(step: Step) -> list[Any]:
     return [numbers(one, 2, "at") for one in several(step.options["at"])]
 
 
-def _seed(step: Step) -> int:
-    """The step's own seed, or that of all."""
-    seed = _number(step.options.get("seed", step.seed), "seed")
-    if not (0 <= seed < 2**31 and seed == int(seed)):
-        raise InputError(f"The seed is {seed:g}; give a whole number from 0 to {2**31 - 1}.")
-    return int(seed)
-
-
 def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return remove(edited, _left(scene, edited, region_of(scene, step)), **_removal(step), fitted=scene)
-
-
-def _removal(step: Step) -> dict[str, Any]:
-    """What a removal and glass share."""
-    given = step.options
-    options: dict[str, Any] = {"seed": _seed(step)}
-    if "grow" in given:
-        options["grow"] = _number(given["grow"], "grow")
-    if "shadow" in given:
-        options["shadow"] = given["shadow"]
-    if "background" in given:
-        options["background"] = _file(step, "background")
-    if "inpaint" in given:
-        from materialist.edits.remove.inpaint import inpainter
-
-        options["inpaint"] = inpainter(str(given["inpaint"]), seed=options["seed"], device=step.device)
-    return options
+    return remove(edited, _left(scene, edited, region_of(scene, step)), _options(step), fitted=scene)
 
 
 def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
     region, options = glass_arguments(scene, step)
-    return glass(edited, _left(scene, edited, region), **options, fitted=scene)
+    return glass(edited, _left(scene, edited, region), options, fitted=scene)
 
 
-def glass_arguments(scene: Scene, step: Step):
-    """([H, W] bool region, options of `glass.glass`) of a glass step. Raises InputError."""
-    given = step.options
-    options: dict[str, Any] = {k: _number(given[k], k) for k in ("ior", "transmission", "roughness") if k in given}
-    if "tint" in given:
-        tint = given["tint"]
-        options["tint"] = tuple(
-            float(c) for c in parse_colour(tint if isinstance(tint, str) else numbers(tint, 3, "tint"), "tint")
-        )
-    if "hollow" in given:
-        open_top = str(given["hollow"]).lower() == "open"
-        options["hollow"] = "open" if open_top else _switch(given["hollow"], "hollow", ", or open")
-    if "model" in given:
-        options["model"] = str(given["model"])
-    if "thickness" in given:
-        known = str(given["thickness"]) in METHODS
-        options["thickness"] = str(given["thickness"]) if known else _file(step, "thickness")
-        if not known and not options["thickness"].is_file():
-            raise InputError(f"There is no file {options['thickness']}; thickness is one, or {', '.join(METHODS)}.")
-    return region_of(scene, step), options | _removal(step)
+def glass_arguments(scene: Scene, step: Step) -> tuple[Array, Glass]:
+    """([H, W] bool region, options) of a glass step. Raises InputError."""
+    return region_of(scene, step), _options(step)
 
 
 _MAKERS = {
@@ -286,30 +241,11 @@ _MAKERS = {
 """Kind of step -> (original scene, scene so far, step) -> scene."""
 
 
-def _switch(value: Any, name: str, other: str = "") -> bool:
-    text = str(value).lower()
-    if text not in (*ON, *OFF):
-        raise InputError(f"The {name} must be true or false{other}, not {value!r}.")
-    return text in ON
-
-
 def _file(step: Step, name: str) -> Path:
-    value = step.options[name]
-    if not isinstance(value, str):
-        raise InputError(f"The {name} must be a file name, not {value!r}.")
-    return step.folder / value
+    return beside(step.folder, name, step.options[name])
 
 
 def _files(step: Step, name: str) -> list[Path]:
     """One file name, or a list of them."""
     value = step.options[name]
-    if isinstance(value, list) and value and all(isinstance(one, str) for one in value):
-        return [step.folder / one for one in value]
-    return [_file(step, name)]
-
-
-def _number(value: Any, name: str) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} must be a number, not {value!r}.") from error
+    return [beside(step.folder, name, one) for one in (value if isinstance(value, list) and value else [value])]

@@ -20,7 +20,6 @@ from materialist.edits.recipe import REGION, Step, apply, glass_arguments
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
-from materialist.options import Glass
 from materialist.studio import SETTINGS
 from materialist.types import Array, Scene
 
@@ -72,10 +71,9 @@ def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
     Raises InputError for values out of range, and for a region without a surface.
     """
     region, options = glass_arguments(scene, step)
-    tint = Glass(**options).tint
     if not (region & (scene.depth > 0)).any():
         raise InputError("The selection covers only sky; select a surface.")
-    return region, tint
+    return region, options.tint
 
 
 class GlassClient:
@@ -236,12 +234,11 @@ class GlassBodies:
 
             report("build", 0, 1)
             edited = apply(scene, [Step(kind, given, folder) for kind, given in request["others"]])
-            fixed = {name: value for name, value in options.items() if name not in VALUES}
-            self._built[key] = GlassPreview(edited, region, **fixed)
+            self._built[key] = GlassPreview(edited, region, options)
         self._built.move_to_end(key)
         while len(self._built) > SETTINGS.glass_bodies:
             self._built.popitem(last=False)
-        return self._built[key], {name: options[name] for name in VALUES if name in options}
+        return self._built[key], {name: getattr(options, name) for name in VALUES}
 
     def _loaded(self, path: str) -> Any:
         if self._scene is None or self._scene[0] != path:

@@ -57,7 +57,7 @@ def invert(
     picture = replace(read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
     show = lambda name, value: _show(report, folder, name, value)  # noqa: E731
-    done = pipeline.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, found=show)
+    done = pipeline.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
     report("save", 0, 1)
     save_scene(done, scene, force=True)
     return {"scene": scene, "psnr": done.report.metrics.get("rerender_psnr_path")}

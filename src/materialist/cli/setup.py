@@ -1,16 +1,21 @@
-"""`materialist models list|download|verify`: networks from a model hub, fetched only when one says so."""
+"""`materialist doctor` and `materialist models`: what this machine has, and networks from a model hub."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from materialist.cli.options import Json
-from materialist.cli.outcome import report_success
+from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.outcome import BAD_INPUT, report_success
 from materialist.errors import InputError, WeightsError
 
+if TYPE_CHECKING:
+    from materialist.doctor import Finding
+
+_MARK = {"ok": ("ok", "green"), "missing": ("--", "yellow"), "broken": ("NO", "red")}
 models = typer.Typer(
     name="models",
     help="List, download and verify networks from a model hub; no other command ever downloads.",
@@ -21,8 +26,42 @@ models = typer.Typer(
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command group."""
+    """Add the commands."""
+    app.command("doctor")(doctor)
     app.add_typer(models)
+
+
+def doctor(seed: Seed = 0, device: DeviceOption = Device.auto, as_json: Json = False) -> None:
+    """Say what works here, what does not, and the one command that mends it; with --device cuda a GPU must be there."""
+    from materialist.doctor import examine
+
+    findings = examine(device)
+    broken = [finding for finding in findings if finding.state == "broken"]
+    if not as_json:
+        _show(findings)
+    verdict = (
+        "The main job cannot run yet; run the commands above." if broken else "Ready: materialist invert PHOTO -o SCENE"
+    )
+    if as_json and broken:
+        content = {"ok": False, "command": "doctor", "findings": [vars(f) for f in findings], "exit_code": BAD_INPUT}
+        typer.echo(json.dumps(content))
+    else:
+        report_success("doctor", as_json, [verdict], findings=[vars(finding) for finding in findings])
+    if broken:
+        raise typer.Exit(BAD_INPUT)
+
+
+def _show(findings: list[Finding]) -> None:
+    """The table, and under each failing line the command that mends it."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False, soft_wrap=True)
+    for finding in findings:
+        mark, colour = _MARK[finding.state]
+        console.print(Text.assemble((f"{mark:>3} ", f"bold {colour}"), f"{finding.name:<22}", finding.detail))
+        if finding.remedy:
+            console.print(Text.assemble(" " * 26, ("mend with: ", "dim"), (finding.remedy, "bold")))
 
 
 @models.command("list")

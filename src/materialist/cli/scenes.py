@@ -1,0 +1,139 @@
+"""`materialist invert`, `render` and `export`: scene packages made, rendered, and written for other programs."""
+
+from __future__ import annotations
+
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from materialist.cli.generate import add_command
+from materialist.cli.options import Run, SceneArgument, output_option
+from materialist.cli.outcome import report_success
+from materialist.cli.progress import StageProgress
+from materialist.errors import InputError
+from materialist.options import InvertOptions
+
+
+class Format(StrEnum):
+    """What other programs read."""
+
+    glb = "glb"
+    blend = "blend"
+    usd = "usd"
+    mitsuba = "mitsuba"
+    html = "html"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    for command in (invert, render, export):
+        add_command(app, command)
+
+
+def invert(
+    photo: Annotated[str, typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...).")],
+    output: Annotated[Path, output_option("SCENE", "The scene package, a folder.")],
+    options: InvertOptions,
+    run: Run,
+) -> None:
+    """Decompose a photo into geometry, materials and light, and write it as a scene package."""
+    from materialist.io.atomic import ensure_writable
+    from materialist.io.package import save_scene
+    from materialist.io.photo import read_photo
+
+    # Everything that can be wrong is found before the work starts.
+    ensure_writable(output, run.force)
+    picture = read_photo(photo, size=options.size, fov=options.fov)
+    from materialist import pipeline
+
+    start = time.monotonic()
+    with StageProgress(quiet=run.as_json) as progress:
+        scene = pipeline.invert(picture, options, progress=progress)
+    save_scene(scene, output, force=run.force)
+    warnings = list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
+    seconds = time.monotonic() - start
+    quality = scene.report.metrics.get("rerender_psnr_path")
+    figure = f", re-rendering {quality:.1f} dB" if quality is not None else ""
+    lines = [
+        f"{output}: done in {seconds:.0f} s with predictor {scene.prior.predictor}{figure}.",
+        *(f"Note: {warning}" for warning in warnings),
+        f"Look at {output / 'overview.png'}",
+    ]
+    facts: dict[str, Any] = {"predictor": scene.prior.predictor, "sources": scene.prior.sources}
+    facts |= {**scene.report.metrics, "seconds": seconds, "warnings": warnings}
+    report_success("invert", run.as_json, lines, scene=str(output), **facts)
+
+
+def render(
+    scene: SceneArgument,
+    output: Annotated[Path, output_option("OUT", "A .png (sRGB) or .exr (linear).")],
+    run: Run,
+    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 64,
+    denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
+) -> None:
+    """Path-trace a scene package."""
+    from rich.console import Console
+
+    from materialist.edits.composite.output import write_composite
+    from materialist.edits.core.notes import PICTURED, is_pictured
+    from materialist.io.image import ensure_image_writable
+    from materialist.io.package import load_scene
+
+    if not 1 <= spp <= 1_000_000:
+        raise InputError(f"--spp is a number of samples from 1 to 1000000, not {spp}.")
+    ensure_image_writable(output, force=run.force)
+    loaded = load_scene(scene)
+    from materialist import pipeline
+
+    with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
+        image = pipeline.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
+    write_composite(output, image, loaded.photo, force=run.force)
+    notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) else []
+    shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
+    report_success("render", run.as_json, shown, image=str(output), spp=spp, warnings=notes)
+
+
+def export(
+    scene: SceneArgument,
+    output: Annotated[
+        Path, output_option("OUT", "NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba).")
+    ],
+    to: Annotated[Format, typer.Option("--to", help="Format.")],
+    run: Run,
+    max_triangles: Annotated[
+        int | None, typer.Option(metavar="N", help="Coarser mesh of at most N triangles; html: 60000 unless given.")
+    ] = None,
+    blender: Annotated[
+        str | None, typer.Option(metavar="PROGRAM", help="blend: the blender program, or a Python that has bpy.")
+    ] = None,
+    shadow_catcher: Annotated[
+        bool, typer.Option("--shadow-catcher", help="blend: show the photo, with the scene to catch shadows on it.")
+    ] = False,
+    fitted_material: Annotated[
+        bool, typer.Option("--fitted-material", help="blend: the material model of the fit, not Blender's Principled.")
+    ] = False,
+) -> None:
+    """Write a scene for another program: glTF, Blender, USD, Mitsuba, or one self-contained page of HTML.
+
+    Nothing of it is random, and nothing is computed on a GPU.
+    """
+    from rich.console import Console
+
+    from materialist.exporters.run import check_format
+    from materialist.exporters.run import export as write
+    from materialist.io.package import load_scene
+
+    check_format(output, to)
+    with Console(stderr=True).status(f"Writing {output}"):
+        done = write(
+            load_scene(scene), output, to=to, force=run.force, max_triangles=max_triangles, blender=blender,
+            shadow_catcher=shadow_catcher, fitted_material=fitted_material,
+        )  # fmt: skip
+    files = [str(done.path), *map(str, done.beside)]
+    report_success(
+        "export", run.as_json, [f"Wrote {', '.join(files)}", *done.notes], output=str(done.path), beside=files[1:],
+        notes=list(done.notes),
+    )  # fmt: skip

@@ -1,0 +1,309 @@
+"""select, edit, relight, glass, remove, insert, drop and apply on a small scene: files, exit codes, one error table."""
+
+import json
+
+import numpy as np
+import pytest
+from edit_scenes import block_mask, rendered_scene
+from made_meshes import box_file, floor_scene, textured_obj
+from PIL import Image
+
+from materialist.cli.picture import is_unseen
+from materialist.color import linear_to_srgb
+from materialist.edits.glass.preview import GlassPreview
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.package import load_scene, save_scene
+
+MASK = block_mask(36, 48)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Scenes, masks that fit and that do not, environment maps, meshes, lists of edits; only read."""
+    folder = tmp_path_factory.mktemp("pictures")
+    save_scene(rendered_scene(block=3.0), folder / "a.scene")
+    save_scene(floor_scene(), folder / "floor.scene")
+    for name, mask in (("block", MASK), ("empty", MASK & False), ("all", MASK | True), ("square", np.ones((36, 36)))):
+        Image.fromarray((mask * 255).astype(np.uint8)).save(folder / f"{name}.png")
+    write_exr(folder / "square.exr", np.ones((32, 32, 3), np.float32))
+    write_exr(folder / "sky.exr", np.full((16, 32, 3), 0.5, np.float32))
+    write_exr(folder / "thick.exr", np.full((36, 48), 0.3, np.float32))
+    write_exr(folder / "wall.exr", np.full((36, 48, 3), 0.25, np.float32))
+    box_file(folder / "box.ply")
+    (folder / "in").mkdir()
+    textured_obj(folder / "in", mtl="../secret.mtl")
+    recipes = {
+        "edits": "- edit: {mask: block.png, value: -0.5}\n- relight: {rotate: 30}\n"
+        "- relight: {ambient: 0.5, skip: true}\n- insert: {mesh: box.ply, at: [30, 28], material: mirror, turn: 20}\n",
+        "dim": "- relight: {dim: 0.2, mask: block.png}\n",
+        "glass": "- glass: {mask: block.png, ior: 1.2, tint: [1, 0.9, 1], hollow: true, thickness: symmetry}\n",
+        "bad": "- edit: {mask: block.png, shininess: 1}\n",
+        "undimmed": "- relight: {rotate: 20, mask: block.png}\n",
+        "nowhere": "- insert: {mesh: box.ply}\n",
+        "ior": "- remove: {mask: block.png, ior: 2}\n",
+    }
+    for name, text in recipes.items():
+        (folder / f"{name}.yaml").write_text(text)
+    return folder
+
+
+def facts(shown):
+    return json.loads(shown.splitlines()[-1])
+
+
+def test_edit_writes_the_photo_with_only_the_block_changed(run, folder, tmp_path):
+    scene, out = folder / "a.scene", tmp_path / "out.exr"
+    options = "--value -0.5 --roughness +0.2 --spp 6 --seed 2 --json"
+    code, shown, err = run(
+        "edit", scene, "--mask", folder / "block.png", *options.split(), "-o", out, "--save", tmp_path / "b.scene"
+    )
+    assert code == 0, err
+    assert facts(shown)["image"] == str(out) and facts(shown)["edits"][0]["roughness"] == "+0.2"
+    picture, photo = read_exr(out), load_scene(scene).photo.original
+    np.testing.assert_array_equal(picture[:8], photo[:8])
+    assert (picture[MASK] < photo[MASK]).all()
+    saved = load_scene(tmp_path / "b.scene")
+    np.testing.assert_array_equal(saved.photo.original, picture)
+    assert saved.provenance["edits"] == facts(shown)["edits"]
+
+
+def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(run, folder, tmp_path):
+    common = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--roughness", "+0", "--spp", 4]
+    code, shown, err = run(*common, "-o", tmp_path / "o.png")
+    assert code == 0 and "nothing of the edit is to be seen" in shown, err
+    photo = np.round(linear_to_srgb(load_scene(folder / "a.scene").photo.original) * 255).astype(np.uint8)
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "o.png")), photo)
+    assert run(*common, "--full-render", "--no-denoise", "-o", tmp_path / "b.png")[0] == 0
+    full = np.asarray(Image.open(tmp_path / "b.png"))
+    assert full.shape == photo.shape and (full[:8] != photo[:8]).any()
+
+
+def test_apply_replays_the_list(run, folder, tmp_path):
+    command = ["apply", folder / "a.scene", folder / "edits.yaml", "--spp", 4, "-o", tmp_path / "o.png"]
+    code, shown, err = run(*command, "--json")
+    assert code == 0, err
+    assert [e["kind"] for e in facts(shown)["edits"]] == ["material", "light", "insert"]
+    assert "3 edits applied, 1 skipped." in run(*command, "--force")[1]
+
+
+def test_relight_dims_the_lights_that_are_meant(run, folder, tmp_path):
+    scene = folder / "a.scene"
+    for command in (
+        ["relight", scene, "--dim", 0.2, "--mask", folder / "block.png"],
+        ["apply", scene, folder / "dim.yaml"],
+    ):
+        assert run(*command, "--spp", 8, "--no-denoise", "-o", tmp_path / f"{command[0]}.exr")[0] == 0
+    one, other = (read_exr(tmp_path / name) for name in ("relight.exr", "apply.exr"))
+    inner = tuple(np.argwhere(MASK).mean(0).astype(int))
+    np.testing.assert_allclose(one[inner], 0.2 * load_scene(scene).photo.original[inner], rtol=0.02)
+    np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
+
+
+def test_relight_by_map_lamp_and_frames(run, folder, tmp_path, monkeypatch):
+    """Of a film one scene is held at a time: each has an environment map of its own."""
+    import weakref
+
+    from materialist.edits.light import frames
+
+    relight, most = ["relight", folder / "a.scene", "--spp", 4], []
+    assert run(*relight, "--envmap", folder / "sky.exr", "--gain", 1, "-o", tmp_path / "o.exr")[0] == 0
+    assert read_exr(tmp_path / "o.exr").mean() < 0.6 * load_scene(folder / "a.scene").photo.original.mean()
+    assert run(*relight, "--lamp", "10,10,2.5,3000,1", "--ambient", 0.5, "-o", tmp_path / "l.png")[0] == 0
+    alive, make = [], frames.relight
+
+    def relit(*arguments, **options):
+        scene = make(*arguments, **options)
+        alive.append(weakref.ref(scene))
+        most.append(sum(one() is not None for one in alive))
+        return scene
+
+    monkeypatch.setattr(frames, "relight", relit)
+    assert run(*relight, "--rotate", 90, "--frames", 5, "--no-denoise", "-o", tmp_path / "turn")[0] == 0
+    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [f"{k:04d}.png" for k in range(5)]
+    assert len(most) == 5 and max(most) <= 3
+
+
+def test_pictures_that_look_the_same():
+    photo = np.random.default_rng(0).uniform(0.2, 0.8, (100, 100, 3)).astype(np.float32)
+    changed = photo.copy()
+    changed[5, :5] += 0.1
+    assert is_unseen(photo, photo) and is_unseen(photo + 1e-5, photo)
+    assert not is_unseen(changed, photo) and is_unseen(changed, photo, relit=True)
+    assert not is_unseen(0.9 * photo, photo, relit=True)
+
+
+def test_select_writes_a_mask_that_edit_reads(run, folder, tmp_path):
+    select = ["select", folder / "a.scene"]
+    code, shown, err = run(*select, "--mask", folder / "block.png", "-o", tmp_path / "m.png", "--json")
+    assert code == 0, err
+    assert facts(shown)["pixels"] == MASK.sum()
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "m.png"))[..., 0] == 255, MASK)
+    assert run(*select, "--click", "17,17", "--native", "-o", tmp_path / "n.png")[0] == 0
+
+
+def test_glass_is_written_saved_and_loaded_again(run, folder, tmp_path):
+    out, saved = tmp_path / "g.exr", tmp_path / "g.scene"
+    code, shown, err = run(
+        "glass", folder / "a.scene", "--mask", folder / "block.png", "--ior", 1.4, "--tint", "#80ff80", "--thickness",
+        folder / "thick.exr", "--spp", 4, "--json", "-o", out, "--save", saved,
+    )  # fmt: skip
+    assert code == 0, err
+    made = facts(shown)["edits"][-1]
+    assert made["kind"] == "glass" and made["ior"] == 1.4 and made["thickness"] == "given"
+    picture, scene = read_exr(out), load_scene(saved)
+    assert (picture[MASK] != load_scene(folder / "a.scene").photo.original[MASK]).any()
+    np.testing.assert_array_equal(scene.photo.original, picture)
+    (body,) = scene.bodies
+    assert body.surface.ior == pytest.approx(1.4) and body.surface.tint[1] == pytest.approx(1)
+    code, shown, err = run(
+        "apply", folder / "a.scene", folder / "glass.yaml", "--spp", 2, "--json", "-o", tmp_path / "1.exr"
+    )
+    assert code == 0 and facts(shown)["edits"][-1]["hollow"] is True, err
+
+
+def test_a_preview_is_a_picture_that_says_so(run, folder, tmp_path):
+    command = ("glass", folder / "a.scene", "--mask", folder / "block.png", "--ior", 1.4, "--thickness", "symmetry")
+    code, shown, err = run(*command, "--preview", "--tint", "1,0.5,0.5", "-o", tmp_path / "p.exr")
+    assert code == 0, err
+    assert "A preview: 48 x 36" in shown and "without the shadow" in shown and "thickness: symmetry" in shown
+    truth = GlassPreview(load_scene(folder / "a.scene"), MASK, thickness="symmetry")
+    np.testing.assert_allclose(
+        read_exr(tmp_path / "p.exr"), truth.picture(ior=1.4, tint=(1, 0.5, 0.5), spp=96), rtol=1e-5
+    )
+
+
+def test_remove_with_a_background_shows_it(run, folder, tmp_path):
+    code, _, err = run(
+        "remove", folder / "a.scene", "--mask", folder / "block.png", "--background", folder / "wall.exr", "--spp", 16,
+        "-o", tmp_path / "r.exr",
+    )  # fmt: skip
+    assert code == 0, err
+    assert abs(read_exr(tmp_path / "r.exr")[MASK].mean() - 0.25) < 0.03
+
+
+def test_insert_writes_picture_and_scene(run, folder, tmp_path):
+    scene, out = folder / "floor.scene", tmp_path / "out.exr"
+    code, shown, err = run(
+        "insert", scene, folder / "box.ply", "--at", "12,28", "--at", "36,28", "--material", "0.1,0.2,0.7", "--spp", 6,
+        "--json", "-o", out, "--save", tmp_path / "b.scene",
+    )  # fmt: skip
+    assert code == 0, err
+    assert [edit["at"] for edit in facts(shown)["edits"]] == [[12, 28], [36, 28]]
+    picture, photo = read_exr(out), load_scene(scene).photo.original
+    assert np.abs(picture - photo).max(-1).sum() > 10
+    np.testing.assert_array_equal(picture[:4], photo[:4])
+    assert len(load_scene(tmp_path / "b.scene").bodies) == 2
+
+
+def test_drop_films_into_a_folder(run, folder, tmp_path):
+    pytest.importorskip("mujoco")
+    code, shown, err = run(
+        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 3, "--fps", 3, "--spp", 4,
+        "--height", 0.3, "--material", "#aa3311", "--json", "-o", tmp_path / "film", "--save", tmp_path / "end.scene",
+    )  # fmt: skip
+    assert code == 0, err
+    frames = sorted((tmp_path / "film").glob("*.png"))
+    assert len(frames) == facts(shown)["frames"] == 3
+    first, last = (np.asarray(Image.open(f)).astype(float) for f in (frames[0], frames[-1]))
+    assert np.abs(first - last).max() > 20
+    assert len(load_scene(tmp_path / "end.scene").bodies) == 1
+
+
+EDIT, RELIGHT, GLASS = ("edit", "a.scene"), ("relight", "a.scene"), ("glass", "a.scene", "--mask", "block.png")
+HUE = (*EDIT, "--mask", "block.png", "--hue", "9")
+TURN = (*RELIGHT, "--rotate", "9")
+INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "out", "words"),
+    [
+        ((*EDIT, "--mask", "square.png", "--hue", "9"), "out.png", "36 x 36"),
+        ((*EDIT, "--mask", "empty.png", "--hue", "9"), "out.png", "empty"),
+        ((*EDIT, "--mask", "none.png", "--hue", "9"), "out.png", "none.png"),
+        ((*EDIT, "--click", "500,5", "--hue", "9"), "out.png", "outside"),
+        ((*EDIT, "--click", "five", "--hue", "9"), "out.png", "--click"),
+        ((*EDIT, "--hue", "9"), "out.png", "exactly one"),
+        ((*EDIT, "--mask", "block.png"), "out.png", "Nothing to change"),
+        ((*HUE, "--roughness", "3"), "out.png", "roughness is 3"),
+        ((*HUE, "--albedo", "1,2"), "out.png", "R,G,B"),
+        ((*HUE, "--texture", "none.png"), "out.png", "none.png"),
+        ((*HUE, "--texture-scale", "2"), "out.png", "--texture-scale says nothing without --texture"),
+        ((*HUE, "--spp", "1"), "out.png", "--spp"),
+        (HUE, "out.gif", ".png"),
+        (("edit", "nothing.scene", *HUE[2:]), "out.png", "nothing.scene"),
+        ((*HUE, "--save", "a.scene"), "out.png", "--force"),
+        ((*HUE, "--save", "out.scene"), "out.scene/a.png", "beside"),
+        ((*HUE, "--full-render", "--save", "out.scene"), "out.png", "leave one of them out"),
+        (RELIGHT, "out.png", "No light"),
+        ((*RELIGHT, "--envmap", "square.exr"), "out.png", "twice as wide"),
+        ((*RELIGHT, "--envmap", "none.exr"), "out.png", "none.exr"),
+        ((*RELIGHT, "--sun", "10,100"), "out.png", "elevation is 100"),
+        ((*RELIGHT, "--sun", "1"), "out.png", "--sun takes 2 numbers"),
+        ((*RELIGHT, "--lamp", "1,2,3"), "out.png", "lamp must be 5 numbers"),
+        ((*RELIGHT, "--lamp", "1,2,3,99999,1"), "out.png", "99999"),
+        ((*TURN, "--frames", "4"), "out.png", ".mp4"),
+        ((*TURN, "--frames", "1"), "out", "frames is 1"),
+        (TURN, "out.mp4", "--frames 48"),
+        ((*TURN, "--gain", "2"), "out.png", "--gain says nothing without --envmap"),
+        ((*TURN, "--sun-power", "2"), "out.png", "--sun-power says nothing without --sun"),
+        ((*TURN, "--fps", "7"), "out.png", "--fps says nothing without --frames"),
+        ((*TURN, "--mask", "block.png"), "out.png", "--mask says nothing without --dim"),
+        ((*RELIGHT, "--dim", "0.5", "--mask", "empty.png"), "out.png", "empty"),
+        ((*TURN, "--frames", "4", "--full-render", "--spp", "0"), "out", "--spp"),
+        ((*TURN, "--frames", "4", "--fps", "0"), "out", "--fps"),
+        (("apply", "a.scene", "bad.yaml"), "out.png", "shininess"),
+        (("apply", "a.scene", "none.yaml"), "out.png", "none.yaml"),
+        (("apply", "a.scene", "undimmed.yaml"), "out.png", "give dim"),
+        (("apply", "a.scene", "nowhere.yaml"), "out.png", "needs its at"),
+        (("apply", "a.scene", "ior.yaml"), "out.png", "'ior'"),
+        (("select", "a.scene", "--click", "1,1"), "out.exr", ".png"),
+        (("select", "a.scene"), "out.png", "exactly one"),
+        ((*GLASS, "--ior", "0.9"), "out.png", "refraction is 0.9"),
+        ((*GLASS, "--tint", "1,1"), "out.png", "must be R,G,B"),
+        ((*GLASS, "--thickness", "none.exr"), "out.png", "none.exr"),
+        ((*GLASS, "--preview", "--full-render"), "out.png", "--preview"),
+        ((*GLASS, "--model", "two-interface", "--full-render"), "out.png", "--model closed"),
+        ((*GLASS, "--model", "two-interface", "--preview"), "out.png", "closed"),
+        (("glass", "a.scene", "--mask", "all.png"), "out.png", "mark one object only"),
+        (("remove", "a.scene", "--mask", "block.png", "--background", "square.exr"), "out.png", "same proportions"),
+        (("remove", "a.scene", "--mask", "block.png", "--inpaint", "magic"), "out.png", "give sd:FOLDER"),
+        (("remove", "a.scene"), "out.png", "exactly one of"),
+        ((*INSERT, "box.ply", "--at", "400,3"), "out.png", "outside the photo"),
+        ((*INSERT, "box.ply", "--at", "here"), "out.png", "2 numbers"),
+        ((*INSERT, "gone.ply", "--at", "12,28"), "out.png", "cannot be read"),
+        ((*INSERT, "in/quad.obj", "--at", "12,28"), "out.png", "never followed"),
+        ((*INSERT, "box.ply", "--at", "12,28", "--material", "wood"), "out.png", "as-is, glass, mirror"),
+        ((*DROP, "box.ply", "--at", "12,28", "--scale", "0"), "film", "scale"),
+        ((*DROP, "box.ply", "--at", "12,28", "--gravity", "0,1"), "film", "gravity must be 3 numbers"),
+        ((*DROP, "box.ply", "--at", "24,28", "--save", "out.scene"), "out.scene/film", "put it beside"),
+    ],
+)
+def test_bad_input_is_one_sentence_with_exit_2_and_nothing_is_written(run, folder, tmp_path, arguments, out, words):
+    named = lambda word: "." in word and not word.replace(".", "").replace(",", "").isdigit()  # noqa: E731
+    place = lambda word: (tmp_path if word.startswith("out") else folder) / word  # noqa: E731
+    before = sorted(folder.rglob("*"))
+    code, shown, err = run(*(place(word) if named(word) else word for word in arguments), "-o", tmp_path / out)
+    assert code == 2 and words in err and "Traceback" not in err and not shown, err
+    assert err.count("\n") == 1 and sorted(folder.rglob("*")) == before and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("seed", ["-1", "99999999999999999999"])
+def test_seeds_that_no_generator_takes(run, folder, tmp_path, seed):
+    code, _, err = run(
+        "edit", folder / "a.scene", "--click", "20,20", "--hue", 20, "--seed", seed, "-o", tmp_path / "a.png"
+    )
+    assert code == 2 and "'--seed'" in err and not list(tmp_path.iterdir())
+
+
+def test_the_device_is_chosen_before_anything_renders(run, folder, tmp_path, monkeypatch):
+    """A GPU machine must not begin on its GPU and then be told of the CPU."""
+    from materialist.edits.insert.insert import insert
+    from materialist.render import variant
+
+    save_scene(insert(load_scene(folder / "a.scene"), folder / "box.ply", (6, 30), scale=0.3), tmp_path / "c.scene")
+    asked, setup = [], variant.setup
+    monkeypatch.setattr(variant, "setup", lambda device="auto": asked.append(device) or setup(device))
+    options = ["--spp", "2", "--device", "cpu", "-o", tmp_path / "out.png"]
+    assert run("edit", tmp_path / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)[0] == 0
+    assert asked[:1] == ["cpu"]

@@ -1,0 +1,164 @@
+"""`doctor` never raises, and every failing line has the command that mends it; `models`, and what mixes predictors."""
+
+import hashlib
+import json
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_pipeline import install
+from PIL import Image
+
+from materialist import doctor
+from materialist.doctor import Finding
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def models(tmp_path, monkeypatch):
+    """No model on this machine, and no hub."""
+    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
+    monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")  # nothing listens there
+
+
+def test_a_wrong_llvm_is_found_in_a_child_and_survived(monkeypatch):
+    monkeypatch.setattr(
+        doctor.subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, -6, "", "Cannot select")
+    )
+    finding = doctor._renderer("/wrong/libLLVM.so")
+    assert finding.state == "broken" and "Cannot select" in finding.detail and "libllvm19" in finding.remedy
+
+
+def test_a_missing_library_is_named_with_its_package(monkeypatch):
+    said = "ImportError: libatomic.so.1: cannot open shared object file: No such file or directory\n\nNameError: name"
+    monkeypatch.setattr(doctor.subprocess, "run", lambda *a, **k: subprocess.CompletedProcess(a, 1, "", said))
+    finding = doctor._renderer(None)
+    assert finding.detail == "libatomic.so.1 is missing" and finding.remedy == "sudo apt-get install -y libatomic1"
+
+
+def test_a_probe_that_hangs_is_survived(monkeypatch):
+    def hang(*_, **__):
+        raise subprocess.TimeoutExpired("python", 120)
+
+    monkeypatch.setattr(doctor.subprocess, "run", hang)
+    assert doctor._renderer(None).state == "broken"
+
+
+def test_missing_packages_name_their_command():
+    finding = doctor._package("no-such-package-here")
+    assert finding.state == "broken" and finding.remedy.endswith("pip install no-such-package-here")
+
+
+def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    packages = {
+        re.match(r"[\w-]+", entry)[0]: extra
+        for extra, entries in extras.items()
+        for entry in entries
+        if extra not in ("app", "dev")
+    }
+
+    def nothing(name):
+        raise doctor.PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, "version", nothing)
+    found = {name: doctor._extra(name, *what) for name, what in doctor._EXTRAS.items()}
+    assert set(found) == set(packages), "every package of an extra is looked for, and no other"
+    for name, finding in found.items():
+        assert finding.state == "missing" and finding.remedy.endswith(
+            f" -m pip install 'materialist[{packages[name]}]'"
+        )
+
+
+@pytest.mark.parametrize(("state", "code"), [("ok", 0), ("missing", 0), ("broken", 2)])
+def test_exit_code_follows_the_main_job(run, monkeypatch, state, code):
+    monkeypatch.setattr(doctor, "examine", lambda device: [Finding("LLVM", state, "19", "mend it")])
+    got, shown, _ = run("doctor")
+    assert got == code and "LLVM" in shown and "mend it" in shown
+    got, shown, _ = run("doctor", "--json")
+    last = json.loads(shown.splitlines()[-1])
+    assert got == code and last["ok"] is (code == 0) and last["findings"][0]["remedy"] == "mend it"
+
+
+def test_a_gpu_that_is_asked_for_must_be_there(monkeypatch):
+    monkeypatch.setattr(doctor.shutil, "which", lambda _: None)
+    assert doctor._cuda().state == "missing" and doctor._cuda(needed=True).state == "broken"
+
+
+def test_this_machine():
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert findings["Python"].state == "ok" and findings["torch"].state == "ok"
+    for finding in findings.values():
+        assert finding.state in ("ok", "missing", "broken")
+        assert finding.state != "broken" or finding.remedy
+
+
+def put(tmp_path, content=b"weights"):
+    """A finished download of the published MatNet."""
+    folder = tmp_path / "models" / "Lez--MatNet"
+    folder.mkdir(parents=True)
+    (folder / "matnet_weights.pth").write_bytes(content)
+    (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(b'weights').hexdigest()}  matnet_weights.pth\n")
+
+
+def test_list_says_what_is_here(run, tmp_path):
+    code, out, _ = run("models", "list", "--json")
+    models = {m["name"]: m for m in json.loads(out.splitlines()[-1])["models"]}
+    assert code == 0 and not models["matnet"]["here"] and models["matnet"]["repo"] == "Lez/MatNet"
+    put(tmp_path)
+    code, out, _ = run("models", "list")
+    assert next(line for line in out.splitlines() if " matnet" in line).startswith("here")
+    assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("-")
+
+
+def test_verify(run, tmp_path):
+    code, _, err = run("models", "verify")
+    assert code == 2 and "models download" in err
+    code, _, err = run("models", "verify", "matnet")
+    assert code == 2 and "models download matnet" in err
+    put(tmp_path)
+    code, out, _ = run("models", "verify", "--json")
+    assert code == 0 and list(json.loads(out.splitlines()[-1])["digests"]) == ["matnet"]
+    (tmp_path / "models/Lez--MatNet/matnet_weights.pth").write_bytes(b"weightx")
+    code, out, err = run("models", "verify", "--json")
+    assert code == 2 and "damaged" in err and json.loads(out.splitlines()[-1])["error"] == "WeightsError"
+
+
+def test_files_that_were_fetched_elsewhere_are_taken(run, tmp_path):
+    source = tmp_path / "fetched"
+    source.mkdir()
+    code, _, err = run("models", "download", "depth-anything", "--from", source)
+    assert code == 2 and "lacks config.json" in err
+    for name, content in (("config.json", b"{}"), ("model.safetensors", b"weights"), ("notes.md", b"no")):
+        (source / name).write_bytes(content)
+    code, _, _ = run("models", "download", "depth-anything", "--from", source)
+    folder = tmp_path / "models" / "depth-anything--Depth-Anything-V2-Small-hf"
+    assert code == 0 and sorted(p.name for p in folder.iterdir()) == ["SHA256SUMS", "config.json", "model.safetensors"]
+    code, out, _ = run("models", "list")
+    assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("here")
+
+
+def test_download_without_a_hub_and_of_nothing(run):
+    code, _, err = run("models", "download", "matnet")
+    assert code == 2 and "cannot be fetched" in err and "maps:DIR" in err
+    assert run("models", "download", "nonsense")[0] == 2
+
+
+def test_invert_with_absent_weights_names_both_ways_out(run, tmp_path):
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (16, 16, 3)).astype(np.uint8)).save(tmp_path / "a.png")
+    code, _, err = run("invert", tmp_path / "a.png", "-o", tmp_path / "a.scene", "--predictor", "matnet")
+    assert code == 2 and "models download matnet" in err and "maps:DIR" in err and "Traceback" not in err
+    assert not (tmp_path / "a.scene").exists()
+
+
+def test_sources_of_single_maps_are_passed_on(run, tmp_path, monkeypatch):
+    Image.fromarray(np.random.default_rng(0).integers(0, 256, (16, 16, 3)).astype(np.uint8)).save(tmp_path / "a.png")
+    calls = install(monkeypatch)
+    options = ("--albedo", "marigold", "--depth", "depth-anything", "--rest", "bundled")
+    assert run("invert", tmp_path / "a.png", "-o", tmp_path / "a.scene", *options)[0] == 0
+    asked = calls[0]["options"]
+    assert (asked.predictor, asked.albedo, asked.depth, asked.normal) == ("bundled", "marigold", "depth-anything", None)
