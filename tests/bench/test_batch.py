@@ -24,6 +24,6 @@ def test_photos_are_spread_over_those_of_a_folder(tmp_path, below):
 
 def test_bad_counts_are_refused(tmp_path):
     with pytest.raises(InputError, match="photos is 0"):
-        batch._chosen(tmp_path, 0, tmp_path)
+        batch.BatchBench(photos=0)
     with pytest.raises(InputError, match="workers is 0"):
         batch._counts("0")

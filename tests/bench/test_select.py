@@ -32,8 +32,6 @@ def test_both_maps_are_scored(tmp_path, mitsuba):
         for maps in ("bundled", "true")
     } and len(rows) >= 4
     assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)
-    true = [row["iou"] for row in rows if row["method"] == "grabcut, true maps"]
-    assert np.mean(true) > 0.5
     boxed = [row["iou"] for row in rows if row["method"] == "network, exact box, true maps"]
     assert np.mean(boxed) > 0.7
 

@@ -60,11 +60,11 @@ class SelectBench(Benchmark):
                 kind = "captured" if folder else "procedural"
                 for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
                     for method in METHODS:
-                        rows += self._rows(sample, found, f"{maps} maps", method, f"{kind} {sample.name}")
+                        rows += self._rows(sample, found, f"{maps} maps", method, f"{kind} {sample.name}", k)
                 write(report, output)
 
     def _rows(
-        self, sample: SyntheticSample, prior: Prediction, maps: str, method: str, name: str
+        self, sample: SyntheticSample, prior: Prediction, maps: str, method: str, name: str, number: int
     ) -> list[dict[str, Any]]:
         """A row a click, and a box."""
         from materialist.edits.select.select import select
@@ -73,7 +73,7 @@ class SelectBench(Benchmark):
         for j, mask in enumerate(sample.things):
             if mask.sum() < self.smallest:
                 continue
-            for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([self.seed, j]))):
+            for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
                 found = select(scene, click=click, method=method)
                 rows.append(_row(found, mask, f"{method}, {maps}", f"{name} object {j} click {k}"))
             for what, box in boxes(mask, self.loose).items():
