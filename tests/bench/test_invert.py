@@ -18,7 +18,8 @@ REPORT = {
     "prior_l1_metallic": 0.3, "warnings": [],
     "stages": [
         {"name": "geometry", "seconds": 1.0}, {"name": "engine", "seconds": 0.75}, {"name": "trace", "seconds": 1.25},
-        {"name": "prior light", "seconds": 0.5}, {"name": "light", "seconds": 1.5}, {"name": "materials", "seconds": 3.0},
+        {"name": "prior light", "seconds": 0.5}, {"name": "light", "seconds": 1.5},
+        {"name": "materials", "seconds": 3.0},
         {"name": "light", "seconds": 0.5}, {"name": "roughness+metallic", "seconds": 0.25},
         {"name": "rerender", "seconds": 4.0},
     ],
