@@ -68,15 +68,3 @@ def test_the_floor_passes_its_gradient_to_the_pixels_it_averages(scene, inputs):
     assert torch.isfinite(grad).all() and (grad[3] > 0).all()
     assert not grad[1:3].any(), "a wall does not see itself"
     torch.testing.assert_close(grad[3], grad[3, :1].expand(5, 3), rtol=1e-4, atol=0)
-
-
-def test_hidden_emitters(inputs):
-    """A sky pixel is black when the light is hidden, and the surfaces are lit all the same."""
-    holes = np.zeros((4, 5), bool)
-    holes[1, 3] = True
-    scene = RenderScene(wall(CAMERA, holes=holes), CAMERA, device="cpu")
-    shown, hidden = (
-        scene.render_torch(**inputs, spp=16, seed=0, max_depth=2, hide_emitters=h).numpy() for h in (False, True)
-    )
-    assert (shown[holes] > 0).all() and not hidden[holes].any()
-    np.testing.assert_allclose(hidden[~holes], shown[~holes], rtol=1e-5)
