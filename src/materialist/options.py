@@ -158,7 +158,7 @@ class InvertOptions(OperationOptions):
 
     operation = "invert"
     predictor: str = option(
-        "auto", "auto, bundled, classical, matnet[:FILE], marigold or maps:DIR; for every map not named below.",
+        "auto", "auto, bundled[:FILE], matnet[:FILE], marigold, maps:DIR or constant; for every map not named below.",
         kind="any", flag="--predictor --rest")
     albedo: str | None = option(None, "Where the albedo comes from.", **_PREDICTOR)
     roughness: str | None = option(None, "The same for roughness,", **_PREDICTOR)
