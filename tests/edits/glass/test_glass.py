@@ -89,7 +89,7 @@ def test_thickness_is_given_mirrored_or_predicted():
         ({"transmission": 1.2}, "transmission is 1.2"),
         ({"roughness": -0.1}, "roughness is -0.1"),
         ({"tint": (1, 2, 1)}, "three numbers"),
-        ({"model": "magic"}, "choose one of 'closed', 'two-interface'"),
+        ({"model": "magic"}, "choose one of closed, two-interface"),
         ({"hollow": "half"}, "or open"),
         ({"thickness": "no.exr"}, "give a file"),
     ],
