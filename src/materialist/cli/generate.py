@@ -40,7 +40,7 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
     @wraps(function)
     def command(**values: Any) -> Any:
         made = {group.name: group.build(values) for group in groups}
-        return function(**made, **{key: value for key, value in values.items() if key in named})
+        return function(**{key: value for key, value in values.items() if key in named} | made)
 
     command.__signature__ = inspect.Signature(flags)  # type: ignore[attr-defined]
     command.__annotations__ = {flag.name: flag.annotation for flag in flags}
