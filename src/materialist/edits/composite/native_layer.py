@@ -9,9 +9,7 @@ import numpy as np
 
 from materialist.edits.composite.upsample import matte
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
-from materialist.edits.core.sky import sky_maps, traced
 from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
-from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
 
 
@@ -71,7 +69,11 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     if not is_relit(scene, edited):
         lamps = new_lamps(scene, edited)
     names = new_bodies(scene, edited) + lamps
-    return _traced(renderer.render_scene(edited), scene, edited, names, spp, seed, clean) if names else None
+    return (
+        _traced(renderer.render_scene(renderer.lit(edited, edited)), scene, edited, names, spp, seed, clean)
+        if names
+        else None
+    )
 
 
 def _traced(
@@ -104,9 +106,7 @@ def _traced(
     gap = contact * _extent(alone)
     depth = path_depth(edited) or MAX_DEPTH
     options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
-    clear = any(is_transparent(bodies[name].surface) for name in names if name in bodies)
-    maps = sky_maps(edited) if clear and np.array_equal(scene.envmap, edited.envmap) else None
-    picture = traced(lambda _: radiance(target, size, part, **options), target, edited, maps)
+    picture = radiance(target, size, part, **options)
     guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
     picture = spread(picture)
     if clean:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from materialist.edits.core.sky import only_lit_by, sky_maps
+from materialist.edits.core.sky import photo_sky
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.errors import SetupError
 from materialist.render.bodies import is_glowing, is_transparent
@@ -28,7 +29,8 @@ class EditRenderer:
     def __init__(self, scene: Scene, *, device: str = "auto"):
         self.scene, self.device = scene, device
         self._built: list[tuple[Scene, Any]] = []
-        self._base: dict[tuple[int, int, int, int], Array] = {}
+        self._base: dict[tuple, Array] = {}
+        self._sky: Array | None = None
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
         """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
@@ -36,29 +38,27 @@ class EditRenderer:
         The splitting tracer serves most light. With lamps, a sun or glass on either side both pictures come from
         Mitsuba's path tracer, which samples the lights and follows paths through glass.
         """
-        depth, paths = self._tracer(edited)
+        scene, edited = self.lit(self.scene, edited), self.lit(edited, edited)
+        depth = max(path_depth(s) for s in (scene, edited))
+        paths = 1 if depth else max(self.render_scene(s).paths for s in (scene, edited))
 
         def base(spp: int, seed: int) -> Array:
-            key = (depth, paths, spp, seed)
+            key = (scene is self.scene, depth, paths, spp, seed)
             if key not in self._base:
-                self._base[key] = self._render(self.scene, depth, paths, spp, seed)
+                self._base[key] = self._render(scene, depth, paths, spp, seed)
             return self._base[key]
 
-        missing = self._missing_sky(edited)
-        if missing is None:
-            return base, lambda spp, seed: self._render(edited, depth, paths, spp, seed)
-        where, more, less = missing
+        return base, lambda spp, seed: self._render(edited, depth, paths, spp, seed)
 
-        def before_sky(spp: int, seed: int) -> Array:
-            sky = self._render(more, depth, paths, spp, seed) - self._render(less, depth, paths, spp, seed)
-            return self._render(edited, depth, paths, spp, seed) + np.where(where, sky, 0)
-
-        return base, before_sky
-
-    def beside(self, edited: Scene, other: Scene) -> Render:
-        """render(spp, seed) of `other` by the tracer that `pair` takes for `edited`."""
-        depth, paths = self._tracer(edited)
-        return lambda spp, seed: self._render(other, depth, paths, spp, seed)
+    def lit(self, shown: Scene, edited: Scene) -> Scene:
+        """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
+        old = self.scene.bodies
+        if is_relit(self.scene, edited) or all(b in old or not is_transparent(b.surface) for b in edited.bodies):
+            return shown
+        if self._sky is None:
+            sky = photo_sky(self.scene)
+            self._sky = self.scene.envmap if sky is None else sky
+        return replace(shown, envmap=self._sky)
 
     def covered(self, edited: Scene) -> Array:
         """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""
@@ -114,24 +114,6 @@ class EditRenderer:
         target.set_materials(scene.materials)
         target.set_envmap(scene.envmap)
         return target
-
-    def _missing_sky(self, edited: Scene) -> tuple[Array, Scene, Scene] | None:
-        """([H, W, 1] where new glass is seen, the edit under the photo's sky alone, and under what the fit has there).
-
-        None where no new glass stands before sky, or where the light is another than the photo's.
-        """
-        old = self.scene.bodies
-        new = [f"body{k}" for k, b in enumerate(edited.bodies) if b not in old and is_transparent(b.surface)]
-        maps = None if not new or is_relit(self.scene, edited) else sky_maps(edited)
-        if maps is None:
-            return None
-        more, less = (only_lit_by(edited, envmap) for envmap in maps)
-        return self._seen(edited, new)[..., None] > 0, more, less
-
-    def _tracer(self, edited: Scene) -> tuple[int, int]:
-        """(path length of Mitsuba's path tracer or 0 for the splitting tracer, paths of either scene a camera ray)."""
-        depth = max(path_depth(s) for s in (self.scene, edited))
-        return depth, 1 if depth else max(self.render_scene(s).paths for s in (self.scene, edited))
 
     def _render(self, scene: Scene, depth: int, paths: int, spp: int, seed: int) -> Array:
         target = self.render_scene(scene)

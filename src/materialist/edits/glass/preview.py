@@ -18,8 +18,6 @@ PATHS = 600_000
 """Paths of one picture: with more pixels than they allow, fewer pixels are traced and the picture is enlarged."""
 FEWEST = 4
 """Paths a traced pixel."""
-SKY = 0.25
-"""Share of them that each of the two pictures has by which the photo's sky comes into the glass."""
 MARGIN = 2
 """Working pixels around the object that are traced as well."""
 
@@ -41,7 +39,7 @@ class GlassPreview:
     def __init__(
         self, scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None, **values: Any
     ):
-        from materialist.edits.core.sky import sky_maps
+        from materialist.edits.core.sky import photo_sky
         from materialist.render.variant import setup
 
         self._options = options = Glass.given(options, **values)
@@ -53,7 +51,8 @@ class GlassPreview:
         self._edited = glass(scene, mask, options, fitted=fitted, ior=1.5, transmission=1.0)
         self._targets: dict[str, tuple[Any, Any]] = {}
         as_photographed = np.array_equal((fitted or scene).envmap, scene.envmap)
-        self._sky = sky_maps(self._edited) if as_photographed else None
+        sky = photo_sky(self._edited) if as_photographed else None
+        self._light = self._edited.envmap if sky is None else sky
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._look()
 
@@ -65,7 +64,6 @@ class GlassPreview:
         """
         from materialist.edits.composite.native_layer import spread
         from materialist.edits.core.renderer import denoised
-        from materialist.edits.core.sky import traced
         from materialist.render.native import radiance
         from materialist.render.scene import GLASS_DEPTH
 
@@ -75,12 +73,7 @@ class GlassPreview:
         size, box = self._size(spp)
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
-        options: dict[str, Any] = {"seed": seed, "max_depth": GLASS_DEPTH, "names": [self._name]}
-
-        def trace(share: float) -> Array:
-            return radiance(target, size, box, spp=max(1, round(share * paths)), **options)
-
-        seen = traced(trace, target, self._edited, self._sky, share=SKY)
+        seen = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
         calm = without_fireflies(spread(seen), spread=focused(self._edited))
         guide = self._guides[size]
         return self._in_photo(denoised(calm, guide.albedo, guide.normal), surface)
@@ -165,7 +158,7 @@ class GlassPreview:
             edited.geometry, edited.camera, bodies=bodies, lamps=edited.lamps, device=self._options.device
         )  # fmt: skip
         target.set_materials(edited.materials)
-        target.set_envmap(edited.envmap)
+        target.set_envmap(self._light)
         return target, target.mi.traverse(target.mi_scene)
 
     def _in_photo(self, traced: Array, surface: Surface) -> Array:
