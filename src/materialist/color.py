@@ -23,13 +23,13 @@ def linear_to_srgb(linear: Array) -> Array:
 
 
 def srgb_levels(linear: Array, dtype: type = np.uint8) -> Array:
-    """Linear values [H, ...] (clipped to [0, 1]) as whole levels of a display file, uint8 or uint16; by parts."""
+    """Linear values [H, ...] (clipped to [0, 1]) as whole levels of a display file, uint8 or uint16; NaN is 0."""
     linear = np.asarray(linear, np.float32)
     top = float(np.iinfo(dtype).max)
     out: Array = np.empty(linear.shape, dtype)
     for start in range(0, len(linear), ROWS):
         rows = slice(start, start + ROWS)
-        out[rows] = np.round(linear_to_srgb(linear[rows]).astype(np.float64) * top)
+        out[rows] = np.round(np.nan_to_num(linear_to_srgb(linear[rows]).astype(np.float64)) * top)
     return out
 
 

@@ -198,6 +198,13 @@ class Body:
     surface: Surface
     name: str = "body"
 
+    @property
+    def mesh(self) -> Mesh:
+        """The triangles; no face of them carries a pixel of the photo."""
+        count = len(self.faces)
+        pixel, plane = np.zeros(count, np.int32), np.full(count, -1, np.int16)
+        return Mesh(self.vertices, self.faces, self.normals, self.uv, pixel, plane)
+
 
 @dataclass(frozen=True)
 class FitReport:

@@ -10,9 +10,8 @@ import trimesh
 from export_scenes import load_xml, room
 
 from materialist.edits.core.surfaces import uniform_surface
-from materialist.exporters import body_parts
 from materialist.exporters.glb import glb_bytes
-from materialist.exporters.parts import scene_parts
+from materialist.exporters.parts import body_parts, one_roughness, scene_parts
 from materialist.exporters.run import export
 from materialist.io.exr import read_exr
 from materialist.types import Body, Lamp, Scene, Surface
@@ -40,7 +39,7 @@ COATED = uniform_surface((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
 
 
 def document(scene):
-    data = glb_bytes(scene, [*scene_parts(scene), *body_parts.body_parts(scene)])
+    data = glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)])
     (size,) = struct.unpack_from("<I", data, 12)
     return json.loads(data[20 : 20 + size])
 
@@ -90,7 +89,7 @@ def test_the_page_shows_bodies_without_the_continued_planes():
     from materialist.exporters.page import _packed
 
     scene = with_bodies(CHECKS)
-    parts = [*scene_parts(scene), *body_parts.body_parts(scene)]
+    parts = [*scene_parts(scene), *body_parts(scene)]
     packed = _packed(scene.camera, scene.depth, parts)
     assert len(parts) > 2 and packed["surface"] == 3 * (len(parts[0].mesh.faces) + 2) < packed["all"]
 
@@ -196,7 +195,7 @@ def test_usd_gets_textures_and_says_that_nothing_refracts(tmp_path):
 def test_the_page_has_a_texture_s_colours_at_the_vertices():
     from materialist.exporters.page import _vertices
 
-    (part,) = body_parts.body_parts(with_bodies(CHECKS))
+    (part,) = body_parts(with_bodies(CHECKS))
     inside = replace(part.mesh, uv=np.float32([[0.25, 0.25], [0.75, 0.25], [1.25, -0.25], [0.75, 0.75]]))
     colours = _vertices(replace(part, mesh=inside))["colour"]
     np.testing.assert_array_equal(colours / 255, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]])
@@ -251,14 +250,14 @@ def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
 
 def test_glass_and_its_film_share_one_roughness_where_a_format_has_one():
     coated = replace(CHECKS, roughness=np.full((1, 1), 0.8, np.float32), transmission=0.75, glass_roughness=0.0)
-    (part,) = body_parts.body_parts(with_bodies(coated))
+    (part,) = body_parts(with_bodies(coated))
     np.testing.assert_allclose(part.materials.roughness, 0.8)
-    np.testing.assert_allclose(body_parts.one_roughness(part).roughness, 0.2, atol=1e-6)
+    np.testing.assert_allclose(one_roughness(part).roughness, 0.2, atol=1e-6)
 
 
 def test_maps_of_several_sizes_are_brought_to_one():
     surface = Surface(CHECKS.albedo, np.linspace(0, 1, 4, dtype=np.float32).reshape(4, 1), CHECKS.metallic)
-    (part,) = body_parts.body_parts(with_bodies(surface))
+    (part,) = body_parts(with_bodies(surface))
     assert part.materials.albedo.shape == (4, 2, 3) and part.materials.roughness.shape == (4, 2)
     np.testing.assert_allclose(part.materials.roughness[:, 1], [0, 1 / 3, 2 / 3, 1], atol=1e-6)
     np.testing.assert_allclose(part.materials.albedo[::2], CHECKS.albedo)

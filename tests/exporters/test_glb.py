@@ -17,9 +17,8 @@ from PIL import Image
 from materialist.camera import project
 from materialist.color import linear_to_srgb
 from materialist.edits.insert.meshes import read_model, repainted
-from materialist.exporters.body_parts import body_parts
 from materialist.exporters.glb import glb_bytes, write_hdr
-from materialist.exporters.parts import scene_parts
+from materialist.exporters.parts import body_parts, scene_parts
 
 VALIDATE = """
 const validator = require('gltf-validator');

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from export_scenes import room
 
-from materialist.exporters.page import _VERTEX, _packed, page, write_page
+from materialist.exporters.page import _VERTEX, _packed, page
 from materialist.exporters.parts import scene_parts
 
 
@@ -62,7 +62,7 @@ def browser():
 
 def test_in_a_browser(browser, tmp_path):
     scene = room()
-    write_page(tmp_path / "room.html", scene, scene_parts(scene))
+    (tmp_path / "room.html").write_text(page(scene, scene_parts(scene)), "utf-8")
     tab = browser.new_page(viewport={"width": 700, "height": 800})
     asked, faults = [], []
     tab.on("request", lambda request: asked.append(request.url.split(":")[0]))

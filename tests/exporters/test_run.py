@@ -55,6 +55,25 @@ def test_a_folder_may_have_a_dot_in_its_name(tmp_path):
     assert mt.export(room(), tmp_path / "room.v2", to="mitsuba").path == tmp_path / "room.v2" / "scene.xml"
 
 
+def test_only_an_earlier_export_is_replaced(tmp_path):
+    target = tmp_path / "out"
+    mt.export(room(), target, to="mitsuba")
+    with pytest.raises(mt.OutputError, match="give --force"):
+        mt.export(room(), target, to="usd")
+    (target / "work").mkdir()
+    (target / "work" / "comp.nk").touch()
+    with pytest.raises(mt.OutputError, match=r"holds work/comp\.nk, which does not belong to an export"):
+        mt.export(room(), target, to="blend", force=True)
+    (target / "work" / "comp.nk").unlink()
+    (target / ".DS_Store").touch()
+    mt.export(room(), target, to="blend", force=True)
+    assert (target / "build.py").is_file() and not (target / "scene.xml").exists()
+    (target / "materialist-export.json").unlink()
+    with pytest.raises(mt.OutputError, match="is not an export"):
+        mt.export(room(), target, to="blend", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 def test_the_page_is_reduced_unless_asked_otherwise(tmp_path, monkeypatch):
     from materialist.exporters import run
 
@@ -65,7 +84,7 @@ def test_the_page_is_reduced_unless_asked_otherwise(tmp_path, monkeypatch):
 
 
 def test_the_public_name_after_an_import_of_the_package():
-    code = "import materialist.exporters.target, materialist as mt; mt.export(None, 'x.obj')"
+    code = "import materialist.exporters.parts, materialist as mt; mt.export(None, 'x.obj')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert "InputError: x.obj does not say its format" in done.stderr
 

@@ -113,8 +113,8 @@ def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
     (tmp_path / "holiday/precious.jpg").write_text("x")
     (tmp_path / "file").write_text("x")
     (tmp_path / "link").symlink_to(tmp_path / "holiday")
-    for name in ("holiday", "file", "link"):
-        with pytest.raises(OutputError, match="not a scene package"):
+    for name, words in (("holiday", "not a scene package"), ("file", "not a scene package"), ("link", "is a link")):
+        with pytest.raises(OutputError, match=words):
             save_scene(scene, tmp_path / name, force=True)
     assert (tmp_path / "holiday/precious.jpg").exists()
 
@@ -126,7 +126,7 @@ def test_force_never_deletes_what_somebody_put_beside_a_scene(scene, tmp_path):
     for name in ("mask.png", "maps/mask.png", "original.psd", ".keys/a.txt", "bodies/notes.txt"):
         (target / name).parent.mkdir(exist_ok=True)
         (target / name).write_text("mine")
-        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which is no part of a scene"):
+        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which does not belong to a scene package"):
             save_scene(scene, target, force=True)
         assert (target / name).read_text() == "mine"
         (target / name).unlink()
@@ -233,15 +233,13 @@ def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
 
 def test_another_machines_neighbour_is_left_alone_for_a_day(scene, tmp_path, monkeypatch):
     """Its number says nothing here: two containers that share a folder may both have process 7."""
-    name = atomic._sibling(tmp_path / "a.scene", "partial").name
-    monkeypatch.setattr(atomic, "host", lambda: "00000000")
-    neighbour = atomic._sibling(tmp_path / "a.scene", "partial")
+    monkeypatch.setattr(atomic.platform, "node", lambda: "another")
+    neighbour = atomic.partial(tmp_path / "a.scene", "")
     monkeypatch.undo()
-    assert neighbour.name != name
     neighbour.mkdir()
     save_scene(scene, tmp_path / "a.scene")
     assert neighbour.is_dir()
-    monkeypatch.setattr(atomic, "KEPT_FOR", -1)
+    monkeypatch.setattr(atomic, "_DAY", -1)
     save_scene(scene, tmp_path / "a.scene", force=True)
     assert os.listdir(tmp_path) == ["a.scene"]
 

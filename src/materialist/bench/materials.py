@@ -288,6 +288,6 @@ def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _draw(lines: list[list], path: Path) -> None:
     """Each picture with the maps of every predictor under each other, the truth last."""
-    from materialist.io.map_sheet import strip, write_sheet
+    from materialist.io.display import strip, write_sheet
 
     write_sheet([strip(image, *predictions) for image, *predictions in lines], path)

@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import SetupError
-from materialist.exporters.body_parts import in_photo
+from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part
-from materialist.exporters.run import Exported
-from materialist.exporters.target import ensure_free, whole_files, whole_folder
+from materialist.io.atomic import ensure_writable, whole_file
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.render.bodies import SMOOTH, is_glowing, is_transparent
@@ -39,24 +38,24 @@ def export_blend(
 
     Raises SetupError when a Blender that was named, or was found, does not build the file.
     """
-    if path.suffix.lower() != ".blend":
-        with whole_folder(path, force, format="blend") as folder:
-            write_blender_assets(folder, scene, parts)
-        command = _command(["blender"], path / "build.py", path.with_name(f"{path.name}.blend"), options)
-        return Exported(path, (), (f"Make the .blend with: {shlex.join(command)}",))
-    ensure_free(path, force, folder=False)
-    program = _find_blender(blender)
-    if program is None:
-        folder_path = path.with_suffix("")
-        with whole_folder(folder_path, force, format="blend") as folder:
-            write_blender_assets(folder, scene, parts)
-        command = _command(["blender"], folder_path / "build.py", path, options)
-        note = f"No Blender was found, so {folder_path} has a script; make {path} with: {shlex.join(command)}"
-        return Exported(folder_path, (), (note,))
-    with tempfile.TemporaryDirectory() as scratch, whole_files([path], force) as (result,):
-        write_blender_assets(Path(scratch), scene, parts)
-        _run(_command(program, Path(scratch) / "build.py", result, options), result)
-    return Exported(path)
+    wants_file = path.suffix.lower() == ".blend"
+    program = None
+    if wants_file:
+        ensure_writable(path, force, None)
+        program = _find_blender(blender)
+    if program is not None:
+        with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as result:
+            write_blender_assets(Path(scratch), scene, parts)
+            _run(_command(program, Path(scratch) / "build.py", result, options), result)
+        return Exported(path)
+    folder = path.with_suffix("") if wants_file else path
+    with export_folder(folder, force, "blend") as whole:
+        write_blender_assets(whole, scene, parts)
+    file = path if wants_file else path.with_name(f"{path.name}.blend")
+    command = shlex.join(_command(["blender"], folder / "build.py", file, options))
+    if wants_file:
+        return Exported(folder, notes=(f"No Blender was found; {folder} has a script: make {path} with: {command}",))
+    return Exported(folder, notes=(f"Make the .blend with: {command}",))
 
 
 def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
@@ -79,11 +78,17 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
         "photo_width": native[1], "photo_height": native[0],
         "parts": {part.name: _look(part) for part in parts},
         "bounces": (GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH) - 2,
-        "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(in_photo(scene)))],
+        "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(_in_photo(scene)))],
         "lamps": [asdict(lamp) for lamp in scene.lamps],
     }  # fmt: skip
     (folder / "scene.json").write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
     shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")
+
+
+def _in_photo(scene: Scene) -> int:
+    """How many of the scene's bodies, the first ones, its photo shows: those of edits that were saved."""
+    saved = [stage for stage in scene.report.stages if stage.get("name") == "edit"]
+    return max((int(stage.get("bodies", len(scene.bodies))) for stage in saved), default=0)
 
 
 def _prefix(part: Part) -> str:

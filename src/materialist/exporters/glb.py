@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from materialist import __version__
+from materialist.color import srgb_levels
+from materialist.edits.core.topology import edge_faults, volume
 from materialist.errors import OutputError
-from materialist.exporters.body_parts import mean_chord, one_roughness
-from materialist.exporters.parts import Part
-from materialist.exporters.textures import base_color, metallic_roughness, png
+from materialist.exporters.parts import Part, one_roughness
+from materialist.io.display import encoded, to_bytes
 from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface
 
 _FLOAT, _UINT = 5126, 5125
@@ -28,13 +29,8 @@ _NEAREST, _NEAREST_MIPMAP_LINEAR, _CLAMP = 9728, 9986, 33071
 _LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
 
 
-def write_glb(path: Path, scene: Scene, parts: list[Part]) -> None:
-    """Write the parts and the camera of a scene to PATH, one self-contained file."""
-    path.write_bytes(glb_bytes(scene, parts))
-
-
 def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
-    """The same as bytes: header, JSON chunk, binary chunk (glTF 2.0 specification, section 4)."""
+    """One self-contained file: header, JSON chunk, binary chunk (glTF 2.0 specification, section 4)."""
     document = _Document()
     meshes = [document.add_part(part) for part in parts]
     nodes = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
@@ -128,8 +124,8 @@ class _Document:
             pbr["metallicFactor"] = float(m.metallic[0, 0])
         else:
             sampler = 0 if part.surface is None else 1
-            pbr["baseColorTexture"] = {"index": self._texture("base_color", base_color(m), sampler)}
-            packed = metallic_roughness(m)
+            pbr["baseColorTexture"] = {"index": self._texture("base_color", srgb_levels(m.albedo), sampler)}
+            packed = to_bytes(np.stack([np.zeros_like(m.roughness), m.roughness, m.metallic], -1))
             pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
         material: dict = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
         if part.surface is not None and max(part.surface.emission) > 0:
@@ -138,7 +134,7 @@ class _Document:
             material["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
             self.extensions.add("KHR_materials_emissive_strength")
         if part.surface is not None and part.surface.transmission > 0:
-            thick = mean_chord(part)
+            thick = _mean_chord(part)
             material.setdefault("extensions", {}).update(self._glass(part.surface, thick))
             material["doubleSided"] = thick == 0
         return self._add("materials", material)
@@ -158,7 +154,7 @@ class _Document:
         return glass
 
     def _texture(self, name: str, pixels: Array, sampler: int) -> int:
-        view = self._view(png(pixels))
+        view = self._view(encoded(pixels))
         image = self._add("images", {"name": name, "mimeType": "image/png", "bufferView": view})
         return self._add("textures", {"sampler": sampler, "source": image})
 
@@ -197,6 +193,15 @@ def _unit(normals: Array) -> Array:
     """[V, 3] unit to float32 rounding; straight to the viewer where there is none."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0, 0, 1], np.float32))
+
+
+def _mean_chord(part: Part) -> float:
+    """Mean way through a closed part, scene units: 4 volume / area (Cauchy); 0 for an open one."""
+    mesh = part.mesh
+    open_edges, _ = edge_faults(mesh.vertices, mesh.faces)
+    a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(np.float64) for k in range(3))
+    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=-1).sum() / 2)
+    return 0.0 if open_edges or area == 0 else 4 * abs(volume(mesh.vertices, mesh.faces)) / area
 
 
 def _passing(part: Part) -> Materials:

@@ -9,16 +9,13 @@ import math
 import zlib
 from collections.abc import Iterable
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
-from materialist.exporters import pictures
+from materialist.color import srgb_levels
 from materialist.exporters.parts import Part
-from materialist.exporters.textures import jpeg
-from materialist.io.display import to_bytes
+from materialist.io import display
 from materialist.types import Array, Camera, Scene
 
 _VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)])
@@ -37,13 +34,11 @@ _NAMES = {
 """Figure of the report -> what a person reads."""
 
 
-def write_page(path: Path, scene: Scene, parts: list[Part]) -> None:
-    """Write PATH: slider between photo and re-rendering, the mesh to turn, maps, light, report."""
-    path.write_text(page(scene, parts), "utf-8")
-
-
 def page(scene: Scene, parts: list[Part]) -> str:
-    """The page as text; everything that came from outside is escaped, and a policy in it forbids any request."""
+    """A slider between photo and re-rendering, the mesh to turn, maps, light and report, as text.
+
+    Everything that came from outside is escaped, and a policy in the page forbids any request.
+    """
     assets = files("materialist.exporters") / "assets"
     camera, title = scene.camera, _title(scene)
     values = {
@@ -52,11 +47,11 @@ def page(scene: Scene, parts: list[Part]) -> str:
         "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in _warnings(scene)),
         "width": str(camera.width),
         "height": str(camera.height),
-        "photo": _image(to_bytes(linear_to_srgb(scene.photo.linear)), quality=94),
-        "rerender": _image(to_bytes(linear_to_srgb(scene.rerender)), quality=94),
+        "photo": _image(srgb_levels(scene.photo.linear), quality=94),
+        "rerender": _image(srgb_levels(scene.rerender), quality=94),
         "triangles": f"{sum(len(part.mesh.faces) for part in parts):,}",
         "maps": _maps(scene),
-        "envmap": _image(pictures.light(scene.envmap)),
+        "envmap": _image(display.light(scene.envmap)),
         "light_note": f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
         "metrics": _metrics(scene.report.metrics),
         "stages": _table(
@@ -102,15 +97,15 @@ def _warnings(scene: Scene) -> list[str]:
 def _maps(scene: Scene) -> str:
     m = scene.materials
     figures = (
-        ("albedo", "Albedo", to_bytes(linear_to_srgb(m.albedo))),
-        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", pictures.grey(m.roughness)),
-        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", pictures.grey(m.metallic)),
-        ("normal", "Normal, camera frame", pictures.normals(scene.normal)),
-        ("depth", "Depth, near bright", pictures.nearness(scene.depth)),
+        ("albedo", "Albedo", srgb_levels(m.albedo)),
+        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", display.grey(m.roughness)),
+        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", display.grey(m.metallic)),
+        ("normal", "Normal, camera frame", display.normals(scene.normal)),
+        ("depth", "Depth, near bright", display.depths(scene.depth)),
         (
             "error",
-            f"Error of the re-rendering × {pictures.ERROR_GAIN}",
-            pictures.error(scene.photo.linear, scene.rerender),
+            f"Error of the re-rendering × {display.ERROR_GAIN}",
+            display.error(scene.photo.linear, scene.rerender),
         ),
     )
     return "".join(
@@ -134,7 +129,7 @@ def _table(rows: Iterable[tuple[Any, Any]]) -> str:
 
 
 def _image(pixels: Array, quality: int = 90) -> str:
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg(np.ascontiguousarray(pixels), quality)).decode()
+    return "data:image/jpeg;base64," + _base64(display.encoded(pixels, "JPEG", quality=quality, subsampling=0))
 
 
 def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
@@ -166,10 +161,14 @@ def _vertices(part: Part) -> Array:
         albedo = part.materials.albedo  # of a body it repeats
         height, width = albedo.shape[:2]
         column, row = np.floor(mesh.uv * (width, height)).astype(int).T
-        made["colour"][:, :3] = to_bytes(linear_to_srgb(albedo[row % height, column % width]))
+        made["colour"][:, :3] = srgb_levels(albedo[row % height, column % width])
         made["colour"][:, 3] = 255
     return made
 
 
 def _deflated(array: Array) -> str:
-    return base64.b64encode(zlib.compress(array.tobytes(), 9)).decode()
+    return _base64(zlib.compress(array.tobytes(), 9))
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode()

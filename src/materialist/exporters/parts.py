@@ -12,7 +12,7 @@ from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene, S
 
 FEWEST = 100
 """Triangles below which a reduced mesh would no longer show the scene."""
-_NEUTRAL = (0.5, 0.5, 0.0)
+_NEUTRAL = ((0.5, 0.5, 0.5), 0.5, 0.0)
 """Albedo, roughness and metallic of a plane that no pixel lies on, as the renderer has it."""
 
 
@@ -27,7 +27,7 @@ class Part:
     materials: Materials
     """Maps [H, W], looked up by uv without filtering; [1, 1] for a constant."""
     surface: Surface | None = None
-    """For a body: its own material, whose maps repeat and are filtered (see `body_parts`)."""
+    """For a body: its own material, whose maps repeat and are filtered ."""
 
     @property
     def constant(self) -> bool:
@@ -58,20 +58,41 @@ def scene_parts(scene: Scene, max_triangles: int | None = None) -> list[Part]:
     return [Part("surface", part(geometry.mesh, -1), scene.materials), *constants]
 
 
+def body_parts(scene: Scene) -> list[Part]:
+    """A part for every body of the scene, named `body0`, `body1`, ..."""
+    return [Part(f"body{k}", body.mesh, _one_size(body.surface), body.surface) for k, body in enumerate(scene.bodies)]
+
+
+def one_roughness(part: Part) -> Materials:
+    """The part's maps for formats in which glass and the opaque share have one roughness: their mean, by share."""
+    surface = part.surface
+    if surface is None or surface.transmission == 0:
+        return part.materials
+    share = np.float32(surface.transmission)
+    mixed = (1 - share) * part.materials.roughness + share * np.float32(surface.interface_roughness)
+    return replace(part.materials, roughness=mixed.astype(np.float32))
+
+
+def _one_size(surface: Surface) -> Materials:
+    """The maps at the size of the largest, by repetition of texels."""
+    maps = (surface.albedo, surface.roughness, surface.metallic)
+    height, width = (max(m.shape[axis] for m in maps) for axis in (0, 1))
+
+    def grown(values: Array) -> Array:
+        rows = np.arange(height) * values.shape[0] // height
+        columns = np.arange(width) * values.shape[1] // width
+        return np.ascontiguousarray(values[np.ix_(rows, columns)])
+
+    return Materials(*(grown(values) for values in maps))
+
+
 def _mean(materials: Materials, members: Array) -> Materials:
     """[1, 1] mean of the maps over the pixels [H, W] of a plane."""
-    if not members.any():
-        albedo, roughness, metallic = _NEUTRAL
-        return Materials(
-            np.full((1, 1, 3), albedo, np.float32),
-            np.full((1, 1), roughness, np.float32),
-            np.full((1, 1), metallic, np.float32),
-        )
-    return Materials(
-        materials.albedo[members].mean(0, dtype=np.float64).astype(np.float32)[None, None],
-        materials.roughness[members].mean(dtype=np.float64).astype(np.float32)[None, None],
-        materials.metallic[members].mean(dtype=np.float64).astype(np.float32)[None, None],
-    )
+    values = _NEUTRAL
+    if members.any():
+        values = [maps[members].mean(0, dtype=np.float64) for maps in vars(materials).values()]
+    albedo, roughness, metallic = (np.float32(value)[None, None] for value in values)
+    return Materials(albedo, roughness, metallic)
 
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:

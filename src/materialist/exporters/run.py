@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError
-from materialist.exporters.body_parts import body_parts, left_out
-from materialist.exporters.parts import Part, scene_parts
+from materialist.exporters.exported import Exported, export_folder
+from materialist.exporters.parts import Part, body_parts, scene_parts
+from materialist.io.atomic import whole_file, whole_files
 from materialist.types import Scene
 
 FORMATS = ("glb", "blend", "usd", "mitsuba", "html")
@@ -17,23 +19,8 @@ SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
 """Formats that may also be a folder: PATH without a suffix of its own."""
-COATED = (
-    "glass whose coat is seen from outside alone: where the transmission is below 1 it is darker there, by 7 to 30 %"
-)
 PAGE_TRIANGLES = 60_000
 """Triangles in an HTML page unless the caller says otherwise."""
-
-
-@dataclass(frozen=True)
-class Exported:
-    """What was written."""
-
-    path: Path
-    """The file or folder to open."""
-    beside: tuple[Path, ...] = ()
-    """Further files that belong to it."""
-    notes: tuple[str, ...] = ()
-    """What the reader should know or do next."""
 
 
 def export(
@@ -69,26 +56,41 @@ def export(
     if to == "html" and max_triangles is None:
         max_triangles = PAGE_TRIANGLES
     bodies = body_parts(scene)
-    note: tuple[str, ...] = ()
-    if names := left_out(bodies, to):
-        note = (f"{to} shows bodies without {' and '.join(names)}; glb, blend and mitsuba have all of it.",)
+    parts = [*scene_parts(scene, max_triangles), *bodies]
+    if to == "blend":
+        from materialist.exporters.blender import export_blend
+
+        chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
+        options = [option for option, wanted in chosen.items() if wanted]
+        made = export_blend(path, scene, parts, force, blender=blender, options=options)
+    else:
+        writers: dict[str, Callable[..., Exported]] = {"glb": _glb, "usd": _usd, "mitsuba": _mitsuba, "html": _html}
+        made = writers[to](path, scene, parts, force)
+    return replace(made, notes=(*made.notes, *_losses(scene, bodies, to)))
+
+
+def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
+    """What the format does not show of the scene, in sentences."""
+    surfaces = [body.surface for body in scene.bodies]
+    clear = any(surface.transmission > 0 for surface in surfaces)
+    absent = []
+    if to == "usd" and clear:
+        absent = ["refraction and tint of glass"]
+    if to == "html":
+        absent = ["textures but for their colours at the vertices"] * any(not p.constant for p in bodies)
+        absent += ["glass"] * clear + ["glow"] * any(max(s.emission) > 0 for s in surfaces)
+    if absent:
+        yield f"{to} shows bodies without {' and '.join(absent)}; glb, blend and mitsuba have all of it."
     if scene.lamps and to == "html":
         count = len(scene.lamps)
-        note = (*note, f"html has none of the scene's {count} lamp{'s' * (count != 1)}; the other formats have.")
+        yield f"html has none of the scene's {count} lamp{'s' * (count != 1)}; the other formats have."
     if is_pictured(scene) and to != "html":
-        note = (*note, f"{PICTURED}{to} shows the scene without it.")
-    if to == "mitsuba" and any(0 < body.surface.transmission < 1 for body in scene.bodies):
-        note = (*note, f"Mitsuba has no {COATED}.")
-    parts = [*scene_parts(scene, max_triangles), *bodies]
-    if to != "blend":
-        made = _writer(to)(path, scene, parts, force)
-        return replace(made, notes=(*made.notes, *note))
-    from materialist.exporters.blender import export_blend
-
-    chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
-    options = [option for option, wanted in chosen.items() if wanted]
-    made = export_blend(path, scene, parts, force, blender=blender, options=options)
-    return replace(made, notes=(*made.notes, *note))
+        yield f"{PICTURED}{to} shows the scene without it."
+    if to == "mitsuba" and any(0 < surface.transmission < 1 for surface in surfaces):
+        yield (
+            "Mitsuba has no glass whose coat is seen from outside alone: where the transmission is below 1 it is "
+            "darker there, by 7 to 30 %."
+        )
 
 
 def check_format(path: Path, to: str | None) -> str:
@@ -109,22 +111,12 @@ def check_format(path: Path, to: str | None) -> str:
     return to
 
 
-def _writer(to: str) -> Callable[..., Exported]:
-    """The function that writes a format, loaded when it is needed."""
-    if to == "usd":
-        from materialist.exporters.usd import export_usd
-
-        return export_usd
-    return {"glb": _glb, "mitsuba": _mitsuba, "html": _html}[to]
-
-
 def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
-    from materialist.exporters.glb import write_glb, write_hdr
-    from materialist.exporters.target import whole_files
+    from materialist.exporters.glb import glb_bytes, write_hdr
 
     light = path.with_suffix(".light.hdr")
     with whole_files([path, light], force) as (mesh_file, light_file):
-        write_glb(mesh_file, scene, parts)
+        mesh_file.write_bytes(glb_bytes(scene, parts))
         write_hdr(light_file, scene.envmap)
     note = f"glTF holds no environment light: {light.name} is it, its centre column along the camera's -Z."
     return Exported(path, (light,), (note,))
@@ -132,17 +124,28 @@ def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
 
 def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.mitsuba_xml import write_mitsuba
-    from materialist.exporters.target import whole_folder
 
-    with whole_folder(path, force, format="mitsuba") as folder:
+    with export_folder(path, force, "mitsuba") as folder:
         write_mitsuba(folder, scene, parts)
     return Exported(path / "scene.xml", (), (f"Render it with: mitsuba -m scalar_rgb {path / 'scene.xml'}",))
 
 
-def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
-    from materialist.exporters.page import write_page
-    from materialist.exporters.target import whole_files
+def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.exporters.usd import pack_usdz, write_usd
 
-    with whole_files([path], force) as (page,):
-        write_page(page, scene, parts)
+    if path.suffix.lower() == ".usdz":
+        with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as file:
+            write_usd(Path(scratch), scene, parts)
+            pack_usdz(Path(scratch), file)
+        return Exported(path)
+    with export_folder(path, force, "usd") as folder:
+        write_usd(folder, scene, parts)
+    return Exported(path / "scene.usdc")
+
+
+def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    from materialist.exporters.page import page
+
+    with whole_file(path, force) as file:
+        file.write_text(page(scene, parts), "utf-8")
     return Exported(path)

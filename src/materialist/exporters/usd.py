@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.color import srgb_levels
 from materialist.errors import SetupError
-from materialist.exporters.body_parts import one_roughness
-from materialist.exporters.parts import Part
-from materialist.exporters.run import Exported
-from materialist.exporters.target import whole_files, whole_folder
-from materialist.exporters.textures import base_color, png
-from materialist.io.display import to_bytes
+from materialist.exporters.parts import Part, one_roughness
+from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
 from materialist.types import Camera, Lamp, Scene
 
@@ -23,27 +19,15 @@ _APERTURE = 36.0
 """Width of the film, millimetres; only its ratio to the focal length counts."""
 
 
-def export_usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
-    """PATH.usdz, or a folder PATH with `scene.usdc` and its textures. Raises SetupError without usd-core."""
+def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
+    """Fill an empty folder with `scene.usdc` and the textures beside it; our frame is USD's with the Y axis up.
+
+    Raises SetupError without usd-core.
+    """
     try:
-        from pxr import UsdUtils
+        from pxr import Sdf, Usd, UsdGeom
     except ImportError as error:
         raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
-    if path.suffix.lower() != ".usdz":
-        with whole_folder(path, force, format="usd") as folder:
-            write_usd(folder, scene, parts)
-        return Exported(path / "scene.usdc")
-    with tempfile.TemporaryDirectory() as scratch, whole_files([path], force) as (result,):
-        write_usd(Path(scratch), scene, parts)
-        if not UsdUtils.CreateNewUsdzPackage(str(Path(scratch) / "scene.usdc"), str(result)):
-            raise OSError(f"usd-core could not pack {path}")
-    return Exported(path)
-
-
-def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
-    """Fill an empty folder with `scene.usdc` and the textures beside it; our frame is USD's with the Y axis up."""
-    from pxr import Sdf, Usd, UsdGeom
-
     stage = Usd.Stage.CreateNew(str(folder / "scene.usdc"))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -56,6 +40,14 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
     for number, lamp in enumerate(scene.lamps):
         _lamp(stage, f"/Scene/lamp{number}", lamp)
     stage.GetRootLayer().Save()
+
+
+def pack_usdz(folder: Path, file: Path) -> None:
+    """One file of what `write_usd` wrote."""
+    from pxr import UsdUtils
+
+    if not UsdUtils.CreateNewUsdzPackage(str(folder / "scene.usdc"), str(file)):
+        raise OSError(f"usd-core could not pack {file}")
 
 
 def _mesh(stage: Any, part: Part, material: Any) -> None:
@@ -92,7 +84,7 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     surface.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.5)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     m = one_roughness(part)
-    color = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    base = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     roughness = surface.CreateInput("roughness", Sdf.ValueTypeNames.Float)
     metallic = surface.CreateInput("metallic", Sdf.ValueTypeNames.Float)
     if part.surface is not None and max(part.surface.emission) > 0:
@@ -102,7 +94,7 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
         surface.GetInput("ior").Set(float(part.surface.ior))
         surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(1 - float(part.surface.transmission))
     if part.constant:
-        color.Set(tuple(float(c) for c in m.albedo[0, 0]))
+        base.Set(tuple(float(c) for c in m.albedo[0, 0]))
         roughness.Set(float(m.roughness[0, 0]))
         metallic.Set(float(m.metallic[0, 0]))
         return material
@@ -111,12 +103,12 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     reader.CreateIdAttr("UsdPrimvarReader_float2")
     reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
     for socket, name, pixels, space, output in (
-        (color, "base_color", base_color(m), "sRGB", "rgb"),
+        (base, "base_color", srgb_levels(m.albedo), "sRGB", "rgb"),
         (roughness, "roughness", to_bytes(m.roughness), "raw", "r"),
         (metallic, "metallic", to_bytes(m.metallic), "raw", "r"),
     ):
         file = f"{prefix}{name}.png"
-        (folder / file).write_bytes(png(pixels))
+        (folder / file).write_bytes(encoded(pixels))
         texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
         texture.CreateIdAttr("UsdUVTexture")
         texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{file}")

@@ -1,8 +1,8 @@
 """Files and folders that appear whole or not at all: written under a hidden name beside the target, then renamed.
 
-A killed run leaves only `.NAME.HASH.partial-PID-HOST` (unfinished) or `.NAME.HASH.replaced-PID-HOST` (the old scene,
-moved aside). The next save to the same target recognises both by name and removes them, unless their process still
-runs. A process of another machine cannot be asked, so its folders stay for a day.
+A killed run leaves only `.NAME.HASH.partial-PID-HOST` (unfinished) or `.NAME.HASH.replaced-PID-HOST` (the old folder,
+moved aside). The next write of a folder to the same target recognises both by name and removes them, unless their
+process still runs. A process of another machine cannot be asked, so its folders stay for a day.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import re
 import shutil
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
@@ -25,25 +26,40 @@ from materialist.errors import OutputError
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
 _MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
-MEMBERS = re.compile(
+_SCENE_FILES = re.compile(
     r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
     rf"|(prior|maps)/{_MAPS}|bodies/\d+(\.ply|\.{_MAPS}))"
 )
 """Files of a package, beside the photo as it was given."""
-JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
+_JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers leave in folders."""
-KEPT_FOR = 24 * 3600
-"""Seconds for which another machine's unfinished folder is left alone."""
+_DAY = 24 * 3600
 
 
-def process_tag() -> str:
-    """`PID-HOST`: this process among those of all machines (containers) that may share a folder."""
-    return f"{os.getpid()}-{host()}"
+@dataclass(frozen=True)
+class FolderKind:
+    """Folders that `force` may replace: they hold a marker file, and nothing that the program did not write."""
+
+    called: str
+    marker: str | None
+    is_member: Callable[[Path, str], bool]
+    """(folder, name of a file below it) -> whether the program wrote it."""
 
 
-def host() -> str:
-    """Eight hexadecimal digits for this machine's name."""
-    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
+def _is_scene_file(folder: Path, name: str) -> bool:
+    return _SCENE_FILES.fullmatch(name) is not None or name == _original(folder)
+
+
+def _original(folder: Path) -> str:
+    """The name of the photo as it was given in a package."""
+    try:
+        return str(json.loads((folder / MARKER).read_text("utf-8"))["photo"]["original"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return "original.exr"
+
+
+SCENE = FolderKind("a scene package", MARKER, _is_scene_file)
+FRAMES = FolderKind("a folder of frames", None, lambda _, name: re.fullmatch(r"\d+\.png", name) is not None)
 
 
 def make_folder(folder: Path) -> None:
@@ -57,78 +73,105 @@ def make_folder(folder: Path) -> None:
 
 def partial(path: Path, suffix: str | None = None) -> Path:
     """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
-    return path.with_name(f".partial-{process_tag()}{path.suffix.lower() if suffix is None else suffix}")
-
-
-def ensure_writable(path: str | Path, force: bool = False) -> None:
-    """Check that a scene can be written at PATH; call it before the fit. Raises OutputError with the way out.
-
-    PATH must not exist, or with `force` be a scene package or an empty folder: nothing else is ever replaced.
-    """
-    target = _absolute(path)
-    probe = _sibling(target, "probe")
-    try:
-        if target.is_symlink() or target.exists():
-            _require_replaceable(path, target, force)
-        make_folder(target.parent)
-        probe.mkdir()
-        probe.rmdir()
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {_reason(error)}.") from error
+    return path.with_name(f"{_stem(path)}partial-{_process()}{path.suffix.lower() if suffix is None else suffix}")
 
 
 @contextmanager
-def whole_folder(path: str | Path, force: bool = False) -> Iterator[Path]:
-    """Yield an empty temporary folder that becomes PATH when the block ends well, and vanishes when it does not."""
-    ensure_writable(path, force)
-    target = _absolute(path)
-    _sweep(target)
-    temporary = _sibling(target, "partial")
+def writing(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
+    """Raise what goes wrong in the block as an OutputError that names PATH and not its temporary."""
     try:
-        temporary.mkdir()
-        yield temporary
-        if target.is_symlink() or target.exists():  # it may have come in the meantime
-            _require_replaceable(path, target, force)
-        _put_in_place(temporary, target)
+        yield
     except OSError as error:
-        raise OutputError(f"{path} cannot be written: {_reason(error)}.") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        raise OutputError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}.") from error
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(temporary), str(path))) from error
 
 
-def _require_replaceable(path: str | Path, target: Path, force: bool) -> None:
-    """Refuse an existing target without `force`, and anything but a scene package or an empty folder with it."""
+def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
+    """Check before the work that a folder of `kind`, or with None a file, can be written at PATH; its parents are made.
+
+    PATH must not exist, or with `force` be of the same kind: nothing else is ever replaced. Raises OutputError with the
+    way out.
+    """
+    target = _absolute(path)
+    with writing(path):
+        if target.is_symlink() or target.exists():
+            _require_replaceable(path, target, force, kind)
+        make_folder(target.parent)
+        probe = partial(target, ".probe")
+        probe.touch()
+        probe.unlink()
+
+
+def _require_replaceable(path: str | Path, target: Path, force: bool, kind: FolderKind | None) -> None:
+    if kind is None and target.is_dir():
+        raise OutputError(f"{path} is a folder; give a file's name.")
     if not force:
         raise OutputError(f"{path} exists; give --force to replace it, or another name.")
-    if target.is_symlink() or not target.is_dir() or (any(target.iterdir()) and not (target / MARKER).is_file()):
-        raise OutputError(f"{path} is not a scene package, so --force will not replace it; give another name.")
-    if name := next((name for name in files_below(target) if name != _original(target) and not _is_member(name)), ""):
-        raise OutputError(
-            f"{path} holds {name}, which is no part of a scene, so --force will not replace it; move that, or give "
-            "another name."
-        )
+    if target.is_symlink():
+        raise OutputError(f"{path} is a link, which --force will not replace; give what it leads to.")
+    if kind is None:
+        return
+    marked = target.is_dir() and (kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir()))
+    if not marked:
+        raise OutputError(f"{path} is not {kind.called}, so --force will not replace it; give another name.")
+    for name in files_below(target):
+        if not kind.is_member(target, name):
+            raise OutputError(
+                f"{path} holds {name}, which does not belong to {kind.called}, so --force will not replace it; "
+                "move that, or give another name."
+            )
+
+
+@contextmanager
+def whole_files(paths: list[Path], force: bool = False) -> Iterator[list[Path]]:
+    """Yield a temporary for every path; they get their names when the block ends well, and vanish when it does not."""
+    for path in paths:
+        ensure_writable(path, force, None)
+    temporaries = [partial(path) for path in paths]
+    try:
+        with writing(paths[0], temporaries[0]):
+            yield temporaries
+            for temporary, path in zip(temporaries, paths, strict=True):
+                os.replace(temporary, path)
+    finally:
+        for temporary in temporaries:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_file(path: str | Path, force: bool = False) -> Iterator[Path]:
+    """Yield a temporary that becomes PATH when the block ends well, and vanishes when it does not."""
+    with whole_files([Path(path)], force) as (temporary,):
+        yield temporary
+
+
+@contextmanager
+def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE) -> Iterator[Path]:
+    """Yield an empty temporary folder that becomes PATH when the block ends well, and vanishes when it does not."""
+    ensure_writable(path, force, kind)
+    target = _absolute(path)
+    _sweep(target)
+    temporary = partial(target, "")
+    try:
+        with writing(path, temporary):
+            temporary.mkdir()
+            yield temporary
+            if target.is_symlink() or target.exists():  # it may have come in the meantime
+                _require_replaceable(path, target, force, kind)
+            _put_in_place(temporary, target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def files_below(folder: Path) -> list[str]:
     """Names of the files in and below a folder, without those that file managers leave."""
     files = (file for file in folder.rglob("*") if file.is_symlink() or not file.is_dir())
-    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in JUNK)
-
-
-def _is_member(name: str) -> bool:
-    return MEMBERS.fullmatch(name) is not None
-
-
-def _original(folder: Path) -> str:
-    """The name of the photo as it was given in a package."""
-    try:
-        return str(json.loads((folder / MARKER).read_text("utf-8"))["photo"]["original"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return "original.exr"
+    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in _JUNK)
 
 
 def interrupted_replacement(path: str | Path) -> Path | None:
-    """The old scene that a save killed at the worst moment left beside a PATH that is now missing, or None."""
+    """The old folder that a save killed at the worst moment left beside a PATH that is now missing, or None."""
     target = _absolute(path)
     if target.exists() or not target.parent.is_dir():
         return None
@@ -136,11 +179,11 @@ def interrupted_replacement(path: str | Path) -> Path | None:
 
 
 def _put_in_place(temporary: Path, target: Path) -> None:
-    """Rename into place; an old scene is moved aside first, and removed only when the new one is there."""
+    """Rename into place; an old folder is moved aside first, and removed only when the new one is there."""
     if not target.exists():
         os.rename(temporary, target)
         return
-    aside = _sibling(target, "replaced")
+    aside = target.with_name(f"{_stem(target)}replaced-{_process()}")
     os.rename(target, aside)
     try:
         os.rename(temporary, target)
@@ -151,7 +194,7 @@ def _put_in_place(temporary: Path, target: Path) -> None:
 
 
 def _sweep(target: Path) -> None:
-    """Remove what killed runs left; an old scene moved aside goes back when nothing has taken its place."""
+    """Remove what killed runs left; an old folder moved aside goes back when nothing has taken its place."""
     for leftover in sorted(target.parent.iterdir()):
         kind, _, owner = leftover.name.removeprefix(_stem(target)).partition("-")
         process, _, machine = owner.partition("-")
@@ -164,9 +207,19 @@ def _sweep(target: Path) -> None:
 
 
 def _in_use(leftover: Path, process: str, machine: str) -> bool:
-    if machine not in ("", host()):
-        return time.time() - leftover.stat().st_ctime < KEPT_FOR
+    if machine not in ("", _host()):
+        return time.time() - leftover.stat().st_ctime < _DAY
     return psutil.pid_exists(int(process)) and int(process) != os.getpid()
+
+
+def _process() -> str:
+    """`PID-HOST`: this process among those of all machines (containers) that may share a folder."""
+    return f"{os.getpid()}-{_host()}"
+
+
+def _host() -> str:
+    """Eight hexadecimal digits for this machine's name."""
+    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
 
 
 def _stem(target: Path) -> str:
@@ -174,17 +227,9 @@ def _stem(target: Path) -> str:
     return f".{target.name[:40]}.{zlib.crc32(os.fsencode(target.name)):08x}."
 
 
-def _sibling(target: Path, kind: str) -> Path:
-    return target.with_name(f"{_stem(target)}{kind}-{process_tag()}")
-
-
 def _absolute(path: str | Path) -> Path:
     """PATH made absolute without following a link at its end; never the file-system root."""
     target = Path(os.path.abspath(path))
     if not target.name:
-        raise OutputError(f"{path} is not a place for a scene; give a folder name such as kitchen.scene.")
+        raise OutputError(f"{path} is not a place for a result; give a name such as kitchen.scene.")
     return target
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

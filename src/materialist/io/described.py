@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError, OutputError
-from materialist.io.atomic import partial
+from materialist.errors import InputError
+from materialist.io.atomic import whole_file, writing
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:
@@ -17,7 +17,7 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
     Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things, OutputError
     when it cannot be written.
     """
-    try:
+    with writing(folder):
         if folder.is_dir() and any(folder.iterdir()):
             old = described(folder / name)
             if old is None:
@@ -28,12 +28,8 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
                         f"{folder} was begun with {key} {old.get(key)}, not {description[key]}; go on with that or "
                         "name another folder."
                     )
-        folder.mkdir(parents=True, exist_ok=True)
-        temporary = partial(folder / name)
-        temporary.write_text(json.dumps(description, indent=1) + "\n", "utf-8")
-        temporary.replace(folder / name)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+        with whole_file(folder / name, force=True) as file:
+            file.write_text(json.dumps(description, indent=1) + "\n", "utf-8")
 
 
 def described(file: Path) -> dict[str, Any] | None:

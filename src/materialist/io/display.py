@@ -1,11 +1,21 @@
-"""Maps as pictures for people: [H, W, 3] uint8."""
+"""Maps, errors and light as pictures for people: [H, W, 3] uint8; sheets of them; and their PNG and JPEG files."""
 
 from __future__ import annotations
 
+import io
+from pathlib import Path
+
 import numpy as np
 
-from materialist.color import linear_to_srgb, luminance
-from materialist.types import Array
+from materialist.color import linear_to_srgb, luminance, srgb_levels
+from materialist.io.atomic import whole_file
+from materialist.io.image import write_png_bytes
+from materialist.types import Array, Prediction
+
+ERROR_GAIN = 4
+"""What errors are multiplied by to be seen."""
+_SIDE = 144
+"""Pixels of a picture's longer side in a sheet."""
 
 
 def to_bytes(values: Array) -> Array:
@@ -36,4 +46,59 @@ def light(envmap: Array) -> Array:
     key = max(float(np.median(power)), float(power.mean()) * 0.1, 1e-8)
     exposed = power * (0.22 / key)
     shown = exposed * (1 + exposed / 16) / (1 + exposed)
-    return to_bytes(linear_to_srgb(envmap * (shown / np.maximum(power, 1e-8))))
+    return srgb_levels(envmap * (shown / np.maximum(power, 1e-8)))
+
+
+def nearness(depth: Array) -> Array:
+    """[H, W] inverse of planar depth [H, W], stretched to [0.1, 1] so that near is bright; 0 without a surface."""
+    known = depth > 0
+    if not known.any():
+        return np.zeros_like(depth)
+    inverse = np.where(known, 1 / np.where(known, depth, 1), 0)
+    low, high = np.percentile(inverse[known], [1, 99])
+    return np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0)
+
+
+def depths(depth: Array) -> Array:
+    """Planar depth [H, W]: near bright, far dark, black where there is no surface."""
+    return ramp(nearness(depth))
+
+
+def error(photo: Array, rerender: Array) -> Array:
+    """Mean absolute difference of two linear pictures [H, W, 3], sRGB-encoded, times ERROR_GAIN."""
+    return ramp(ERROR_GAIN * np.abs(linear_to_srgb(photo) - linear_to_srgb(rerender)).mean(-1))
+
+
+def strip(image: Array, *predictions: Prediction) -> Array:
+    """The linear picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
+    import cv2
+
+    joined = np.concatenate([np.concatenate([srgb_levels(image), *_maps(p)], 1) for p in predictions], 0)
+    factor = _SIDE / max(image.shape[:2])
+    size = (max(1, round(joined.shape[1] * factor)), max(1, round(joined.shape[0] * factor)))
+    return cv2.resize(joined, size, interpolation=cv2.INTER_AREA)
+
+
+def _maps(prediction: Prediction) -> list[Array]:
+    m = prediction.materials
+    rest = [grey(m.roughness), grey(m.metallic), normals(prediction.normal), grey(nearness(prediction.depth))]
+    return [srgb_levels(m.albedo), *rest]
+
+
+def write_sheet(strips: list[Array], path: Path) -> None:
+    """Strips under each other as a PNG, written whole or not at all."""
+    if not strips:
+        return
+    wide = max(s.shape[1] for s in strips)
+    padded = [np.pad(s, ((0, 6), (0, wide - s.shape[1]), (0, 0))) for s in strips]
+    with whole_file(path, force=True) as file:
+        write_png_bytes(file, np.concatenate(padded, 0))
+
+
+def encoded(pixels: Array, kind: str = "PNG", **settings: int) -> bytes:
+    """A PNG or JPEG file of [H, W, 3] or [H, W] uint8; `settings` are Pillow's."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, kind, **settings)
+    return buffer.getvalue()

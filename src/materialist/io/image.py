@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from materialist.color import srgb_levels
-from materialist.errors import InputError, OutputError
-from materialist.io.atomic import make_folder, partial
+from materialist.errors import InputError
+from materialist.io.atomic import ensure_writable, whole_file, writing
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
@@ -26,10 +25,8 @@ def write_png_bytes(path: str | Path, pixels: Array) -> None:
     """Write [H, W, 3] or [H, W] uint8 as they are. Raises OutputError when the file cannot be written."""
     from PIL import Image
 
-    try:
+    with writing(path):
         Image.fromarray(pixels).save(path, format="PNG")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None:
@@ -37,41 +34,16 @@ def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None
 
     Raises OutputError when the file exists and `force` is not given, or cannot be written.
     """
-    path = Path(path)
     ensure_image_writable(path, force=force)
-    temporary = partial(path)
-    try:
-        (write_exr if path.suffix.lower() == ".exr" else write_png)(temporary, linear)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
-    except OutputError as error:
-        raise OutputError(str(error).replace(str(temporary), str(path))) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    with whole_file(path, force) as temporary:
+        (write_exr if temporary.suffix == ".exr" else write_png)(temporary, linear)
 
 
 def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
     """Check, before hours of work, that write_image will accept PATH; raises OutputError or InputError."""
-    path = Path(path)
-    if path.suffix.lower() not in (".png", ".exr"):
+    if Path(path).suffix.lower() not in (".png", ".exr"):
         raise InputError(f"The output {path} must end in .png (for looking) or .exr (linear, for further work).")
-    if path.is_dir():
-        raise OutputError(f"{path} is a folder; give a file's name.")
-    if path.exists() and not force:
-        raise OutputError(f"{path} exists; give --force to replace it, or another name.")
-    probe_beside(path)
-
-
-def probe_beside(path: Path) -> None:
-    """Write and remove a file next to PATH, whose folder is made; raises OutputError where that fails."""
-    try:
-        make_folder(path.parent)
-        probe = partial(path, ".probe")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    ensure_writable(path, force, None)
 
 
 def read_map(path: str | Path) -> Array:

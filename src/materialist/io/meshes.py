@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from materialist.errors import InputError, OutputError, SceneError
+from materialist.errors import InputError, SceneError
+from materialist.io.atomic import writing
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Body, Mesh, Surface
 
@@ -52,10 +53,8 @@ def write_ply(path: str | Path, mesh: Mesh) -> None:
     faces["count"], faces["vertex_indices"] = 3, mesh.faces
     faces["pixel"], faces["plane"] = mesh.face_pixel, mesh.face_plane
     header = _HEADER.format(vertices=len(vertices), faces=len(faces)).encode()
-    try:
+    with writing(path):
         Path(path).write_bytes(header + vertices.tobytes() + faces.tobytes())
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def read_ply(path: str | Path) -> Mesh:
@@ -89,9 +88,8 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
     (folder / "bodies").mkdir()
     entries: list[dict[str, Any]] = []
     for k, body in enumerate(bodies):
-        count, surface = len(body.faces), body.surface
-        nowhere, kind = np.zeros(count, np.int32), np.full(count, -1, np.int16)
-        write_ply(folder / "bodies" / f"{k}.ply", Mesh(body.vertices, body.faces, body.normals, body.uv, nowhere, kind))
+        surface = body.surface
+        write_ply(folder / "bodies" / f"{k}.ply", body.mesh)
         for name in ("albedo", "roughness", "metallic"):
             write_exr(folder / "bodies" / f"{k}.{name}.exr", getattr(surface, name))
         entries.append(

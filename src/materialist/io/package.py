@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from materialist import __version__
-from materialist.errors import InputError, MaterialistError, OutputError, SceneError
+from materialist.errors import InputError, MaterialistError, SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
@@ -32,10 +32,7 @@ def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
     scene package, or when the disk is full or read-only; nothing half-written stays behind.
     """
     with whole_folder(path, force) as folder:
-        try:
-            _write(scene, folder)
-        except OutputError as error:  # name the package the user asked for, not the temporary that will vanish
-            raise OutputError(str(error).replace(str(folder), str(path))) from error
+        _write(scene, folder)
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -141,10 +138,7 @@ def _write_original(photo: Photo, folder: Path) -> str:
         write_exr(folder / "original.exr", photo.original)
         return "original.exr"
     suffix = Path(photo.path or "").suffix.lower() or _suffix_of(photo.source)
-    try:
-        (folder / f"original{suffix}").write_bytes(photo.source)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
+    (folder / f"original{suffix}").write_bytes(photo.source)
     return f"original{suffix}"
 
 
@@ -254,10 +248,7 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(plain(content), indent=1, ensure_ascii=False)
     if not is_utf8(text):  # a file name of another encoding
         text = json.dumps(plain(content), indent=1)
-    try:
-        path.write_text(text + "\n", "utf-8")
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    path.write_text(text + "\n", "utf-8")
 
 
 def _report_to_json(report: FitReport) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -14,7 +13,8 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
+from materialist.io.atomic import whole_file
 from materialist.types import Array, Camera, Materials, Prediction
 
 
@@ -152,10 +152,5 @@ def _decode(arrays: dict[str, Array]) -> Sample:
 
 def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
     """An .npz of arrays, whole or not at all. Raises OutputError where it cannot be written."""
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    with whole_file(path, force=True) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]

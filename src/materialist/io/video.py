@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import srgb_levels
-from materialist.errors import InputError, OutputError, SetupError
-from materialist.io.atomic import partial
-from materialist.io.image import probe_beside, write_png_bytes
+from materialist.errors import InputError, SetupError
+from materialist.io.atomic import FRAMES, ensure_writable, whole_file, whole_folder
+from materialist.io.image import write_png_bytes
 from materialist.types import Array
 
 BT709 = (
@@ -29,13 +27,9 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
     path = Path(path)
     if path.suffix.lower() not in (".mp4", ""):
         raise InputError(f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames.")
-    if path.exists() and not (force and _replaceable(path)):
-        raise OutputError(f"{path} exists; give {'another name' if force else '--force to replace it'}.")
-    if path.is_symlink():
-        raise OutputError(f"{path} is a link, which --force will not replace; give the file or folder it leads to.")
     if path.suffix:
         _ffmpeg()
-    probe_beside(path)
+    ensure_writable(path, force, None if path.suffix else FRAMES)
 
 
 def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, force: bool = False) -> int:
@@ -45,25 +39,14 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
     """
     path = Path(path)
     ensure_video_writable(path, force=force)
-    temporary = partial(path)
-    try:
-        count = (_to_video if path.suffix else _to_folder)(temporary, pictures, fps)
-        if path.is_dir():
-            shutil.rmtree(path)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True) if temporary.is_dir() else temporary.unlink(missing_ok=True)
-    return count
-
-
-def _to_folder(folder: Path, pictures: Iterable[Array], fps: int) -> int:
-    folder.mkdir()
-    count = 0
-    for count, picture in enumerate(pictures, 1):
-        write_png_bytes(folder / f"{count - 1:04d}.png", srgb_levels(picture))
-    return count
+    if path.suffix:
+        with whole_file(path, force) as file:
+            return _to_video(file, pictures, fps)
+    with whole_folder(path, force, FRAMES) as folder:
+        count = 0
+        for count, picture in enumerate(pictures, 1):
+            write_png_bytes(folder / f"{count - 1:04d}.png", srgb_levels(picture))
+        return count
 
 
 def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
@@ -84,11 +67,6 @@ def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
         if writer is not None:
             writer.close()
     return count
-
-
-def _replaceable(path: Path) -> bool:
-    """A file, or a folder that holds nothing but frames."""
-    return path.is_file() or all(p.suffix == ".png" and p.stem.isdigit() for p in path.iterdir())
 
 
 def _ffmpeg():

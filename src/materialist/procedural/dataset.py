@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.errors import InputError, OutputError
 from materialist.io.described import claim, described
-from materialist.io.map_sheet import strip, write_sheet
+from materialist.io.display import strip, write_sheet
 from materialist.io.samples import SampleFolder, write_arrays
 from materialist.procedural.objects import things
 from materialist.procedural.sample import KINDS, SPLITS, Options, make_sample

@@ -122,18 +122,18 @@ def file_url(path: Path) -> str:
 
 def maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
-    from materialist.exporters import pictures
+    from materialist.io import display
 
     materials = scene.materials
     return [
         (srgb_levels(materials.albedo), "Albedo: colour without light"),
-        (pictures.grey(materials.roughness), "Roughness: black is a mirror, white is chalk"),
-        (pictures.grey(materials.metallic), "Metallic: white is metal"),
-        (pictures.normals(scene.normal), "Normals: which way surfaces face"),
-        (pictures.nearness(scene.depth), "Depth: near is bright"),
-        (pictures.light(scene.envmap), "Light, all around; ahead is the middle"),
+        (display.grey(materials.roughness), "Roughness: black is a mirror, white is chalk"),
+        (display.grey(materials.metallic), "Metallic: white is metal"),
+        (display.normals(scene.normal), "Normals: which way surfaces face"),
+        (display.depths(scene.depth), "Depth: near is bright"),
+        (display.light(scene.envmap), "Light, all around; ahead is the middle"),
         (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
-        (pictures.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
+        (display.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
     ]
 
 

@@ -123,7 +123,7 @@ def _written(session: Session, name: str) -> str:
 @cache
 def _gallery() -> list[tuple[Array, str]]:
     """Small pictures of the lights, the photo's own first."""
-    from materialist.exporters.pictures import light
+    from materialist.io.display import light
 
     own = np.full((64, 128, 3), 225, np.uint8)
     return [(own, OWN), *((light(lights.light(name, 64)), name) for name in lights.names())]

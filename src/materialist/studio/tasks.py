@@ -12,7 +12,7 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import SetupError
-from materialist.io.atomic import partial
+from materialist.io.atomic import partial, whole_file
 from materialist.jobs.worker import Reporter
 from materialist.types import Array, Materials, Prediction, Scene
 
@@ -65,15 +65,15 @@ def invert(
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     """Pictures of what `invert` has found so far."""
-    from materialist.exporters import pictures
+    from materialist.io import display
 
     if isinstance(value, Prediction):
-        shown = {"first depth": pictures.nearness(value.depth), "first normals": pictures.normals(value.normal)}
+        shown = {"first depth": display.depths(value.depth), "first normals": display.normals(value.normal)}
         shown |= _materials("first ", value.materials)
     elif isinstance(value, Materials):
         shown = _materials("", value)
     else:
-        shown = {name: pictures.light(value) if name == "light" else srgb_levels(value)}
+        shown = {name: display.light(value) if name == "light" else srgb_levels(value)}
     for title, pixels in shown.items():
         file = folder / f"found-{title.replace(' ', '-')}.jpg"
         write_pixels(file, pixels)
@@ -81,12 +81,12 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 
 def _materials(before: str, maps: Materials) -> dict[str, Array]:
-    from materialist.exporters import pictures
+    from materialist.io import display
 
     return {
         f"{before}albedo": srgb_levels(maps.albedo),
-        f"{before}roughness": pictures.grey(maps.roughness),
-        f"{before}metallic": pictures.grey(maps.metallic),
+        f"{before}roughness": display.grey(maps.roughness),
+        f"{before}metallic": display.grey(maps.metallic),
     }
 
 
@@ -108,15 +108,14 @@ def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 25
 
 def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
-    from materialist.exporters.glb import write_glb
+    from materialist.exporters.glb import glb_bytes
     from materialist.exporters.parts import scene_parts
-    from materialist.exporters.target import whole_files
     from materialist.io.package import load_scene
 
     report("export", 0, 1)
     loaded = load_scene(scene)
-    with whole_files([Path(output)], True) as (file,):
-        write_glb(file, loaded, scene_parts(loaded, triangles)[:1])
+    with whole_file(output, force=True) as file:
+        file.write_bytes(glb_bytes(loaded, scene_parts(loaded, triangles)[:1]))
     return {"file": output}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from torch import nn
 
 from materialist.errors import InputError
-from materialist.io.map_sheet import strip, write_sheet
+from materialist.io.display import strip, write_sheet
 from materialist.io.samples import Sample, Source
 from materialist.metrics.maps import score, summary
 from materialist.procedural.photographic import as_photo
