@@ -15,7 +15,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.photo import HDR_CLIP
+from materialist.io.photo import HDR_CLIP, exposed, read_photo
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
@@ -172,19 +172,12 @@ def _named(mask: Array | None) -> dict[str, Any] | None:
 
 
 def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
-    if isinstance(photo, Photo):
-        from materialist.io.photo import exposed
-
-        photo = exposed(photo)
-        if fov in ("auto", None):
-            return photo
-        from materialist.io.photo import option_fov
-
-        angle = option_fov(fov) or photo.camera.fov
-        return replace(photo, camera=replace(photo.camera, fov=angle), fov_source="option")
-    from materialist.io.photo import read_photo
-
-    return read_photo(photo, size=size, fov=fov)
+    if not isinstance(photo, Photo):
+        return read_photo(photo, size=size, fov=fov)
+    photo = exposed(photo)
+    if fov == "auto":
+        return photo
+    return replace(photo, camera=replace(photo.camera, fov=fov), fov_source="option")
 
 
 def _seen_by(source, picture: Photo) -> Photo:

@@ -1,34 +1,81 @@
-"""Pictures of integers and float TIFFs, by Pillow, OpenCV and tifffile, to linear Rec.709."""
+"""Pictures of integers and float TIFFs, by Pillow and OpenCV, to linear Rec.709."""
 
 from __future__ import annotations
 
-import re
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from PIL import Image, ImageCms, UnidentifiedImageError
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.decoded import OVER_WHITE, Decoded, check_size
 from materialist.io.exif import image_tags
-from materialist.io.icc import matrix_profile
+from materialist.io.icc import MatrixProfile, matrix_profile
 from materialist.types import Array
 
-if TYPE_CHECKING:
-    from PIL import Image
-
 FORMATS = "PNG, JPEG, HEIC, TIFF, WEBP, EXR, HDR or camera RAW"
-PHOTOMETRIC, ORIENTATION, PLANAR, EXTRA = 262, 274, 284, 338
-"""Tags of TIFF: what values mean, whether channels lie apart, and what those beyond colour are (1: alpha that colours
-are multiplied by)."""
+OVER_WHITE = "Transparent parts are laid over white."
+MAX_PIXELS = 200_000_000
+"""Largest photo accepted, pixels: the largest phone sensors; 2.4 GB as float32."""
+MIN_SIDE = 8
+"""Shortest side accepted, pixels."""
+MAX_ASPECT = 8
+"""Longest shape accepted, long side over short side."""
+_PHOTOMETRIC, _PLANAR, _EXTRA = 262, 284, 338
+"""Tags of TIFF: what values mean, whether channels lie apart, and what the channel beyond colour is."""
+_PREMULTIPLIED = 1
+"""Value of `_EXTRA`: alpha that colours are multiplied by."""
+
+
+@dataclass
+class Decoded:
+    """A decoded file."""
+
+    linear: Array
+    """[H, W, 3] float32 linear Rec.709, upright; display files in [0, 1], scene-linear ones (EXR, HDR) as stored."""
+    scene_linear: bool = False
+    """True for files that hold light rather than display values: EXR, HDR, float TIFF."""
+    tags: dict[str, Any] = field(default_factory=dict)
+    """EXIF by name."""
+    warnings: list[str] = field(default_factory=list)
+    alpha: Array | None = None
+    """[H, W, 1] in [0, 1] of a scene-linear file with transparent parts, whose `linear` is the light of the rest."""
+
+    def over(self, radiance: float) -> Array:
+        """[H, W, 3] with `radiance` behind what is transparent."""
+        return self.linear if self.alpha is None else self.linear + np.float32(radiance) * (1 - self.alpha)
+
+
+def check_size(width: int, height: int, name: object) -> None:
+    """Refuse photos that are too small, too large or too long, before their pixels are decoded."""
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{name} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the limit is "
+            f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
+        )
+    if min(width, height) < MIN_SIDE:
+        raise InputError(f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed.")
+    if max(width, height) > MAX_ASPECT * min(width, height):
+        raise InputError(
+            f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to the part of interest."
+        )
+
+
+def light_and_alpha(light: Array, alpha: Array, warnings: list[str]) -> Decoded:
+    """A scene-linear file of [H, W, 3] light with [H, W, 1] alpha, which is dropped where it is opaque."""
+    alpha = np.clip(alpha.astype(np.float32), 0, 1)
+    if bool(np.all(alpha >= 1)):
+        return Decoded(light, True, warnings=warnings)
+    return Decoded(light, True, warnings=[*warnings, OVER_WHITE], alpha=alpha)
 
 
 def read_bitmap(path: Path) -> Decoded:
     """Everything Pillow opens: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
-    from PIL import Image, UnidentifiedImageError
     from pillow_heif import register_heif_opener
 
     register_heif_opener()
@@ -60,16 +107,9 @@ def _is_deep(image: Image.Image, path: Path) -> bool:
             return file.read(25)[24] == 16
     if image.format == "TIFF":
         return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
-    if image.format == "PPM" and image.mode != "F":
-        return _white(path) > 255
+    if image.format == "PPM" and image.mode == "I":
+        raise InputError(f"{path} has more than 8 bits a channel, which is read from PNG and TIFF alone.")
     return image.mode in ("I", "F") or image.mode.startswith("I;16")
-
-
-def _white(path: Path) -> int:
-    """The value of white in a binary PGM or PPM; 255 in other files."""
-    with path.open("rb") as file:
-        words = re.sub(rb"#[^\n]*", b" ", file.read(4096)).split(None, 4)
-    return int(words[3]) if words[0] in (b"P5", b"P6") else 255
 
 
 def _shallow(image: Image.Image, warnings: list[str]) -> Array:
@@ -77,27 +117,22 @@ def _shallow(image: Image.Image, warnings: list[str]) -> Array:
     alpha = None
     if image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info:
         image_rgba = image.convert("RGBA")
-        alpha = np.asarray(image_rgba)[..., 3].astype(np.float32)[..., None] / 255
+        alpha = np.asarray(image_rgba)[..., 3:].astype(np.float32) / 255
         if image.mode not in ("L", "LA", "La"):
             image_rgba.info.update(image.info)
             image = image_rgba
     profile = image.info.get("icc_profile")
     matrix = matrix_profile(profile) if profile else None
     if matrix is not None and image.mode not in ("CMYK", "L", "LA", "1"):
-        rgb = np.asarray(image.convert("RGB"))
-        linear = _srgb(rgb) if matrix.is_srgb else matrix.linear(rgb, 256)
+        linear = _by_matrix(np.asarray(image.convert("RGB")), matrix)
     else:
-        linear = _srgb(np.asarray(_through_lcms(image, profile, warnings)))
+        linear = _srgb(np.asarray(_through_lcms(image, profile if matrix is None else None, warnings)))
     return linear if alpha is None else _over_white(linear, alpha, warnings)
 
 
 def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]) -> Image.Image:
     """An 8-bit sRGB image, by the embedded profile where there is one that fits, else by Pillow's own conversion."""
-    import io
-
-    from PIL import ImageCms
-
-    if profile and matrix_profile(profile) is None:
+    if profile:
         try:
             source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
             base = {"GRAY": "L", "RGB ": "RGB", "CMYK": "CMYK"}[source.profile.xcolor_space]
@@ -112,54 +147,43 @@ def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]
 
 def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, bool]:
     """16-bit integers and floats, which Pillow would cut to 8 bits, through OpenCV; (linear, scene_linear)."""
+    tags = getattr(image, "tag_v2", {})
+    _require_interleaved(tags.get(_PLANAR, 1), path)
+    if tags.get(_PHOTOMETRIC) == 0 or _PREMULTIPLIED in np.atleast_1d(tags.get(_EXTRA, 2)):
+        raise InputError(f"{path} has inverted values or premultiplied alpha; save it as plain 16-bit RGB.")
+    colour, alpha = _opencv(path)
+    if colour.dtype.kind == "f":
+        return np.ascontiguousarray(colour, np.float32), True
+    profile = image.info.get("icc_profile")
+    matrix = matrix_profile(profile) if profile else None
+    if profile and matrix is None:
+        warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
+    linear = _by_matrix(colour, matrix)
+    if alpha is not None:
+        linear = _over_white(linear, alpha / np.float32(np.iinfo(alpha.dtype).max), warnings)
+    return linear, False
+
+
+def _opencv(path: Path) -> tuple[Array, Array | None]:
+    """RGB [H, W, 3] and alpha [H, W, 1] of a picture of 8- or 16-bit integers or 32- or 64-bit floats."""
     import cv2
 
-    _require_interleaved(image, path)
     decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    if decoded is None:
-        raise InputError(f"{path} has an unusual pixel layout; save it as 8- or 16-bit RGB.")
-    pixels = np.atleast_3d(np.asarray(decoded))
-    scale = {"uint8": 255, "uint16": 65535}.get(pixels.dtype.name, 1)
-    if image.format == "PPM" and pixels.dtype == np.uint16:  # of any number of levels
-        pixels = np.rint(pixels * (scale / _white(path))).astype(np.uint16)
-    grey, alpha = pixels.shape[2] <= 2, None
-    if pixels.shape[2] in (2, 4):
-        alpha = pixels[..., -1:].astype(np.float32) / np.float32(scale)
-    colour = np.repeat(pixels[..., :1], 3, -1) if grey else pixels[..., 2::-1]
-    if pixels.dtype.kind == "f":
-        linear, scene_linear = np.ascontiguousarray(colour, np.float32), True
-    elif pixels.dtype in (np.uint8, np.uint16):
-        scene_linear = False
-        if _tiff_tag(image, PHOTOMETRIC, 1) == 0:  # white is zero
-            colour = scale - colour
-        if alpha is not None and _tiff_tag(image, EXTRA, 2) == 1:  # multiplied by it
-            colour = np.clip(np.rint(colour / np.maximum(alpha, 1e-6)), 0, scale).astype(pixels.dtype)
-        profile = image.info.get("icc_profile") or b""
-        matrix = matrix_profile(profile)
-        if profile and matrix is None:
-            warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
-        linear = _srgb(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour, scale + 1)
-    else:
-        raise InputError(f"{path} holds {pixels.dtype} pixels; save it as 8- or 16-bit RGB.")
-    return (linear if alpha is None else _over_white(linear, alpha, warnings)), scene_linear
+    pixels = np.atleast_3d(np.asarray(decoded)) if decoded is not None else np.zeros((1, 1, 1), bool)
+    if pixels.dtype.kind not in "uf" or (pixels.dtype.itemsize > 2 and pixels.dtype.kind == "u"):
+        raise InputError(f"{path} has an unusual pixel layout, or is damaged; save it as 8- or 16-bit RGB.")
+    colour = np.repeat(pixels[..., :1], 3, -1) if pixels.shape[2] <= 2 else pixels[..., 2::-1]
+    return colour, pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
 
 
-def _tiff_tag(image: Any, tag: int, usual: int) -> int:
-    """The value of a tag of a TIFF, `usual` where it has none or the image is no TIFF."""
-    found = (getattr(image, "tag_v2", None) or {}).get(tag, usual)
-    return int(found[0] if isinstance(found, tuple) else found)
-
-
-def _require_interleaved(image: Any, path: Path) -> None:
+def _require_interleaved(planar: int, path: Path) -> None:
     """OpenCV reads deep TIFFs whose channels lie apart as if they did not. Raises InputError for those."""
-    if _tiff_tag(image, PLANAR, 1) == 2:
+    if planar == 2:
         raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
 
 
 def is_float_tiff(path: Path) -> bool:
     """Whether a TIFF holds colour in a layout that Pillow does not know: float channels."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
         with _pixel_limit_lifted(), Image.open(path):
             return False
@@ -167,42 +191,25 @@ def is_float_tiff(path: Path) -> bool:
         return True
 
 
-def read_float_tiff(path: Path, over: float) -> Decoded:
-    """Float RGB TIFF, scene-linear, of 16, 32 or 64 bits; OpenCV applies the orientation itself."""
-    import cv2
+def read_float_tiff(path: Path) -> Decoded:
+    """Float RGB TIFF, scene-linear, of 32 or 64 bits; OpenCV applies the orientation itself."""
     from tifffile import TiffFile
 
     with TiffFile(path) as file:
-        tags = file.pages[0].tags  # type: ignore[union-attr]
-        apart = int(tags.valueof(PLANAR, 1))
-        extra = np.atleast_1d(tags.valueof(EXTRA, 2))
-        half = _half(file, path) if file.pages[0].dtype == np.float16 else None
-    if apart == 2:
-        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
-    if half is None:
-        pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-        order = [2, 1, 0, 3]
-    else:
-        pixels, order = _upright(half, int(tags.valueof(ORIENTATION, 1))), [0, 1, 2, 3]
-    if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3 or pixels.dtype.kind != "f":
-        raise InputError(f"{path} is a damaged TIFF, or one of an unusual layout; save it as 8- or 16-bit RGB.")
-    check_size(pixels.shape[1], pixels.shape[0], path)
-    colour, laid = np.ascontiguousarray(pixels[..., order[:3]], np.float32), False
-    if pixels.shape[2] == 4:
-        alpha = np.clip(pixels[..., 3:].astype(np.float32), 0, 1)
-        laid = over > 0 and bool(np.any(alpha < 1))
-        colour = (colour if extra[0] == 1 else colour * alpha) + np.float32(over) * (1 - alpha)
-    return Decoded(colour, True, {}, [OVER_WHITE] * laid, laid)
+        page: Any = file.pages[0]
+        _require_interleaved(page.tags.valueof(_PLANAR, 1), path)
+        extra = np.atleast_1d(page.tags.valueof(_EXTRA, 2))
+        check_size(page.imagewidth, page.imagelength, path)
+    colour, alpha = _opencv(path)
+    light = np.ascontiguousarray(colour, np.float32)
+    if alpha is None:
+        return Decoded(light, True)
+    return light_and_alpha(light if extra[0] == _PREMULTIPLIED else light * alpha.astype(np.float32), alpha, [])
 
 
-def _half(file: Any, path: Path) -> Array:
-    """Pixels [H, W, C] of 16-bit floats, which OpenCV does not know."""
-    try:
-        return np.asarray(file.pages[0].asarray())
-    except ValueError as error:  # a compression that needs a library of its own
-        if "imagecodecs" not in str(error):
-            raise
-        raise InputError(f"{path} is compressed in an unusual way; save it uncompressed, or with ZIP.") from error
+def _by_matrix(pixels: Array, matrix: MatrixProfile | None) -> Array:
+    """Linear values of uint8 or uint16; sRGB's own where there is no profile or it is sRGB's."""
+    return _srgb(pixels) if matrix is None or matrix.is_srgb else matrix.linear(pixels)
 
 
 def _srgb(pixels: Array) -> Array:
@@ -236,8 +243,6 @@ def _upright(pixels: Array, orientation: int) -> Array:
 @contextmanager
 def _pixel_limit_lifted() -> Iterator[None]:
     """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
-    from PIL import Image
-
     before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:
         yield

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError, MaterialistError, SetupError
-from materialist.io.bitmap import is_float_tiff, read_bitmap, read_float_tiff
-from materialist.io.decoded import OVER_WHITE, Decoded, check_size
+from materialist.io.bitmap import Decoded, check_size, is_float_tiff, light_and_alpha, read_bitmap, read_float_tiff
 from materialist.io.exif import file_tags
 from materialist.io.exr import read_exr
 
@@ -23,7 +22,7 @@ RAW_SUFFIXES = frozenset(
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 
 
-def decode(path: Path, over: float = 1.0) -> Decoded:
+def decode(path: Path) -> Decoded:
     """Read any supported image file. Raises InputError, or SetupError when camera RAW support is not installed."""
     try:
         with path.open("rb") as file:
@@ -34,11 +33,11 @@ def decode(path: Path, over: float = 1.0) -> Decoded:
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
         if head.startswith(b"\x76\x2f\x31\x01"):
-            return _exr(path, over)
+            return _exr(path)
         if head.startswith((b"#?RADIANCE", b"#?RGBE")):
             return _hdr(path)
         if head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")) and is_float_tiff(path):
-            return read_float_tiff(path, over)
+            return read_float_tiff(path)
         return read_bitmap(path)
     except MaterialistError:
         raise
@@ -48,7 +47,7 @@ def decode(path: Path, over: float = 1.0) -> Decoded:
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
 
 
-def _exr(path: Path, over: float) -> Decoded:
+def _exr(path: Path) -> Decoded:
     """OpenEXR; alpha is premultiplied there."""
     import OpenEXR
 
@@ -62,14 +61,12 @@ def _exr(path: Path, over: float) -> Decoded:
         warnings.append("The file holds a part of its frame, taken for the whole photo; give --fov for that part.")
     if abs(float(header.get("pixelAspectRatio", 1)) - 1) > 1e-3:
         warnings.append("The file says that its pixels are not square; they are taken as square.")
-    pixels, laid = read_exr(path, photo=True), False
+    pixels = read_exr(path, photo=True)
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
     if pixels.shape[-1] == 4:
-        laid = over > 0 and bool(np.any(pixels[..., 3] < 1))
-        pixels = pixels[..., :3] + over * np.clip(1 - pixels[..., 3:], 0, 1)
-    warnings += [OVER_WHITE] * laid
-    return Decoded(np.ascontiguousarray(pixels), True, {}, warnings, laid)
+        return light_and_alpha(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3:], warnings)
+    return Decoded(pixels, True, warnings=warnings)
 
 
 def _hdr(path: Path) -> Decoded:

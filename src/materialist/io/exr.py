@@ -10,8 +10,8 @@ from materialist.errors import InputError, OutputError
 from materialist.plain import is_utf8
 from materialist.types import Array
 
-_GREY = ("Y", "V", "L", "Z", "y", "depth")
-_LIGHT = ("Y", "L", "y")
+_GREY = ("Y", "V", "L", "Z", "depth")
+_LIGHT = ("Y", "L")
 """Those of them that may be a photo."""
 _PICTURES = ("beauty", "combined", "rgba", "rgb", "image", "final")
 """Names of the layer that is the picture, where there are several."""
@@ -42,12 +42,8 @@ def read_exr(path: str | Path, *, photo: bool = False) -> Array:
         raise InputError(
             f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
         ) from error
-    if photo:
-        coloured = [part for part in parts if _coloured(_layers(part))]
-        array = _pick_photo((coloured or parts)[0], path)
-    else:
-        array = _pick(parts[0], path)
-    return np.ascontiguousarray(array, np.float32)
+    chosen = next((part for part in parts if _coloured(_layers(part))), parts[0])
+    return np.ascontiguousarray(_pick(chosen, path, photo), np.float32)
 
 
 def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
@@ -72,17 +68,13 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
         raise OutputError(f"{path} cannot be written: {error}") from error
 
 
-def _odd(channels: dict[str, Array]) -> list[str]:
-    """Names of channels that hold no half or float."""
-    return [name for name, pixels in channels.items() if pixels.dtype not in (np.float16, np.float32)]
-
-
 def _layers(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
-    """Layer -> channel -> pixels; "" is what has no layer."""
-    odd, layers = _odd(channels), dict[str, dict[str, Array]]()
-    for name in [name for name in channels if name not in odd]:
-        layer, _, part = name.rpartition(".")
-        layers.setdefault(layer, {})[part.upper() if len(part) == 1 else part] = channels[name]
+    """Layer -> channel -> half or float pixels; "" is what has no layer."""
+    layers: dict[str, dict[str, Array]] = {"": {}}
+    for name, pixels in channels.items():
+        if pixels.dtype in (np.float16, np.float32):
+            layer, _, part = name.rpartition(".")
+            layers.setdefault(layer, {})[part.upper() if len(part) == 1 else part] = pixels
     return layers
 
 
@@ -97,37 +89,19 @@ def _stacked(parts: dict[str, Array], names: str) -> Array:
     return np.stack([parts[c].astype(np.float32) for c in (names + "A" if "A" in parts else names)], -1)
 
 
-def _pick_photo(channels: dict[str, Array], path: Path) -> Array:
-    """The photo among the channels: RGB(A), else grey, with its alpha."""
-    layers, odd = _layers(channels), _odd(channels)
-    for layer in _coloured(layers):
-        return _stacked(layers[layer], "RGB")
-    for name in _LIGHT:
-        if name in channels and name not in odd:
-            plain = layers[""]
-            return _stacked(plain, 3 * name.upper()) if "A" in plain else channels[name]
-    lone = next(iter(channels), "")
-    if len(channels) == 1 and not odd and lone not in _GREY:
-        return channels[lone]
-    return _refused(channels, odd, path)
-
-
-def _pick(channels: dict[str, Array], path: Path) -> Array:
-    """The map among the channels: plain RGB(A), then grey, then a layer with RGB(A), the one named so first."""
-    layers, odd = _layers(channels), _odd(channels)
-    coloured = _coloured(layers)
-    if "" not in coloured:
-        for name in _GREY:
-            if name in channels and name not in odd:
-                return channels[name]
-    for layer in coloured:
-        return _stacked(layers[layer], "RGB")
-    if len(channels) == 1 and not odd:
-        return next(iter(channels.values()))
-    return _refused(channels, odd, path)
-
-
-def _refused(channels: dict[str, Array], odd: list[str], path: Path) -> Array:
+def _pick(channels: dict[str, Array], path: Path, photo: bool) -> Array:
+    """The photo or the map among the channels of a part. Raises InputError where there is none."""
+    layers = _layers(channels)
+    plain, coloured = layers[""], _coloured(layers)
+    grey = [name for name in (_LIGHT if photo else _GREY) if name in plain]
+    if coloured and (photo or "" in coloured or not grey):
+        return _stacked(layers[coloured[0]], "RGB")
+    if grey:
+        return _stacked(plain, 3 * grey[0]) if photo and "A" in plain else plain[grey[0]]
+    known = [pixels for parts in layers.values() for name, pixels in parts.items() if not (photo and name in _GREY)]
+    if len(channels) == len(known) == 1:
+        return known[0]
+    odd = [str(pixels.dtype) for pixels in channels.values() if pixels.dtype not in (np.float16, np.float32)]
     if odd:
-        raise InputError(f"{path} holds {channels[odd[0]].dtype} pixels; save it as half or float.")
+        raise InputError(f"{path} holds {odd[0]} pixels; save it as half or float.")
     raise InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")

@@ -36,9 +36,10 @@ class MatrixProfile:
         curve_off = max(float(np.abs(curve - srgb_to_linear(encoded)).max()) for curve in self.curves)
         return bool(np.abs(self.matrix - np.eye(3)).max() < 3e-3) and curve_off < 2e-3
 
-    def linear(self, encoded: Array, levels: int) -> Array:
-        """[H, W, 3] integers in 0 .. levels - 1 to [H, W, 3] float32 linear Rec.709, clipped to [0, 1]."""
-        positions = np.arange(levels) / (levels - 1)
+    def linear(self, encoded: Array) -> Array:
+        """[H, W, 3] uint8 or uint16 to [H, W, 3] float32 linear Rec.709, clipped to [0, 1]."""
+        top = np.iinfo(encoded.dtype).max
+        positions = np.arange(top + 1) / top
         out = np.empty(encoded.shape, np.float32)
         for channel, curve in enumerate(self.curves):
             table = np.interp(positions, np.linspace(0, 1, len(curve)), curve).astype(np.float32)

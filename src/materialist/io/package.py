@@ -154,7 +154,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     try:
         stops = int(meta.get("stops", 0))
         if meta["has_source"]:
-            original = decode_photo(file, over=2.0**-stops).linear
+            original = decode_photo(file).over(2.0**-stops)
             original = original * np.float32(2.0**stops) if stops else original
         else:
             original = read_exr(file)

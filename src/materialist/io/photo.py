@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.io.bitmap import MIN_SIDE, Decoded
 from materialist.io.decode import decode
-from materialist.io.decoded import MIN_SIDE, Decoded
 from materialist.io.examples import PREFIX, example_path
 from materialist.io.exif import horizontal_fov
+from materialist.options import InvertOptions
 from materialist.types import Array, Camera, Photo
 
 DEFAULT_FOV = 35.0
@@ -39,24 +40,21 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
     """
-    angle = option_fov(fov)
-    if isinstance(size, bool) or not isinstance(size, int) or not MIN_SIDE <= size <= 8192:
-        raise InputError(f"The working size must be a whole number of pixels from {MIN_SIDE} to 8192, not {size!r}.")
+    wanted = InvertOptions(size=size, fov="auto" if fov is None else fov)
+    angle = None if wanted.fov == "auto" else float(wanted.fov)
     name = str(path)
     file = example_path(name) if name.startswith(PREFIX) else Path(path)
     decoded = decode_photo(file)
-    hdr, stops = False, 0
-    if decoded.scene_linear:
-        # What is transparent tells nothing.
-        opaque = decode_photo(file, over=0.0).linear if decoded.over else decoded.linear
-        hdr = not _is_clipped(opaque)
-        stops = _stops(_working(opaque, size)) if hdr else 0
-        if stops and decoded.over:
-            decoded.linear = decode_photo(file, over=2.0**-stops).linear
-    original = decoded.linear
+    hdr = decoded.scene_linear and not _is_clipped(decoded.linear)
+    stops = _stops(_working(decoded.linear, size)) if hdr else 0
+    original = decoded.over(2.0**-stops)
     height, width = original.shape[:2]
     linear = _working(original, size)
-    warnings = [*decoded.warnings, *_remarks(width, height)]
+    warnings = list(decoded.warnings)
+    if width == 2 * height:
+        warnings.append(
+            "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
+        )
     if stops:
         original, linear = (picture * np.float32(2.0**stops) for picture in (original, linear))
         warnings.append(f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit.")
@@ -100,11 +98,8 @@ def _stops(linear: Array) -> int:
     return int(np.clip(np.round(np.log2(max(BRIGHT / bright, MIDDLE / middle))), -60, 60))
 
 
-def decode_photo(file: Path, over: float = 1.0) -> Decoded:
-    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise.
-
-    over: radiance behind the transparent parts of an EXR; 0 for light, of which a transparent film tells nothing.
-    """
+def decode_photo(file: Path) -> Decoded:
+    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise."""
     try:
         folder, there = file.is_dir(), file.exists()
         empty = file.is_file() and file.stat().st_size == 0
@@ -116,7 +111,7 @@ def decode_photo(file: Path, over: float = 1.0) -> Decoded:
         raise InputError(f"There is no picture at {file}.")
     if empty:
         raise InputError(f"{file} is empty (0 bytes); copy it again.")
-    decoded = decode(file, over)
+    decoded = decode(file)
     pixels = decoded.linear
     if decoded.scene_linear:
         broken = ~np.isfinite(pixels).all(-1)
@@ -132,19 +127,6 @@ def decode_photo(file: Path, over: float = 1.0) -> Decoded:
     return decoded
 
 
-def option_fov(fov: float | str | None) -> float | None:
-    """The --fov option as degrees, or None for automatic."""
-    if fov is None or fov == "auto":
-        return None
-    try:
-        angle = float(fov)
-    except ValueError:
-        angle = float("nan")
-    if not 1 < angle < 170:
-        raise InputError(f"The field of view must be between 1 and 170 degrees (or auto), not {fov}.")
-    return angle
-
-
 def _working(original: Array, size: int) -> Array:
     """[H, W, 3] with the longer side at most `size`: area average of linear light, never an enlargement.
 
@@ -158,16 +140,6 @@ def _working(original: Array, size: int) -> Array:
         return original
     target = (round(width * scale), round(height * scale))
     return np.asarray(cv2.resize(original, target, interpolation=cv2.INTER_AREA))
-
-
-def _remarks(width: int, height: int) -> list[str]:
-    """What the user should know about this photo."""
-    remarks = []
-    if width == 2 * height:
-        remarks.append(
-            "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
-        )
-    return remarks
 
 
 def _require_content(linear: Array, name: str) -> None:

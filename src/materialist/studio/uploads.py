@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import InputError, MaterialistError
+from materialist.io.bitmap import check_size
 from materialist.io.decode import RAW_SUFFIXES
-from materialist.io.decoded import check_size
 from materialist.studio import SETTINGS
 
 PHOTOS = frozenset(

@@ -150,7 +150,7 @@ def read_envmap(path: str | Path, *, rows: int = 256) -> Array:
 
     from materialist.io.photo import decode_photo
 
-    envmap = checked_envmap(decode_photo(Path(path), over=0).linear)
+    envmap = checked_envmap(decode_photo(Path(path)).linear)
     if envmap.shape[0] > rows:
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
     return envmap

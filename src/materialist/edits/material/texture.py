@@ -15,7 +15,7 @@ def read_texture(path: str | Path) -> Array:
     """[h, w, 3] float32 linear picture in [0, 1]. Raises InputError."""
     from materialist.io.photo import decode_photo
 
-    return np.clip(decode_photo(Path(path)).linear, 0, 1)
+    return np.clip(decode_photo(Path(path)).over(1.0), 0, 1)
 
 
 def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -> Array:
