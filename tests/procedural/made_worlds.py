@@ -3,10 +3,9 @@
 import numpy as np
 
 from materialist.procedural import materials as m
-from materialist.procedural.objects import solids as s
-from materialist.procedural.objects.parts import block
+from materialist.procedural.objects import shapes as s
 from materialist.procedural.walls import Opening, RoomWall, surface
-from materialist.procedural.world import Portal, ScenePart, World, look
+from materialist.procedural.world import Portal, ScenePart, World, block, look, moved
 from materialist.render.envmap import half_turn, on_mitsuba_grid
 
 X, Y, Z = np.eye(3)
@@ -27,16 +26,15 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
         block((0.5, 0.7, 0.5), (0.3, 0, -0.3), plain((0.9, 0.7, 0.4), 0.3, 1.0), 0.05, turn=0.5),
         block((0.4, 0.4, 0.4), (-0.4, 0, 0), red, turn=0.2),
     ]  # fmt: skip
-    hole = (0.6, 1.4, 0.6, 1.5) if window else (2.0, 2.0, 2.0, 2.0)
-    side = RoomWall(np.array([1.0, 0, -1]), Z, 2.0, 2.0, [Opening(*hole)] if window else [])
-    parts += surface(side, grey)
+    side = RoomWall(2.0, 2.0, [Opening(0.6, 1.4, 0.6, 1.5)] if window else [])
+    parts += moved(surface(side, grey), (1, 0, -1), -np.pi / 2)
     if lamp:
         glow = plain((0.8, 0.8, 0.8), emission=(8.0, 6.0, 4.0))
         parts.append(ScenePart(s.sheet((-0.3, 1.95, -0.3), 0.6 * X, 0.6 * Z), glow))
     envmap = np.full((32, 64, 3), sky, np.float32)
     envmap[:12] *= np.array([1.0, 1.5, 3.0], np.float32)
     envmap[10, 40] *= 60
-    portals = [Portal(side.point(0.6, 0.6), 0.8 * Z, 0.9 * Y)] if window and portal else []
+    portals = [Portal(np.array([1, 0.6, -0.4]), 0.8 * Z, 0.9 * Y)] if window and portal else []
     return World(parts, envmap, look((0.1, 1.0, 0.95), (0, 0.6, -0.5), 70), portals)
 
 

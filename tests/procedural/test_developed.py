@@ -7,7 +7,7 @@ import numpy as np
 
 from materialist.procedural import packing, sample, tiles
 from materialist.procedural.materials import Material
-from materialist.procedural.objects import solids as s
+from materialist.procedural.objects import shapes as s
 from materialist.procedural.tracer import SampleTracer
 from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera

@@ -9,7 +9,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.procedural import packing, tracer
-from materialist.procedural.objects import solids as s
+from materialist.procedural.objects import shapes as s
 from materialist.procedural.sample import labels_of
 from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
@@ -127,7 +127,7 @@ def test_the_sky_has_no_labels():
 
 def test_texture_labels_average_the_part_that_the_centre_sees():
     probe = {
-        "owner": np.array([[[0, 0, 1, 0]]]), "surface": np.ones((1, 1, 4)), "depth": np.array([[[1.0, 2, 3, 4]]]),
+        "owner": np.array([[[0, 0, 1, 0]]]), "depth": np.array([[[1.0, 2, 3, 4]]]),
         "normal": np.zeros((1, 1, 4, 3)), "albedo": np.array([[[[0.1] * 3, [0.2] * 3, [0.9] * 3, [0.6] * 3]]]),
         "roughness": np.array([[[0.1, 0.2, 0.9, 0.6]]]), "metallic": np.zeros((1, 1, 4)),
     }  # fmt: skip
@@ -161,9 +161,8 @@ def test_sizes_that_do_not_fill_vectors_are_refused():
 def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
     from types import SimpleNamespace
 
-    from materialist.procedural.objects.things import one_thing, placed
     from materialist.procedural.sample import things_of
-    from materialist.procedural.world import ScenePart
+    from materialist.procedural.world import one_thing, placed
 
     solid, _ = SimpleNamespace(), None
     floor = ScenePart(solid, None)

@@ -109,19 +109,18 @@ def _turned(index: int, seed: int) -> Thing:
 
 def _free(index: int, seed: int) -> Thing:
     """A lumpy or twisted body."""
-    from materialist.procedural.objects import solids
     from materialist.procedural.objects.glassware import centred
 
     rng = np.random.default_rng([seed, 8, index])
     if index % 2:
         turn, bend = rng.choice([-1, 1]) * rng.uniform(1, 3), rng.uniform(-0.4, 0.4)
         column = shapes.superquadric(np.array([0.5, 1, rng.uniform(0.25, 0.5)]), 0.6, rng.uniform(0.5, 1))
-        body = centred(solids.warped(column, lambda p: _twist(p, turn, bend)))
+        body = centred(shapes.warped(column, lambda p: _twist(p, turn, bend)))
         name = f"twisted {index}"
     else:
-        body = centred(solids.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
+        body = centred(shapes.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
         name = f"blob {index}"
-    return Thing(name, "asymmetric", solids.grounded(shapes.placed(body, scale=0.65)))
+    return Thing(name, "asymmetric", shapes.grounded(shapes.placed(body, scale=0.65)))
 
 
 def _twist(points: Array, turn: float, bend: float) -> Array:
@@ -160,13 +159,11 @@ class GlassScene:
     @cached_property
     def behind(self) -> Front:
         """The room alone."""
-        from materialist.procedural.objects.solids import joined
-
         if not self.room:
             size = (self.camera.height, self.camera.width)
             normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*size, 3))
             return Front(np.zeros(size, np.float32), normal, np.zeros(size, np.float32), -normal)
-        return seen(joined([i.solid for i in self.room]), self.camera)
+        return seen(shapes.joined([i.solid for i in self.room]), self.camera)
 
     @cached_property
     def mask(self) -> Array:

@@ -39,17 +39,15 @@ class Material:
     """Radiance is emission times albedo, on the front side."""
     offset: tuple[float, float] | None = None
     """Shift in tiles; None for a shift of its own for every surface."""
-    surface: bool = True
-    """False for pictures of the distance (a view behind a window): no label is given there."""
 
     def row(self, shift: tuple[float, float]) -> Array:
-        """[28] float32 as the path tracer reads it; `shift` moves the tile where the material leaves that open."""
+        """[24] float32 as the path tracer reads it; `shift` moves the tile where the material leaves that open."""
         c, s = np.cos(self.turn), np.sin(self.turn)
         (c0, c1, c2), (r0, r1), (m0, m1) = self.colours, self.roughness, self.metallic
         offset = shift if self.offset is None else self.offset
         return np.array(
             [*c0, r0, *c1, r1, *c2, self.grain, m0, m1, c / self.repeat[0], s / self.repeat[0], -s / self.repeat[1],
-             c / self.repeat[1], offset[0], offset[1], *self.emission, float(self.tile), float(self.surface), 0, 0, 0],
+             c / self.repeat[1], offset[0], offset[1], *self.emission, float(self.tile)],
             np.float32,
         )  # fmt: skip
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from materialist.procedural import lights
 from materialist.procedural import materials as m
-from materialist.procedural import skies
-from materialist.procedural.objects import solids as s
+from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects import street_things as street
 from materialist.procedural.objects import things
-from materialist.procedural.objects.parts import Parts, block, placed
-from materialist.procedural.objects.shapes import Solid, grid_faces
 from materialist.procedural.objects.things import Meshes
-from materialist.procedural.world import ScenePart, World, look, look_down
+from materialist.procedural.world import Parts, ScenePart, World, block, bounds, look, look_down, placed
 
 GROUNDS: tuple[tuple[float, m.Maker], ...] = (
     (0.2, m.wood), (0.13, m.stone), (0.13, m.fabric), (0.1, m.tiled), (0.1, m.plastic), (0.1, m.wall_paint),
@@ -44,7 +44,7 @@ def still_life(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wo
     target = np.array([rng.normal() * 0.06, rng.uniform(0.05, 0.18), rng.normal() * 0.06])
     up, turn, distance, fov = rng.uniform([np.radians(5), -0.7, 0.65, 25], [np.radians(60), 0.7, 1.4, 60])
     view = look_down(target, distance, turn, up, fov, rng.normal() * 0.03)
-    return World(parts, skies.around(rng, captures), view, kind="still life")
+    return World(parts, lights.around(rng, captures), view, kind="still life")
 
 
 def outdoor(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World:
@@ -54,7 +54,7 @@ def outdoor(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World
     eye = np.array([rng.normal() * 0.8, height, rng.uniform(3, 7)])
     target = np.array([rng.normal() * 1.5, rng.uniform(0.0, 2.2), -rng.uniform(2, 12)])
     view = look(eye, target, rng.uniform(30, 70), rng.normal() * 0.02)
-    return World(parts, skies.outdoors(rng, captures), view, kind="outdoor")
+    return World(parts, lights.outdoors(rng, captures), view, kind="outdoor")
 
 
 def _flat(half: float, material: m.Material, n: int = 1) -> ScenePart:
@@ -66,7 +66,7 @@ def _houses(rng, start: float, end: float, gap: float) -> list[tuple[float, Part
     row = []
     while start < end:
         house = street.house(rng)
-        width = float(np.ptp(house[0].solid.vertices[:, 0]))
+        width = float(np.ptp(bounds(house[:1]), axis=0)[0])
         row.append((start + width / 2, house))
         start += width + rng.choice([0.0, rng.uniform(0.5, gap)])
     return row
@@ -108,9 +108,6 @@ def _yard(rng, meshes) -> Parts:
         parts += placed(street.wall(rng, 40.0), (0, 0, back))
     if rng.random() < 0.4:
         parts += placed(street.wall(rng, 12.0), (rng.choice([-1, 1]) * rng.uniform(3, 7), 0, 0), np.pi / 2)
-    if rng.random() < 0.4:
-        size = (rng.uniform(2, 6), 0.05, rng.uniform(2, 8))
-        parts.append(block(size, (rng.normal() * 2, 0, rng.normal() * 2), m.ground(rng)))
     return parts + _strewn(rng, meshes, int(rng.integers(3, 12)), (4.5, back + 1.5, 2.5))
 
 
@@ -134,19 +131,22 @@ def _strewn(rng, meshes, count: int, bounds) -> Parts:
 
 def _land(rng, meshes) -> Parts:
     """Meadow or park, with hills, trees and stones."""
-    n = 64
-    t = np.sinh(np.linspace(-4, 4, n)) / np.sinh(4) * 0.8 * HORIZON
-    x, z = np.meshgrid(t, t, indexing="ij")
     hills, bumps = s.lumps(rng, rng.uniform(0, 7), 0.012), s.lumps(rng, rng.uniform(0, 0.25), 0.12)
-    p, far = np.stack([x, 0 * x, z], -1), np.clip((np.hypot(x, z - 4) - 4) / 25, 0, 1)
-    y = hills(p) * far**1.5 + bumps(p) * np.clip(far * 4, 0, 1)
-    flat, faces = np.stack([x, y, z], -1).reshape(-1, 3), grid_faces(n, n, flip=True)
-    parts = [ScenePart(Solid(flat, faces, s.smooth_normals(flat, faces), flat[:, [0, 2]]), m.ground(rng))]
+
+    def height(p):
+        """[...] of the ground at points [..., 3], level around the viewer."""
+        far = np.clip((np.hypot(p[..., 0], p[..., 2] - 4) - 4) / 25, 0, 1)
+        return hills(p) * far**1.5 + bumps(p) * np.clip(far * 4, 0, 1)
+
+    unit = s.sheet((-1, 0, 1), (2, 0, 0), (0, 0, -2), 64)
+    wide = np.sinh(4 * unit.vertices) / np.sinh(4) * 0.8 * HORIZON  # fine around the viewer
+    land = s.warped(replace(unit, vertices=wide, uv=wide[:, [0, 2]]), lambda p: p + height(p)[:, None] * [0, 1, 0])
+    parts = [ScenePart(land, m.ground(rng))]
     if rng.random() < 0.5:
         parts.append(ScenePart(s.sheet((-1.5, 0.01, 12), (rng.uniform(1, 3), 0, 0), (0, 0, -14)), m.ground(rng)))
     for _ in range(int(rng.integers(4, 16))):
-        at = np.array([rng.uniform(-20, 20), 0, rng.uniform(-40, -3)])
-        at[1] = y.ravel()[np.argmin(((flat - at)[:, ::2] ** 2).sum(-1))] - 0.05
+        at = rng.uniform([-20, 0, -40], [20, 0, -3])
+        at[1] = height(at) - 0.05
         tall = rng.random() < 0.6
         parts += placed(street.tree(rng, rng.uniform(3, 9)) if tall else street.bush(rng, rng.uniform(0.6, 2.5)), at)
     return parts + _strewn(rng, meshes, int(rng.integers(1, 7)), (3.5, -4, 2))

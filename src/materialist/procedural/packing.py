@@ -11,7 +11,7 @@ from materialist.envmap import row_solid_angle
 from materialist.procedural.world import World
 from materialist.types import Array
 
-FACE, MATERIAL, PORTAL = 28, 28, 16
+FACE, MATERIAL, PORTAL = 28, 24, 16
 """Floats a row of each table: multiples of four, for wide gathers."""
 MAX_PORTALS = 4
 LIGHT_TABLE = 2048

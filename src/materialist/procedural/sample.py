@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance
-from materialist.procedural import outdoors, packing, rooms, workshops
+from materialist.procedural import outdoors, packing, rooms
 from materialist.procedural.world import World
 from materialist.render.denoise import denoise
 from materialist.types import Array, Camera
@@ -23,7 +23,7 @@ _KINDS: tuple[tuple[str, Callable[..., World], float], ...] = (
     ("table", rooms.table_top, 0.14),
     ("still-life", outdoors.still_life, 0.12),
     ("outdoor", outdoors.outdoor, 0.18),
-    ("workshop", workshops.workshop, 0.2),
+    ("workshop", rooms.workshop, 0.2),
 )
 """Name, maker and share of a set."""
 KINDS = tuple(name for name, *_ in _KINDS)
@@ -126,7 +126,7 @@ def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
     rays of the pixel that see the same part; all 0 where there is no surface."""
     centre = _centre(probe)
     owner = probe["owner"][..., centre]
-    mask = (owner >= 0) & (probe["surface"][..., centre] > 0.5)
+    mask = owner >= 0
     same = ((probe["owner"] == owner[..., None]) & mask[..., None]).astype(np.float32)
     share = same / np.maximum(same.sum(-1, keepdims=True), 1)
     out = {k: (probe[k] * share).sum(2) for k in ("roughness", "metallic")}

@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
+from materialist.bsdf import lobes
+from materialist.bsdf.disney import base_reflectance, specular_probability
+from materialist.bsdf.ggx import alpha_of
 from materialist.procedural import tiles
 from materialist.procedural.packing import ENV_ROWS, ENV_TABLE, FACE, LIGHT_TABLE, MATERIAL, MAX_PORTALS, PORTAL
 
@@ -43,7 +48,6 @@ class Look:
     roughness: Any
     metallic: Any
     emission: Any
-    surface: Any
 
 
 @dataclass
@@ -66,14 +70,10 @@ class Surfaces:
 
     def hit(self, found, d) -> Hit:
         """The surface at preliminary intersections `found` of rays with directions d."""
-
         return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid())
 
     def at(self, index, b, d, t, valid) -> Hit:
         """The surface at barycentric coordinates b of faces, seen along directions d."""
-        import drjit as dr
-        import mitsuba as mi
-
         row = [dr.gather(mi.Vector4f, self.face, index * (FACE // 4) + k, valid) for k in range(FACE // 4)]
         corners = [(row[2 * k], row[2 * k + 1]) for k in range(3)]
         place = [mi.Point3f(a.x, a.y, a.z) for a, _ in corners]
@@ -94,10 +94,10 @@ class Surfaces:
 
     def look(self, hit: Hit, texel) -> Look:
         """The material at hits; `texel` in [0, 1)^2 spreads the lookup over neighbouring texels."""
-        import drjit as dr
-        import mitsuba as mi
-
-        r = [dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid) for k in range(7)]
+        r = [
+            dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid)
+            for k in range(MATERIAL // 4)
+        ]
         s = hit.uv.x * r[3].z + hit.uv.y * r[3].w + r[4].z
         t = hit.uv.x * r[4].x + hit.uv.y * r[4].y + r[4].w
         side = tiles.SIZE
@@ -111,7 +111,7 @@ class Surfaces:
         roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _LEAST_ROUGHNESS, 1)
         metallic = dr.lerp(r[3].x, r[3].y, f[0])
         emission = mi.Color3f(r[5].x, r[5].y, r[5].z) * albedo
-        return Look(albedo, roughness, metallic, emission, r[6].x)
+        return Look(albedo, roughness, metallic, emission)
 
 
 @dataclass
@@ -130,9 +130,6 @@ class Lights:
 
     def sky(self, d):
         """Radiance from direction d (camera frame), bilinear."""
-        import drjit as dr
-        import mitsuba as mi
-
         u, v = self._place(d)
         x, y = u * self.sizes[1] - 0.5, v * self.sizes[0] - 0.5
         columns, rows = mi.Int32(self.sizes[1]), mi.Int32(self.sizes[0])
@@ -150,25 +147,17 @@ class Lights:
 
     def _place(self, d):
         """(u, v) in [0, 1) of directions in the camera frame."""
-        import drjit as dr
-        import mitsuba as mi
-
         s = mi.Vector3f(*(dr.dot(row, d) for row in self.turn))
         u = dr.atan2(s.x, -s.z) * (0.5 * dr.inv_pi) + 0.5
         return u - dr.floor(u), dr.acos(dr.clip(s.y, -1, 1)) * dr.inv_pi
 
     def density(self, ray, hit: Hit):
         """Density per solid angle with which `aim` would have found what the ray found, seen from its origin."""
-        import drjit as dr
-
         cosine = dr.abs(dr.dot(hit.ng, ray.d))
         lamp = self.shares[2] * hit.density * hit.t * hit.t / dr.maximum(cosine, 1e-6)
         return dr.select(hit.valid, dr.select(hit.front, lamp, 0), self._sky_density(ray.o, ray.d))
 
     def _sky_density(self, p, d):
-        import drjit as dr
-        import mitsuba as mi
-
         u, v = self._place(d)
         column = dr.minimum(mi.UInt32(u * (2 * ENV_ROWS)), 2 * ENV_ROWS - 1)
         row = dr.minimum(mi.UInt32(v * ENV_ROWS), ENV_ROWS - 1)
@@ -176,9 +165,6 @@ class Lights:
         return total + self.shares[1] * self._portal_density(p, d)
 
     def _portal_density(self, p, d):
-        import drjit as dr
-        import mitsuba as mi
-
         total = mi.Float(0)
         for k in range(MAX_PORTALS):
             corner, right, up, normal, share = self._portal(mi.UInt32(k))
@@ -192,18 +178,12 @@ class Lights:
         return total
 
     def _portal(self, k):
-        import drjit as dr
-        import mitsuba as mi
-
         r = [dr.gather(mi.Vector4f, self.portals, k * (PORTAL // 4) + i) for i in range(PORTAL // 4)]
         corner, right = mi.Point3f(r[0].x, r[0].y, r[0].z), mi.Vector3f(r[0].w, r[1].x, r[1].y)
         return corner, right, mi.Vector3f(r[1].z, r[1].w, r[2].x), mi.Vector3f(r[2].y, r[2].z, r[2].w), r[3].x
 
     def aim(self, hit: Hit, surfaces: Surfaces, draws) -> ToLight:
         """One direction from each hit towards a light, chosen by `draws.which` and `draws.light`."""
-        import drjit as dr
-        import mitsuba as mi
-
         s0, s1, s2 = self.shares
         to_sky, to_portal = draws.which < s0, draws.which < s0 + s1
         # The envmap: a texel from the table, a uniform direction within it.
@@ -234,16 +214,10 @@ class Lights:
 
     def _portal_count(self):
         """Number of portals, from the rows in use."""
-        import drjit as dr
-        import mitsuba as mi
-
         used = [dr.gather(mi.Float, self.portals, mi.UInt32(k * PORTAL + 12)) > 0 for k in range(MAX_PORTALS)]
         return sum((dr.select(u, mi.Float(1), 0) for u in used), mi.Float(0))
 
     def _texel_direction(self, texel, u):
-        import drjit as dr
-        import mitsuba as mi
-
         row, column = texel // (2 * ENV_ROWS), texel % (2 * ENV_ROWS)
         step = float(np.pi / ENV_ROWS)
         top, bottom = dr.cos(mi.Float(row) * step), dr.cos(mi.Float(row + 1) * step)
@@ -254,3 +228,28 @@ class Lights:
         scene = mi.Vector3f(r * s, y, -r * c)
         rows = self.turn
         return mi.Vector3f(*(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3)))
+
+
+def value(wi, wo, look: Look):
+    """The project's BRDF (paper, section Preliminary) with its diffuse and specular lobes apart.
+
+    Returns (f_d cos of a white dielectric, f_s cos [3], sampling density) for local unit directions; 0 below the
+    surface.
+    """
+    above, alpha = (wi.z > 0) & (wo.z > 0), alpha_of(look.roughness)
+    specular = lobes.specular(wi, wo, alpha, base_reflectance(look.albedo, look.metallic))
+    density = lobes.density(wi, wo, alpha, _specular_probability(wi, look))
+    return (
+        dr.select(above, lobes.diffuse(wi, wo, look.roughness), 0),
+        dr.select(above, specular, mi.Color3f(0)),
+        dr.select(above, density, 0),
+    )
+
+
+def sample(wi, look: Look, draws):
+    """A local direction drawn with the density that `value` gives."""
+    return lobes.sample(wi, alpha_of(look.roughness), draws.lobe < _specular_probability(wi, look), draws.bsdf)
+
+
+def _specular_probability(wi, look: Look):
+    return specular_probability(wi.z, mi.luminance(look.albedo), look.metallic)

@@ -2,19 +2,22 @@
 
 Mitsuba's own integrators compile again whenever the set of shapes, materials or lamps changes, which costs more than
 a 256 x 256 picture. Here all shapes are one mesh, all materials rows of a table over one bank of tiles, and lamps are
-luminous faces of the mesh. The reflectance is that of `render.bsdf` (paper, section Preliminary). Light is sampled by
+luminous faces of the mesh. The reflectance is that of `bsdf` (paper, section Preliminary). Light is sampled by
 the balance heuristic between the BSDF and one draw from {envmap, portals, luminous faces}.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from functools import cache
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from materialist.buffers import floats, integers
 from materialist.errors import InputError
-from materialist.procedural import scatter, tiles
+from materialist.procedural import shading, tiles
 from materialist.procedural.packing import Packed
 from materialist.procedural.shading import Hit, Lights, Surfaces
 from materialist.render.variant import setup
@@ -29,24 +32,18 @@ VECTOR = 16
 CLAMP = 30.0
 """Largest contribution of one light sample after the first surface, against fireflies; mean light is about 1."""
 
-_BANK: dict[str, Any] = {}
 
-
-def _bank(mi):
+@cache
+def _bank():
     """The tiles on the device, once a process: [N * SIZE * SIZE] UInt32, four channels of 8 bits."""
-    if "tiles" not in _BANK:
-        packed = np.ascontiguousarray(tiles.bank()[0]).view(np.uint32).ravel()
-        _BANK["tiles"] = integers(mi, packed)
-    return _BANK["tiles"]
+    return integers(mi, np.ascontiguousarray(tiles.bank()[0]).view(np.uint32))
 
 
 class SampleTracer:
     """One packed world, ready to be rendered."""
 
     def __init__(self, packed: Packed, camera: Camera, *, device: str = "auto"):
-        self.mi = mi = setup(device)
-        import drjit as dr
-
+        setup(device)
         if camera.width * camera.height % VECTOR:
             raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
         self.camera = camera
@@ -58,8 +55,8 @@ class SampleTracer:
             dr.eval(copy)
             return copy
 
-        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(mi, packed)})
-        self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank(mi))
+        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(packed)})
+        self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank())
         rows, columns = packed.env.shape[:2]
         sizes = dr.opaque(mi.Float, float(rows)), dr.opaque(mi.Float, float(columns))
         shares = [dr.opaque(mi.Float, float(s)) for s in packed.shares]
@@ -76,9 +73,7 @@ class SampleTracer:
 
         The shading is what the diffuse lobe of the first surface would send back with albedo 1 and metallic 0.
         """
-        import drjit as dr
-
-        mi, (h, w) = self.mi, (self.camera.height, self.camera.width)
+        h, w = self.camera.height, self.camera.width
         rows = max(1, int(np.sqrt(spp)))
         spp = rows * rows
         lane = dr.arange(mi.UInt32, h * w * spp)
@@ -97,12 +92,10 @@ class SampleTracer:
     def probe(self, side: int) -> dict[str, Array]:
         """What side x side rays through each pixel see.
 
-        Returns arrays of a leading [H, W, side * side]: owner (-1 for nothing), surface (0 or 1), depth (planar,
-        metres, 0 for nothing), normal [., 3] (camera frame, towards the camera), albedo [., 3], roughness, metallic.
+        Returns arrays of a leading [H, W, side * side]: owner (-1 for nothing), depth (planar, metres, 0 for
+        nothing), normal [., 3] (camera frame, towards the camera), albedo [., 3], roughness, metallic.
         """
-        import drjit as dr
-
-        mi, (h, w), n = self.mi, (self.camera.height, self.camera.width), side * side
+        h, w, n = self.camera.height, self.camera.width, side * side
         lane = dr.arange(mi.UInt32, h * w * n)
         pixel, sample = lane // n, lane % n
         places = (mi.Point2f(mi.Float(sample % side), mi.Float(sample // side)) + 0.5) / side
@@ -112,7 +105,7 @@ class SampleTracer:
         depth = dr.select(hit.valid, -hit.p.z, 0)
         owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
         out = {
-            "owner": owner, "surface": dr.select(hit.valid, look.surface, 0), "depth": depth,
+            "owner": owner, "depth": depth,
             "normal": [dr.select(hit.valid, c, 0) for c in hit.n],
             "albedo": [dr.select(hit.valid, c, 0) for c in look.albedo],
             "roughness": look.roughness, "metallic": look.metallic,
@@ -123,9 +116,7 @@ class SampleTracer:
 
     def _camera_ray(self, pixel, place):
         """Rays through `place` in [0, 1)^2 of pixels, from the origin along -Z."""
-        import drjit as dr
-
-        mi, (h, w) = self.mi, (self.camera.height, self.camera.width)
+        h, w = self.camera.height, self.camera.width
         x = (mi.Float(pixel % w) + place.x - w / 2) / self.focal
         y = (h / 2 - mi.Float(pixel // w) - place.y) / self.focal
         return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
@@ -136,24 +127,10 @@ class SampleTracer:
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
-        import drjit as dr
-
-        mi = self.mi
-        even, lanes = _Even(mi, pixel, sample, seed), dr.width(pixel)
-        zero, one = mi.Color3f(0), mi.Color3f(1)
+        even, lanes = _Even(pixel, sample, seed), dr.width(pixel)
         fate = mi.PCG32(initstate=mi.UInt64(seed) + 311, initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR))
-        state = (
-            mi.Ray3f(ray),
-            rng,
-            fate,
-            mi.UInt32(0),
-            one,
-            mi.Color3f(0),
-            zero,
-            mi.Color3f(0),
-            mi.Float(-1),
-            mi.Bool(True),
-        )
+        start = mi.Ray3f(ray), rng, fate, mi.UInt32(0)
+        state = (*start, mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Float(-1), mi.Bool(True))
 
         def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
             hit = self._hit(ray, active)
@@ -177,7 +154,7 @@ class SampleTracer:
             shadow.maxt = to_light.distance
             wanted &= ~self.scene.ray_test(shadow, coherent=False, active=wanted)
             wi = hit.frame.to_local(-ray.d)
-            diffuse, specular, density = scatter.value(wi, wo, look)
+            diffuse, specular, density = shading.value(wi, wo, look)
             share = to_light.radiance / dr.maximum(to_light.pdf + density, 1e-20)
             share = dr.select(wanted, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
             first = depth == 0
@@ -185,8 +162,8 @@ class SampleTracer:
             total = total + beta * full * share
             white = white + dr.select(first, mi.Color3f(diffuse), beta_white * full) * share
             # Go on.
-            wo = scatter.sample(wi, look, draws)
-            diffuse, specular, pdf = scatter.value(wi, wo, look)
+            wo = shading.sample(wi, look, draws)
+            diffuse, specular, pdf = shading.value(wi, wo, look)
             full = look.albedo * (1 - look.metallic) * diffuse + specular
             d = hit.frame.to_world(wo)
             active &= (wo.z > 0) & (pdf > 0) & (dr.dot(hit.ng, d) > 0)
@@ -202,7 +179,7 @@ class SampleTracer:
         return out[6], out[7]
 
 
-def _mesh(mi, packed: Packed):
+def _mesh(packed: Packed):
     mesh = mi.Mesh("all", len(packed.vertices), len(packed.faces))
     params = mi.traverse(mesh)
     params["vertex_positions"] = floats(mi, packed.vertices)
@@ -217,16 +194,13 @@ class _Even:
     # Powers of the inverse of the positive root of x**7 = x + 1 (Roberts 2018, generalised golden ratios).
     _STEPS = tuple((1 / 1.1127756842787055) ** (k + 1) % 1 for k in range(6))
 
-    def __init__(self, mi, pixel, sample, seed):
-        import drjit as dr
-
-        self.mi, self.dr, self.sample = mi, dr, sample
+    def __init__(self, pixel, sample, seed):
+        self.sample = sample
         shift = mi.PCG32(initstate=mi.UInt64(seed) + 977, initseq=mi.UInt64(pixel))
         self.shift = [shift.next_float32() for _ in self._STEPS]
 
     def draw(self, rng, depth):
         """The numbers that one surface needs; `rng` goes on."""
-        dr, mi = self.dr, self.mi
         free = [rng.next_float32() for _ in range(8)]
         index = mi.Float(self.sample)
         even = [s + index * step for s, step in zip(self.shift, self._STEPS)]
@@ -235,9 +209,12 @@ class _Even:
         return Draws(u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7]))
 
 
+@dataclass
 class Draws:
     """Uniform random numbers for one surface of a path."""
 
-    def __init__(self, which, light, lobe, bsdf, texel):
-        self.which, self.light, self.lobe, self.bsdf = which, light, lobe, bsdf
-        self.texel = texel
+    which: mi.Float
+    light: mi.Point2f
+    lobe: mi.Float
+    bsdf: mi.Point2f
+    texel: mi.Point2f

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from materialist.procedural.materials import Material
+from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
@@ -19,6 +21,9 @@ class ScenePart:
     material: Material
     thing: object | None = None
     """What the part belongs to: parts of one thing have the same; None for walls, floors and the like."""
+
+
+Parts = list[ScenePart]
 
 
 @dataclass(frozen=True)
@@ -77,3 +82,47 @@ def look_down(
     """
     eye = target + distance * np.array([np.sin(turn) * np.cos(up), np.sin(up), np.cos(turn) * np.cos(up)])
     return look(eye if within is None else np.clip(eye, *within), target, fov, roll)
+
+
+def block(
+    size: ArrayLike, at: ArrayLike, material: Material, radius: float = 0.0, *, turn: float = 0.0, tip: float = 0.0
+) -> ScenePart:
+    """A slab of `size` [3] standing at `at` [3], its edges rounded by `radius`; tipped about X, turned about Y."""
+    return ScenePart(shapes.moved(shapes.slab(size, radius), at, turn, tip), material)
+
+
+def rod(points: ArrayLike, radius: ArrayLike, material: Material, n: int = 8) -> ScenePart:
+    """A round rod along points [P, 3]."""
+    return ScenePart(shapes.tube(points, radius, n), material)
+
+
+def orb(at: ArrayLike, radius: float, material: Material, n: int = 24) -> ScenePart:
+    """A ball about `at` [3]."""
+    return ScenePart(shapes.moved(shapes.ball(n), at, scale=radius), material)
+
+
+def one_thing(parts: Parts) -> Parts:
+    """The parts, those that belong to nothing yet as one thing."""
+    thing = object()
+    return [part if part.thing is not None else replace(part, thing=thing) for part in parts]
+
+
+def moved(parts: Parts, at: ArrayLike, turn: float = 0.0) -> Parts:
+    """The parts turned about Y and moved by `at` [3]."""
+    return [replace(p, solid=shapes.moved(p.solid, at, turn)) for p in parts]
+
+
+def placed(parts: Parts, at: ArrayLike, turn: float = 0.0) -> Parts:
+    """The parts turned about Y and moved by `at` [3], as one thing but for those that are things already."""
+    return moved(one_thing(parts), at, turn)
+
+
+def standing(parts: Parts) -> Parts:
+    """The parts moved up or down together, so that they stand on y = 0."""
+    return placed(parts, (0, -bounds(parts)[0][1], 0))
+
+
+def bounds(parts: Parts) -> tuple[Array, Array]:
+    """[3] lower and [3] upper corner of the box around the parts, metres."""
+    points = np.concatenate([p.solid.vertices for p in parts])
+    return points.min(0), points.max(0)

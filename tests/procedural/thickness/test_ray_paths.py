@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.procedural.objects import shapes, solids
+from materialist.procedural.objects import shapes
 from materialist.procedural.thickness.ray_paths import ShapeTracer
 
 RADIUS = 0.5
 
 
 def ball(radius=RADIUS, n=160):
-    return solids.moved(solids.ball(n), scale=radius)
+    return shapes.moved(shapes.ball(n), scale=radius)
 
 
 def inside_out(solid):
@@ -58,7 +58,7 @@ def test_lengths_are_in_units_of_the_direction():
 
 
 def test_a_hollow_ball_has_walls():
-    shell = solids.joined([ball(), inside_out(ball(0.4))])
+    shell = shapes.joined([ball(), inside_out(ball(0.4))])
     x = np.array([0.05, 0.35, 0.45])
     found = ShapeTracer(shell).trace(*straight(x))
     outer, inner = (2 * np.sqrt(np.maximum(r * r - x * x, 0)) for r in (0.5, 0.4))
@@ -67,14 +67,14 @@ def test_a_hollow_ball_has_walls():
 
 
 def test_gaps_count_as_solid_and_not_as_material():
-    pair = solids.joined([solids.moved(ball(0.2), at=(0, 0, z)) for z in (-0.4, 0.4)])
+    pair = shapes.joined([shapes.moved(ball(0.2), at=(0, 0, z)) for z in (-0.4, 0.4)])
     found = ShapeTracer(pair).trace(*straight([0.01]))
     assert found.solid[0] == pytest.approx(1.2, abs=5e-3)
     assert found.material[0] == pytest.approx(0.8, abs=1e-2)
 
 
 def test_bodies_that_overlap_are_counted_once():
-    pair = solids.joined([solids.moved(ball(0.3), at=(0, 0, z)) for z in (-0.1, 0.1)])
+    pair = shapes.joined([shapes.moved(ball(0.3), at=(0, 0, z)) for z in (-0.1, 0.1)])
     found = ShapeTracer(pair).trace(*straight([0.01]))
     assert found.solid[0] == pytest.approx(0.8, abs=5e-3)
     assert found.material[0] == pytest.approx(0.8, abs=5e-3)

@@ -7,7 +7,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
-from materialist.procedural.objects import solids
+from materialist.procedural.objects import shapes as solids
 from materialist.procedural.objects.glassware import Shape, make_shape
 from materialist.procedural.thickness import dataset, view
 from materialist.procedural.thickness.ray_paths import ShapeTracer

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.procedural.objects import shapes, solids
+from materialist.procedural.objects import shapes
 from materialist.procedural.objects.implicit import creature
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
@@ -101,7 +101,7 @@ def _mug(rng: np.random.Generator) -> tuple[Solid, bool]:
     t = np.linspace(-1.3, 1.3, 24)
     reach, high = width * rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.35)
     line = np.stack([width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1)
-    return solids.joined([solid, _tube(line, width * rng.uniform(0.06, 0.14), 12)]), True
+    return shapes.joined([solid, _tube(line, width * rng.uniform(0.06, 0.14), 12)]), True
 
 
 def _goblet(rng: np.random.Generator) -> tuple[Solid, bool]:
@@ -129,12 +129,12 @@ def _bottle(rng: np.random.Generator) -> tuple[Solid, bool]:
     outside = _turned(np.stack([radius, y], -1))
     keep = (y > wall) & (y < 1 - wall) & (radius > 1.3 * wall)
     inside = _turned(np.stack([radius - wall, y], -1)[keep])
-    return solids.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)]), True
+    return shapes.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)]), True
 
 
 def _tube(line: Array, radius: Array | float, n: int) -> Solid:
-    """`solids.tube` with its faces turned outwards."""
-    solid = solids.tube(line, radius, n)
+    """`shapes.tube` with its faces turned outwards."""
+    solid = shapes.tube(line, radius, n)
     return replace(solid, faces=solid.faces[:, ::-1])
 
 
@@ -144,7 +144,7 @@ def _superquadric(rng: np.random.Generator) -> tuple[Solid, bool]:
 
 def _box(rng: np.random.Generator) -> tuple[Solid, bool]:
     extent = rng.uniform(0.25, 1, 3)
-    return solids.slab(extent, float(rng.choice([0.0, 0.04, 0.15])) * extent.min()), False
+    return shapes.slab(extent, float(rng.choice([0.0, 0.04, 0.15])) * extent.min()), False
 
 
 def _frustum(rng: np.random.Generator) -> tuple[Solid, bool]:
@@ -162,7 +162,7 @@ def _frustum(rng: np.random.Generator) -> tuple[Solid, bool]:
         upwards = np.array([0.0, 1, 0])
         low, high = high - upwards, around + upwards
     sides = [np.stack([low[k - 1], low[k], high[k], high[k - 1]]) for k in range(corners)]
-    return solids.joined([_flat(side[::-1]) for side in sides] + [_flat(low), _flat(high[::-1])]), False
+    return shapes.joined([_flat(side[::-1]) for side in sides] + [_flat(low), _flat(high[::-1])]), False
 
 
 def _flat(corners: Array) -> Solid:
@@ -177,7 +177,7 @@ def _flat(corners: Array) -> Solid:
 
 
 def _blob(rng: np.random.Generator) -> tuple[Solid, bool]:
-    return solids.blob(rng, rng.uniform(0.5, 1, 3), rng.uniform(0.08, 0.45), 56), False
+    return shapes.blob(rng, rng.uniform(0.5, 1, 3), rng.uniform(0.08, 0.45), 56), False
 
 
 def _ring(rng: np.random.Generator) -> tuple[Solid, bool]:
@@ -185,7 +185,7 @@ def _ring(rng: np.random.Generator) -> tuple[Solid, bool]:
     t = np.linspace(0, 2 * np.pi, 49)
     radius = rng.uniform(0.22, 0.38)
     line = radius * np.stack([np.cos(t), np.sin(t) * rng.uniform(0.6, 1), 0 * t], -1)
-    return solids.moved(_tube(line, rng.uniform(0.25, 0.75) * radius, 24), tip=rng.uniform(0, 1.6)), False
+    return shapes.moved(_tube(line, rng.uniform(0.25, 0.75) * radius, 24), tip=rng.uniform(0, 1.6)), False
 
 
 def twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
@@ -200,12 +200,12 @@ def twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
         x, z = (p[:, 0] * np.cos(angle) - p[:, 2] * np.sin(angle), p[:, 0] * np.sin(angle) + p[:, 2] * np.cos(angle))
         return np.stack([x * scale + bend * p[:, 1] ** 2, p[:, 1], z * scale], -1)
 
-    return solids.warped(solid, warp), False
+    return shapes.warped(solid, warp), False
 
 
 def _figure(rng: np.random.Generator) -> tuple[Solid, bool]:
     """Several bodies grown together, often alike on the left and on the right: toys, animals, fruit."""
-    trunk = solids.moved(solids.ball(32), scale=1)
+    trunk = shapes.moved(shapes.ball(32), scale=1)
     parts = [replace(trunk, vertices=trunk.vertices * rng.uniform(0.2, 0.45, 3))]
     for _ in range(int(rng.integers(1, 5))):
         direction = rng.normal(size=3)
@@ -213,10 +213,10 @@ def _figure(rng: np.random.Generator) -> tuple[Solid, bool]:
         at = direction * rng.uniform(0.2, 0.45)
         extent = rng.uniform(0.06, 0.28, 3)
         for side in (1, -1) if rng.random() < 0.6 and abs(at[0]) > 0.08 else (1,):
-            limb = solids.moved(solids.ball(24), turn=rng.uniform(0, 3), tip=rng.uniform(0, 3))
+            limb = shapes.moved(shapes.ball(24), turn=rng.uniform(0, 3), tip=rng.uniform(0, 3))
             parts.append(replace(limb, vertices=limb.vertices * extent + at * [side, 1, 1]))
-    body = solids.joined(parts)
-    return replace(body, normals=solids.smooth_normals(body.vertices, body.faces)), False
+    body = shapes.joined(parts)
+    return replace(body, normals=shapes.smooth_normals(body.vertices, body.faces)), False
 
 
 def _creature(rng: np.random.Generator) -> tuple[Solid, bool]:

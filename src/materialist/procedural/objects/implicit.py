@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from materialist.procedural.objects import solids
+from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
@@ -40,7 +40,7 @@ def creature(rng: np.random.Generator) -> Solid:
     if rng.random() < 0.35:
         parts.append(_plinth(rng, low, 1.3 * max(build[0], build[2])))
     melt = rng.uniform(0.015, 0.07)
-    skin = solids.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
+    skin = shapes.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
 
     def field(p: Array) -> Array:
         total = parts[0](p)
@@ -83,7 +83,7 @@ def surface(field: Field, low: Array, high: Array, points: int = POINTS) -> Soli
     vertices = low + (index + within) * (high - low) / cells
     a, b, c, d = corner.reshape(-1, 4).T
     faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).astype(np.int32)
-    return Solid(vertices, faces, solids.smooth_normals(vertices, faces), vertices[:, :2].copy())
+    return Solid(vertices, faces, shapes.smooth_normals(vertices, faces), vertices[:, :2].copy())
 
 
 def _bounds(field: Field) -> tuple[Array, Array]:

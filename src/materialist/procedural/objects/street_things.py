@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.procedural import materials as m
-from materialist.procedural.objects import solids as s
-from materialist.procedural.objects.parts import Parts, block, orb, rod
-from materialist.procedural.world import ScenePart
+from materialist.procedural.objects import shapes as s
+from materialist.procedural.world import Parts, ScenePart, block, orb, rod
 
 
 def house(rng) -> Parts:
@@ -59,8 +58,7 @@ def tree(rng, size: float) -> Parts:
     line = size * np.array([(0, 0, 0), (0.02, fork, 0), (0, 0.75, 0.03)])
     parts = [rod(line, size * np.array([0.035, 0.025, 0.008]), trunk)]
     for _ in range(int(rng.integers(4, 10))):
-        end = np.array([rng.normal() * 0.22, rng.uniform(0.55, 1.0), rng.normal() * 0.22]) * size
-        start = np.array([0, fork + rng.uniform(0, 0.2), 0]) * size
+        start, end = size * rng.uniform([(0, fork, 0), (-0.4, 0.55, -0.4)], [(0, fork + 0.2, 0), (0.4, 1, 0.4)])
         middle = (start + end) / 2 + [0, 0.06 * size, 0]
         parts.append(rod([start, middle, end], size * np.array([0.016, 0.01, 0.004]), trunk, 6))
         tips += [middle, end]
@@ -69,9 +67,8 @@ def tree(rng, size: float) -> Parts:
         roots = np.array(tips)[rng.integers(len(tips), size=n)] + rng.normal(size=(n, 3)) * 0.11 * size
         parts.append(ScenePart(s.leaves(rng, roots, rng.normal(size=(n, 3)), length, 0.5 * length), leaf))
     elif kind < 0.9:
-        for tip in tips[:8]:
-            mass = s.blob(rng, size * rng.uniform(0.25, 0.5, 3), 0.25, 32)
-            parts.append(ScenePart(s.moved(mass, tip - [0, 0.12 * size, 0]), leaf))
+        masses = [s.blob(rng, size * rng.uniform(0.25, 0.5, 3), 0.25, 32) for _ in tips[:8]]
+        parts += [ScenePart(s.moved(one, tip - [0, 0.12 * size, 0]), leaf) for one, tip in zip(masses, tips)]
     return parts
 
 
@@ -84,7 +81,7 @@ def bush(rng, size: float) -> Parts:
     return [ScenePart(core, leaf), ScenePart(leaves, leaf)]
 
 
-def person(rng) -> Parts:
+def person(rng, meshes=()) -> Parts:
     """Somebody standing, of capsules and a head."""
     tall, skin, shirt, trousers, parts = rng.uniform(1.5, 1.9), m.skin(rng), m.fabric(rng), m.fabric(rng), []
     hip, neck = 0.5 * tall, 0.84 * tall

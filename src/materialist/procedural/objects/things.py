@@ -10,11 +10,9 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects import solids as s
-from materialist.procedural.objects.parts import Parts, block, footprint, one_thing, orb, placed, rod
+from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.world import ScenePart
+from materialist.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
 
 Meshes = tuple[Path, ...]
 
@@ -41,7 +39,7 @@ def mesh(path: Path) -> Solid:
 
     setup()
     try:
-        solid = shapes.load(path)
+        solid = s.load(path)
         usable = len(solid.faces) > 0 and bool(np.isfinite(solid.vertices).all())
     except (RuntimeError, LookupError, ValueError) as error:
         raise InputError(f"The mesh {path} cannot be read; mend it, or take it out of the folder.") from error
@@ -57,14 +55,11 @@ def _box(rng, size) -> Parts:
 
 
 def _superquadric(rng, size) -> Parts:
-    extent = size * rng.uniform(0.5, 1.1, 3)
-    solid = shapes.superquadric(extent, rng.uniform(0.2, 1.4), rng.uniform(0.2, 1.4), 32)
+    """Balls, eggs, rounded boxes, drums, diamonds."""
+    round_one = rng.random() < 0.4
+    extent = size * (np.full(3, rng.uniform(0.5, 1)) if round_one else rng.uniform(0.5, 1.1, 3))
+    solid = s.superquadric(extent, *((1, 1) if round_one else rng.uniform(0.2, 1.4, 2)), 32)
     return [ScenePart(s.metric(solid, extent[0] * 1.5, extent[1] * 1.5), m.any_object(rng))]
-
-
-def _ball(rng, size) -> Parts:
-    radius = size * rng.uniform(0.25, 0.5)
-    return [orb((0, radius, 0), radius, m.any_object(rng), 40)]
 
 
 def _blob(rng, size) -> Parts:
@@ -75,11 +70,9 @@ def _blob(rng, size) -> Parts:
 def vase(rng, size) -> Parts:
     """Vase or jar of revolution, open at its top; flowers or twigs now and then."""
     radius = size * rng.uniform(0.18, 0.4)
-    heights = np.sort(np.concatenate([[0, 1], rng.uniform(0.1, 0.95, int(rng.integers(2, 5)))]))
-    widths = rng.uniform(0.35, 1.0, len(heights))
-    widths[0] = max(widths[0], 0.5)
+    heights = np.linspace(0, 1, int(rng.integers(4, 7)))
+    widths = rng.uniform(0.4, 1.0, len(heights))
     control = np.stack([widths * radius, heights * size], -1)
-    control = control[np.concatenate([[True], np.diff(control[:, 1]) > 0.04 * size])]
     parts = [ScenePart(s.pot(control, 0.04 * size), m.any_object(rng))]
     if rng.random() < 0.35:
         parts += _twigs(rng, size * 0.7, size * rng.uniform(0.7, 1.5), widths[-1] * radius * 0.6)
@@ -100,18 +93,14 @@ def _twigs(rng, base, length, spread) -> Parts:
 
 
 def _cup(rng, size) -> Parts:
-    """Cup or mug with a handle and a drink in it, at times on a saucer."""
-    radius, look, parts, lift = size * rng.uniform(0.4, 0.6), m.ceramic(rng), [], 0.0
-    if rng.random() < 0.35:
-        saucer = np.array([(0.5, 0), (0.6, 0.3), (0.95, 0.8), (1, 1)]) * size * [0.9, rng.uniform(0.14, 0.36)]
-        parts, lift = [ScenePart(s.pot(saucer, 0.05 * size), look)], 0.12 * size
+    """Cup or mug with a handle and a drink in it."""
+    radius, look = size * rng.uniform(0.4, 0.6), m.ceramic(rng)
     control = np.array([(0.65, 0), (0.85, 0.2), (1, 0.6), (1.02, 1)]) ** [rng.uniform(0.3, 1.3), 1] * [radius, size]
-    parts.append(ScenePart(s.moved(s.pot(control, 0.05 * size), (0, lift, 0)), look))
     phi = np.linspace(-np.pi / 2, np.pi / 2, 12)
-    loop = np.stack([np.cos(phi) * 0.35 * size + radius * 0.9, (np.sin(phi) * 0.3 + 0.5) * size + lift, 0 * phi], -1)
+    loop = np.stack([np.cos(phi) * 0.35 * size + radius * 0.9, (np.sin(phi) * 0.3 + 0.5) * size, 0 * phi], -1)
     drink = m.uniform(m.hsv(rng.uniform(0.03, 0.12), rng.uniform(0.2, 0.9), rng.uniform(0.1, 0.8)), 0.08)
-    level = s.moved(s.disc(radius * 0.9), (0, size * rng.uniform(0.6, 0.85) + lift, 0))
-    return [*parts, rod(loop, 0.05 * size, look, 7), ScenePart(level, drink)]
+    level = ScenePart(s.moved(s.disc(radius * 0.9), (0, size * rng.uniform(0.6, 0.85), 0)), drink)
+    return [ScenePart(s.pot(control, 0.05 * size), look), rod(loop, 0.05 * size, look, 7), level]
 
 
 def _bowl(rng, size) -> Parts:
@@ -133,11 +122,10 @@ def _bottle(rng, size) -> Parts:
     profile = np.array([(1e-3, 0), (0.95, 0), (1, 0.03), (1, shoulder), (neck + 0.1, shoulder + 0.15), (neck, 0.92),
                         (neck * 1.1, 0.93), (neck * 1.1, 1), (1e-3, 1)]) * [r, size]  # fmt: skip
     look = m.plastic(rng) if rng.random() < 0.7 else m.metal(rng)
-    parts = [ScenePart(s.metric(shapes.lathe(profile, 40), np.pi * r, size), look)]
+    parts = [ScenePart(s.metric(s.lathe(profile, 40), np.pi * r, size), look)]
     if rng.random() < 0.7:
-        low, high = sorted(rng.uniform(0.08, shoulder - 0.03, 2) * size)
-        high = max(high, low + 0.1 * size)
-        band = shapes.lathe(np.array([(1.012 * r, low), (1.012 * r, high)]), 40)
+        low, high = rng.uniform([0.05, 0.5], [0.25, 0.95]) * shoulder * size
+        band = s.lathe(np.array([(1.012 * r, low), (1.012 * r, high)]), 40)
         label = replace(m.printed(rng, np.pi * r, high - low), offset=None)
         parts.append(ScenePart(s.metric(band, np.pi * r, high - low), label))
     return parts
@@ -172,11 +160,7 @@ def plant(rng, size) -> Parts:
     way = np.stack([np.cos(angle), rng.uniform(0, 1.2, n), np.sin(angle)], -1)
     length = height * rng.uniform(0.2, 0.4)
     leaves = ScenePart(s.leaves(rng, roots, way, length, length * rng.uniform(0.25, 0.6)), leaf)
-    return [
-        *parts,
-        rod([(0, y, 0) for y in (0.8 * pot, size, pot + 0.8 * height)], 0.015 * size, m.wood(rng), 6),
-        leaves,
-    ]
+    return [*parts, rod([(0, 0.8 * pot, 0), (0, pot + 0.8 * height, 0)], 0.015 * size, m.wood(rng), 6), leaves]
 
 
 def _ring(rng, size) -> Parts:
@@ -190,13 +174,12 @@ def _stacked(rng, size) -> Parts:
     """Figures of stacked round parts: candles, chessmen, lamps, toys."""
     look, top, parts = m.any_object(rng), 0.0, []
     for _ in range(int(rng.integers(2, 6))):
-        height, r, kind = size * rng.uniform(0.1, 0.4), size * rng.uniform(0.06, 0.25), rng.random()
-        if kind < 0.4:
-            solid = s.grounded(s.metric(s.drum(r, height, r * rng.uniform(0.5, 1)), np.pi * r, height))
-        elif kind < 0.8:
-            solid = s.moved(s.ball(32), (0, height / 2, 0), scale=height / 2)
-        else:
-            solid = s.slab((2 * r, height, 2 * r), 0.1 * r)
+        height, r, kind = size * rng.uniform(0.1, 0.4), size * rng.uniform(0.06, 0.25), rng.integers(3)
+        solid = (
+            s.grounded(s.metric(s.drum(r, height, r * rng.uniform(0.5, 1)), np.pi * r, height)),
+            s.grounded(s.moved(s.ball(32), scale=height / 2)),
+            s.slab((2 * r, height, 2 * r), 0.1 * r),
+        )[kind]
         parts.append(ScenePart(s.moved(solid, (0, top, 0)), look if rng.random() < 0.6 else m.any_object(rng)))
         top += height * 0.97
     return parts
@@ -204,27 +187,28 @@ def _stacked(rng, size) -> Parts:
 
 def cushion(rng, size) -> Parts:
     """A soft cushion, leaning back."""
-    base = shapes.superquadric(size * np.array([1, rng.uniform(0.7, 1), 0.3]), 0.35, 0.35, 24)
+    base = s.superquadric(size * np.array([1, rng.uniform(0.7, 1), 0.3]), 0.35, 0.35, 24)
     bump = s.lumps(rng, 0.05 * size, 2 / size)
     solid = s.warped(base, lambda p: p + bump(p)[:, None] * [0, 0, 1])
     return [ScenePart(s.moved(s.metric(solid, size, size), tip=-rng.uniform(0.1, 0.5)), m.fabric(rng))]
 
 
 KINDS = (
-    (0.13, _box), (0.1, _superquadric), (0.07, _ball), (0.1, _blob), (0.12, vase), (0.1, _cup), (0.08, _bowl),
+    (0.13, _box), (0.17, _superquadric), (0.1, _blob), (0.12, vase), (0.1, _cup), (0.08, _bowl),
     (0.1, _bottle), (0.06, _books), (0.05, plant), (0.03, _ring), (0.06, _stacked),
 )  # fmt: skip
 
 
 def scattered(
     rng: np.random.Generator, count: int, half: tuple[float, float], sizes: tuple[float, float],
-    meshes: Meshes = (), share: float = 0.3, taken: list | None = None,
+    meshes: Meshes = (), share: float = 0.3,
 ) -> Parts:  # fmt: skip
     """Up to `count` things on the rectangle |x| <= half[0], |z| <= half[1] at y = 0 that do not touch each other."""
-    taken, parts = [] if taken is None else taken, []
+    taken: list[tuple[float, float, float]] = []
+    parts: Parts = []
     for _ in range(count):
         one = thing(rng, float(np.exp(rng.uniform(*np.log(sizes)))), meshes, share)
-        radius = footprint(one)
+        radius = max(float(np.hypot(p.solid.vertices[:, 0], p.solid.vertices[:, 2]).max()) for p in one)
         for _ in range(12):
             x, z = rng.uniform(-1, 1, 2) * np.maximum(np.array(half) - 0.6 * radius, 0.01)
             if all(np.hypot(x - a, z - b) > 0.85 * (radius + r) for a, b, r in taken):
