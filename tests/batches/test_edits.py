@@ -5,7 +5,6 @@ from made_batch import photos
 
 from materialist.batches.edits import edits_key, missing_files
 from materialist.batches.run import batch
-from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
 
 TEXT = "- drop: {mesh: ['{name}.ply', ball.ply], at: [3, 4]}\n- edit: {mask: 'm/{name}.png', hue: 20}\n"
@@ -44,14 +43,13 @@ def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
 
 
 def test_files_that_are_missing_are_found_step_by_step(recipe):
-    steps, folder = read_recipe(recipe), recipe.parent
-    assert missing_files(steps, "a") == [f"{folder}/m/a.png"]
-    assert missing_files(steps, "c") == [f"{folder}/c.ply", f"{folder}/m/c.png"]
+    folder = recipe.parent
+    assert missing_files(recipe, "c") == [f"{folder}/c.ply", f"{folder}/m/c.png"]
     recipe.write_text(
         "- glass: {click: [3, 4], thickness: network}\n- glass: {click: [3, 4], thickness: d.exr}\n"
         "- edit: {mask: none.png, hue: 3, skip: true}\n- relight: {envmap: sky.exr}\n"
     )
-    assert missing_files(read_recipe(recipe), "a") == [f"{folder}/d.exr", f"{folder}/sky.exr"]
+    assert missing_files(recipe, "a") == [f"{folder}/d.exr", f"{folder}/sky.exr"]
 
 
 def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):

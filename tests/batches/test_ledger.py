@@ -38,8 +38,8 @@ def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(
     write(tmp_path, ("done", "a.png"))
     with pytest.raises(InputError, match="--resume to go on"):
         open_ledger(tmp_path, OPTIONS)
-    assert write(tmp_path, force=True).last["a.png"]["event"] == "begin"
-    assert write(tmp_path, resume=True).last["a.png"]["event"] == "begin"  # also after the next stop
+    for how in ({"force": True}, {"resume": True}):  # begun anew, also after the next stop
+        assert write(tmp_path, **how).last["a.png"]["key"] is None
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "thesis.txt").touch()

@@ -7,7 +7,7 @@ from made_batch import photos
 
 from materialist.batches.photos import LONGEST_NAME as LONGEST
 from materialist.batches.photos import list_photos, unique_names
-from materialist.batches.remote import local_copy, version
+from materialist.batches.remote import fingerprint, local_copy
 from materialist.errors import InputError
 
 
@@ -59,10 +59,10 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
     with local_copy(url) as file:
         assert file.read_bytes() == (tmp_path / "x.png").read_bytes() and file.suffix == ".png"
     assert not file.exists()
-    before = version(url)
-    assert version(url) == before
+    before = fingerprint(url)
+    assert fingerprint(url) == before
     store.pipe("/bucket/x.png", b"other")
-    assert version(url) != before
+    assert fingerprint(url) != before
     with (
         pytest.raises(InputError, match=r"nothing at memory://bucket/none\.png"),
         local_copy("memory://bucket/none.png"),
@@ -75,7 +75,7 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
 def test_names_are_stems_as_long_as_those_are_unique():
     names = unique_names(["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"])
     assert names == {
-        "a/k.png": "a_k", "b/k.jpg": "b_k", "c.png": "c", "d.png": "d.png", "d.jpg": "d.jpg", "x y/é.png": "é",
+        "a/k.png": "a_k.png", "b/k.jpg": "b_k.jpg", "c.png": "c", "d.png": "d.png", "d.jpg": "d.jpg", "x y/é.png": "é",
         "http://h/p/z.jpg": "z",
     }  # fmt: skip
 

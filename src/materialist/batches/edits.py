@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,45 +25,39 @@ def edits_for(path: str | Path, name: str) -> list[Step]:
 
 def edits_key(path: str | Path, name: str, spp: int) -> str:
     """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples."""
-    described = []
-    for step in edits_for(path, name):
-        files = {
-            key: [_content(step, key, file) for file in _list(step.options[key])]
-            for key in FILES
-            if key in step.options
-        }
-        described.append([step.kind, step.options, files])
+    described = [
+        [step.kind, step.options, [_content(file, key) for key, file in _files(step)]] for step in edits_for(path, name)
+    ]
     return hashlib.sha256(json.dumps([described, spp], sort_keys=True).encode()).hexdigest()
 
 
-def missing_files(steps: list[Step], name: str) -> list[str]:
-    """Files that steps as `read_recipe` gives them need for a photo and that are not there."""
-    found = []
-    for step in steps:
-        if step.skipped:
-            continue
-        options = _named(step.options, name)
-        given = [(key, file) for key in FILES if key in options for file in _list(options[key])]
-        files = [f for key, f in given if isinstance(f, str) and not (key == "thickness" and f in METHODS)]
-        found += [str(step.folder / file) for file in files if not os.path.isfile(step.folder / file)]
-    return found
+def missing_files(path: str | Path, name: str) -> list[str]:
+    """Files that the edits of a photo need and that are not there."""
+    found = [file for step in edits_for(path, name) if not step.skipped for _, file in _files(step)]
+    return [str(file) for file in found if not file.is_file()]
 
 
-def _named(options: dict, name: str) -> dict:
-    put = lambda value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
-    named = {k: [put(one) for one in v] if isinstance(v, list) else put(v) for k, v in options.items() if k in FILES}
-    return {**options, **named}
+def _named(options: dict[str, Any], name: str) -> dict[str, Any]:
+    def put(value: Any) -> Any:
+        if isinstance(value, list):
+            return [put(one) for one in value]
+        return value.replace("{name}", name) if isinstance(value, str) else value
+
+    return {key: put(value) if key in FILES else value for key, value in options.items()}
 
 
-def _content(step: Step, key: str, file: Any) -> str | list[str] | None:
-    """Hash of a file; of a mesh, also the hashes of its materials and textures."""
-    path = step.folder / str(file)
+def _files(step: Step) -> Iterator[tuple[str, Path]]:
+    """(option, file) of the files that a step names."""
+    for key in FILES:
+        value = step.options.get(key, [])
+        for name in value if isinstance(value, list) else [value]:
+            if isinstance(name, str) and not (key == "thickness" and name in METHODS):
+                yield key, step.folder / name
+
+
+def _content(file: Path, key: str) -> list[str] | None:
+    """Hashes of a file and, of a mesh, of its materials and textures; None where it cannot be read."""
     try:
-        beside = [file_hash(other) for other in files_beside(path)] if key == "mesh" else []
-        return [file_hash(path), *beside] if beside else file_hash(path)
+        return [file_hash(file), *(file_hash(other) for other in (files_beside(file) if key == "mesh" else ()))]
     except OSError:
         return None
-
-
-def _list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [value]

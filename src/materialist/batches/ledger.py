@@ -1,8 +1,7 @@
 """RUNS/batch.jsonl: the events of a batch, one line each, only ever appended.
 
-A line is written in one piece and flushed to the disk before the next photo begins, so that a batch that is killed at
-any moment can be resumed: a last line that was cut off is skipped. A lock that vanishes with its process keeps a
-second batch out of the folder.
+A line is flushed to the disk before the next photo begins, so a batch that is killed at any moment can be resumed; a
+last line that was cut off is skipped. A lock that vanishes with its process keeps a second batch out of the folder.
 """
 
 from __future__ import annotations
@@ -25,33 +24,36 @@ FORMAT = 1
 class Ledger:
     """The events of a batch. Open it with `open_ledger`."""
 
-    def __init__(self, path: Path, events: list[dict[str, Any]], lock: int) -> None:
+    def __init__(self, path: Path, events: list[dict[str, Any]], options: dict[str, Any], lock: int) -> None:
         self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
         self._lock = lock
-        self._cut = _ends_within_a_line(path)
+        self.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
+        """Stands for the options of this batch; results of other options do not count as done."""
         self.last: dict[str, dict[str, Any]] = {}
         """Photo id -> its last event: begin, done or failed."""
-        self.key = ""
-        """Stands for the options of this batch; the results of others do not count as done."""
         self.names: dict[str, str] = {}
         """Photo id -> name, of all photos that were ever begun here."""
+        self.owned: set[str] = set()
+        """File names of results that this batch may replace: their places were free when their photos were begun."""
         for event in events:
             self._note(event)
 
     def append(self, event: str, **facts: Any) -> dict[str, Any]:
         """Write one event. Raises OutputError when the disk is full or read-only."""
         entry = {"event": event, "key": self.key, **facts}
-        line = ("\n" if self._cut else "") + json.dumps(entry, ensure_ascii=True) + "\n"
+        line = (json.dumps(entry, ensure_ascii=True) + "\n").encode()
         self._note(entry)  # first, so that a Ctrl-C during the write finds the summary no older than the file
         try:
-            written = os.write(self._file, line.encode())
-            self._cut = written < len(line)
-            if self._cut:
+            if os.write(self._file, line) < len(line):
                 raise OSError("the disk is full")
             os.fsync(self._file)
         except OSError as error:
             raise OutputError(f"{LEDGER} cannot be written: {error.strerror or error}.") from error
         return entry
+
+    def end_line(self) -> None:
+        """End a line that was cut off; the reader skips an empty one."""
+        os.write(self._file, b"\n")
 
     def close(self) -> None:
         """Let another batch into the folder."""
@@ -59,12 +61,12 @@ class Ledger:
         os.close(self._lock)
 
     def _note(self, entry: dict[str, Any]) -> None:
-        if entry.get("anew"):  # what was done before is to be done again; whose results lie there stays known
-            kept = ("id", "name", "own_scene", "own_picture", "scene_bytes", "picture_hash")
-            self.last = {i: {k: e[k] for k in kept if k in e} | {"event": "begin"} for i, e in self.last.items()}
+        if entry.get("anew"):  # all photos are to be done again
+            self.last = {id: {**last, "key": None} for id, last in self.last.items()}
         if "id" in entry:
             self.last[entry["id"]] = entry
             self.names[entry["id"]] = entry["name"]
+            self.owned.update(entry.get("owned", ()))
 
 
 def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = False, force: bool = False) -> Ledger:
@@ -94,8 +96,9 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
         events = read_events(path) if held else []
         if resume and not force:
             _require_same(events, options, folder)
-        ledger = Ledger(path, events, lock)
-        ledger.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
+        ledger = Ledger(path, events, options, lock)
+        if held:
+            ledger.end_line()
         ledger.append("start", format=FORMAT, options=options, anew=not resume)
     except BaseException:
         os.close(lock)
@@ -104,7 +107,7 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
 
 
 def read_events(path: str | Path) -> list[dict[str, Any]]:
-    """The events of a ledger, oldest first; lines that were cut off are passed over. Raises InputError."""
+    """The events of a ledger, oldest first; lines that were cut off are skipped. Raises InputError."""
     events = []
     for line in Path(path).read_bytes().splitlines():
         try:
@@ -113,18 +116,17 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
             continue
         if isinstance(entry, dict) and "event" in entry:
             events.append(entry)
-    starts = [entry for entry in events if entry["event"] == "start"]
-    if any(entry.get("format") != FORMAT for entry in starts):
+    if any(entry["event"] == "start" and entry.get("format") != FORMAT for entry in events):
         raise InputError(f"{path} is a ledger of another version; name another folder.")
     return events
 
 
 def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder: Path) -> None:
     """Raise InputError where an option is not what it was at the last start."""
-    starts = [entry for entry in events if entry["event"] == "start"]
-    before = starts[-1].get("options", {}) if starts else {}
+    starts = [entry["options"] for entry in events if entry["event"] == "start"]
+    before = starts[-1] if starts else options
     for name in sorted({*before, *options}):
-        if before and before.get(name) != options.get(name):
+        if before.get(name) != options.get(name):
             raise InputError(
                 f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
                 "name another folder, or add --force to redo what differs."
@@ -139,11 +141,3 @@ def _locked(folder: Path) -> int:
         os.close(lock)
         raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error
     return lock
-
-
-def _ends_within_a_line(path: Path) -> bool:
-    """Whether a write was cut off."""
-    with path.open("rb") as file:
-        size = file.seek(0, os.SEEK_END)
-        file.seek(max(size - 1, 0))
-        return file.read(1) not in (b"", b"\n")

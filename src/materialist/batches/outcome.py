@@ -19,15 +19,11 @@ COLUMNS = (
 """Columns of the summary; a photo that failed has only the reason."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One photo of a batch."""
+class Row(dict[str, Any]):
+    """One photo of a batch: values by COLUMNS. `status` is `done`, `failed` or `open` (not reached)."""
 
-    facts: dict[str, Any]
-    """Keys of COLUMNS; status is `done`, `failed` or `open` (not reached)."""
-
-    def __getitem__(self, key: str) -> Any:
-        return self.facts.get(key)
+    def __missing__(self, key: str) -> None:
+        return None
 
 
 @dataclass(frozen=True)
@@ -43,34 +39,37 @@ class Outcome:
     """Wall clock of this call."""
     options: dict[str, Any] = field(default_factory=dict)
 
+    def of(self, status: str) -> list[Row]:
+        """The photos that are `done`, `failed` or `open`."""
+        return [row for row in self.rows if row["status"] == status]
+
     def count(self, status: str) -> int:
         """How many photos are `done`, `failed` or `open`."""
-        return sum(row["status"] == status for row in self.rows)
+        return len(self.of(status))
 
     @property
     def hash(self) -> str:
         """Of all results: equal for equal photos and options, however many workers and interruptions there were."""
-        done = [row for row in self.rows if row["status"] == "done"]
-        return together((row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}") for row in done)
+        return together((row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}") for row in self.of("done"))
 
     @property
     def exit_code(self) -> int:
         """0 when every photo is done, 1 when one met a bug of ours, else 2."""
-        if all(row["status"] == "done" for row in self.rows):
+        if self.count("done") == len(self.rows):
             return 0
         return 1 if any(row["bug"] for row in self.rows) else 2
 
 
 @dataclass(frozen=True)
 class Status:
-    """A batch on its way."""
+    """The state of a running batch."""
 
     total: int
     done: int
     """Including photos that an earlier call finished."""
     failed: int
     rate: float
-    """Photos per second of this call; 0 while none is through."""
+    """Photos per second of this call; 0 before the first ends."""
     left: float | None
     """Seconds to go at that rate; None while it is not known."""
     running: dict[str, str] = field(default_factory=dict)
@@ -78,18 +77,17 @@ class Status:
     news: str | None = None
     """A line to show; most are about a photo that has just ended."""
     urgent: bool = False
-    """Whether the line is about something that went wrong."""
+    """Whether the line reports a failure."""
 
 
 def write_summary(outcome: Outcome) -> None:
-    """Write both into the folder of the batch, each whole or not at all. Raises OutputError."""
-    replace_file(outcome.runs / "summary.csv", _csv(outcome).encode("utf-8"))
-    replace_file(outcome.runs / "summary.json", (json.dumps(as_dict(outcome), indent=1) + "\n").encode())
-
-
-def as_dict(outcome: Outcome) -> dict[str, Any]:
-    """The content of summary.json."""
-    return {
+    """Write both tables into the folder of the batch, each whole or not at all. Raises OutputError."""
+    text = io.StringIO()
+    table = csv.writer(text)
+    table.writerow(COLUMNS)
+    table.writerows([_cell(row[key]) for key in COLUMNS] for row in outcome.rows)
+    replace_file(outcome.runs / "summary.csv", text.getvalue().encode("utf-8"))
+    summary = {
         "photos": len(outcome.rows),
         **{status: outcome.count(status) for status in ("done", "failed", "open")},
         "kept": outcome.kept,
@@ -99,19 +97,11 @@ def as_dict(outcome: Outcome) -> dict[str, Any]:
         "options": outcome.options,
         "rows": [{key: row[key] for key in COLUMNS} for row in outcome.rows],
     }
-
-
-def _csv(outcome: Outcome) -> str:
-    text = io.StringIO()
-    table = csv.writer(text)
-    table.writerow(COLUMNS)
-    for row in outcome.rows:
-        table.writerow([_cell(row[key]) for key in COLUMNS])
-    return text.getvalue()
+    replace_file(outcome.runs / "summary.json", (json.dumps(summary, indent=1) + "\n").encode())
 
 
 def _cell(value: Any) -> Any:
-    """A value as a spreadsheet may read it: no text of ours or of a file's name can begin a formula."""
+    """A value for a spreadsheet: no text of ours or of a file's name can begin a formula."""
     if isinstance(value, list):
         value = " | ".join(value)
     if isinstance(value, float):

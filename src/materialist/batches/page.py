@@ -37,7 +37,7 @@ def write_pages(outcome: Outcome) -> None:
 
 
 def _facts(outcome: Outcome) -> list[tuple[str, str]]:
-    done = [row for row in outcome.rows if row["status"] == "done"]
+    done = outcome.of("done")
     facts = [("photos", str(len(outcome.rows))), ("done", str(len(done))), ("failed", str(outcome.count("failed")))]
     if outcome.count("open"):
         facts.append(("not reached", str(outcome.count("open"))))

@@ -6,7 +6,7 @@ import os
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -79,15 +79,12 @@ def _of_folder(folder: Path, runs: Path) -> list[Listed]:
             for name in files:
                 if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:
                     path = Path(place) / name
-                    found.append(Listed(_printable(path.relative_to(folder).as_posix()), os.path.abspath(path)))
+                    # Bytes of a path that are no UTF-8 cannot be written into a table; they become escapes.
+                    id = path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode("utf-8")
+                    found.append(Listed(id, os.path.abspath(path)))
     except OSError as error:
         raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
     return found
-
-
-def _printable(text: str) -> str:
-    """A path whose bytes are no UTF-8 can be opened but not written into a table: those bytes as escapes."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _raise(error: OSError) -> None:
@@ -118,16 +115,16 @@ def _named(entry: str, folder: Path) -> Listed:
 
 
 def unique_names(ids: Iterable[str], known: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Photo id -> name. Whatever the order, equal sets of ids get equal names; those in `known` keep theirs.
+    """Photo id -> name: its stem, where that is not unique its whole path, else a hash behind its stem.
 
-    Names differ by more than upper and lower case, hold no separators, and never begin with a dot.
+    Whatever the order, equal sets of ids get equal names; those in `known` keep theirs. Names differ by more than upper
+    and lower case, hold no separators, and never begin with a dot.
     """
     known = known or {}
     ids = list(dict.fromkeys(ids))
     names = {one: known[one] for one in ids if one in known}
     used = {name.casefold() for name in known.values()}
-    forms: tuple[Callable[[str], str], ...] = (_stem, _path, _with_suffix, _hashed)
-    for form in forms:
+    for form in (_stem, lambda one: one.replace("://", "/"), _hashed):
         proposed = {one: _clean(form(one)) for one in ids if one not in names}
         count = Counter(name.casefold() for name in proposed.values())
         chosen = {i: n for i, n in proposed.items() if count[n.casefold()] == 1 and n.casefold() not in used}
@@ -139,14 +136,6 @@ def unique_names(ids: Iterable[str], known: Mapping[str, str] | None = None) -> 
 def _stem(one: str) -> str:
     last = re.split(r"[/\\]", one.rstrip("/\\"))[-1].removeprefix("example:")
     return last.rsplit(".", 1)[0] or last
-
-
-def _path(one: str) -> str:
-    return one.rsplit(".", 1)[0].replace("://", "/")
-
-
-def _with_suffix(one: str) -> str:
-    return one.replace("://", "/")
 
 
 def _hashed(one: str) -> str:

@@ -11,10 +11,10 @@ from typing import Any
 from materialist.batches.edits import edits_key
 from materialist.batches.ledger import Ledger
 from materialist.batches.photos import Listed, unique_names
-from materialist.batches.remote import is_url, version
+from materialist.batches.remote import fingerprint
 from materialist.batches.results import file_hash, whole_size
 from materialist.batches.task import PhotoTask
-from materialist.errors import InputError, MaterialistError
+from materialist.errors import InputError
 from materialist.options import InvertOptions
 from materialist.predict import CHOICES
 
@@ -56,33 +56,16 @@ def plan(photos: Iterable[Listed], ledger: Ledger, template: PhotoTask) -> tuple
     return [task for task, finished in found if not finished], [task.id for task, finished in found if finished]
 
 
-def fingerprint(location: str) -> str | None:
-    """The hash of a photo's bytes, or the version that a remote store gives it; None where it cannot be read."""
-    from materialist.io.examples import PREFIX, example_path
-
-    try:
-        if is_url(location):
-            return version(location)
-        return file_hash(example_path(location) if location.startswith(PREFIX) else location)
-    except (OSError, MaterialistError):
-        return None
-
-
 def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether the scene of the ledger's last entry is there, whole, and of the photo as it is now."""
-    size = entry.get("scene_bytes")
-    if not size or size != whole_size(task.scene):
-        return False
-    known = entry.get("photo_version") if is_url(task.location) else entry.get("photo_hash")
-    return known is not None and known == fingerprint(task.location)
+    size, version = entry.get("scene_bytes"), entry.get("photo_version")
+    return bool(size and version) and size == whole_size(task.scene) and version == fingerprint(task.location)
 
 
 def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether nothing is to be edited, or the edited photo is there and of the same edits."""
-    if entry.get("event") != "done":
-        return False
-    if task.edits is None:
-        return True
+    if entry.get("event") != "done" or task.edits is None:
+        return entry.get("event") == "done"
     try:
         same = entry.get("edits") == edits_key(task.edits, task.name, task.spp)
         return same and entry.get("picture_hash") == file_hash(task.picture)

@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from materialist.errors import InputError, SetupError
+from materialist.batches.results import file_hash
+from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.io.examples import PREFIX, example_path
 
 LARGEST = 2 << 30
 """Bytes of a photo that is fetched: no photo within the pixel limit is larger."""
@@ -27,21 +29,25 @@ def shown(url: str) -> str:
 
 def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
     """URLs of the photos at a URL: a folder with its subfolders, a pattern with *, or one photo."""
-    with _told(url):
-        system, path = _system(url)
-        system.invalidate_cache()  # what was listed earlier in this process may have changed
-        if not any(mark in path for mark in "*[") and _suffix(url) in suffixes:
+    with _opened(url) as (system, path):
+        system.invalidate_cache()  # an earlier listing in this process may be out of date
+        pattern = any(mark in path for mark in "*[")
+        if not pattern and _suffix(url) in suffixes:
             return [url]
-        paths = system.glob(path) if any(mark in path for mark in "*[") else system.find(path)
+        paths = system.glob(path) if pattern else system.find(path)
         found = [str(system.unstrip_protocol(one)) for one in paths]
     return [one for one in found if _suffix(one) in suffixes and not PurePosixPath(shown(one)).name.startswith(".")]
 
 
-def version(url: str) -> str:
-    """A text that changes with the file behind the URL; the store gives it without a download where it can."""
-    with _told(url):
-        system, path = _system(url)
-        return f"url:{system.ukey(path)}"
+def fingerprint(location: str) -> str | None:
+    """The hash of a photo's bytes, or the version that a remote store gives it; None where it cannot be read."""
+    try:
+        if not is_url(location):
+            return file_hash(example_path(location) if location.startswith(PREFIX) else location)
+        with _opened(location) as (system, path):
+            return f"url:{system.ukey(path)}"
+    except (OSError, MaterialistError):
+        return None
 
 
 @contextmanager
@@ -52,8 +58,7 @@ def local_copy(location: str) -> Iterator[Path]:
         return
     with tempfile.TemporaryDirectory(prefix="materialist-") as folder:
         file = Path(folder) / f"photo{_suffix(location)}"
-        with _told(location):
-            system, path = _system(location)
+        with _opened(location) as (system, path):
             size = system.info(path).get("size")
             if size is not None and size > LARGEST:
                 raise InputError(f"{shown(location)} has {size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}.")
@@ -61,24 +66,15 @@ def local_copy(location: str) -> Iterator[Path]:
         yield file
 
 
-def _system(url: str) -> tuple[Any, str]:
+@contextmanager
+def _opened(url: str) -> Iterator[tuple[Any, str]]:
+    """The file system of a URL and the path in it; errors of the store become a sentence without the URL's secrets."""
     try:
         import fsspec
     except ModuleNotFoundError as error:
         raise SetupError("Photos behind URLs need fsspec; install it with: pip install 'materialist[batch]'") from error
-    system, path = fsspec.core.url_to_fs(url)
-    return system, path
-
-
-def _suffix(url: str) -> str:
-    return PurePosixPath(shown(url)).suffix.lower()
-
-
-@contextmanager
-def _told(url: str) -> Iterator[None]:
-    """Turn the errors of a store into one sentence without the URL's secrets."""
     try:
-        yield
+        yield fsspec.core.url_to_fs(url)
     except (InputError, SetupError):
         raise
     except ImportError as error:  # fsspec names the package that the protocol needs
@@ -88,3 +84,7 @@ def _told(url: str) -> Iterator[None]:
     except Exception as error:
         reason = str(error).replace(url, shown(url)) or type(error).__name__
         raise InputError(f"{shown(url)} cannot be read: {reason}.") from error
+
+
+def _suffix(url: str) -> str:
+    return PurePosixPath(shown(url)).suffix.lower()

@@ -7,7 +7,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,13 @@ from materialist.batches.ledger import Ledger, open_ledger
 from materialist.batches.outcome import Outcome, Row, Status, write_summary
 from materialist.batches.page import write_pages
 from materialist.batches.photos import Listed, list_photos
-from materialist.batches.plan import check_options, fingerprint, plan
-from materialist.batches.remote import is_url
+from materialist.batches.plan import check_options, plan
 from materialist.batches.task import INVERSION, SINGLE_THREAD, PhotoTask, process
 from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
-from materialist.jobs.pool import LocalPool, Pool
+from materialist.jobs.pool import LocalPool
 from materialist.jobs.process import LOST, Message
+from materialist.jobs.ray_pool import RayPool
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 Watch = Callable[[Status], None]
@@ -34,8 +34,7 @@ class Pace:
     """How often a batch does things; tuned by eye."""
 
     tries: int = 3  # how often a photo is begun whose worker dies
-    refresh: float = 30.0  # least seconds between two writings of the summary and the page while the batch runs,
-    share: float = 50  # and least ratio of other work to the time of a writing
+    refresh: float = 30.0  # seconds between two writings of the summary and the page while the batch runs
 
 
 PACE = Pace()
@@ -97,7 +96,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     asked |= {name: value for name, value in options.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
-        _check_files(how.recipe)
+        read_recipe(how.recipe)
     photos, folder = list_photos(source, runs=runs), Path(runs)
     ledger = open_ledger(folder, {**asked, "tool_version": __version__}, resume=how.resume, force=how.force)
     run = None
@@ -106,7 +105,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
         tasks, finished = plan(photos, ledger, template)
         run = _Run(folder, photos, ledger, tasks, len(finished), asked, progress or (lambda _: None))
         run.start = start
-        if how.recipe is not None and (notice := _lacking(how.recipe, tasks, none_done=not finished)):
+        if how.recipe is not None and (notice := _lacking(how.recipe, tasks)):
             run.tell(notice, urgent=True)
         if tasks:
             run.work(_pool(how, len(tasks), asked["device"], asked["size"]))
@@ -117,10 +116,8 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
         ledger.close()
 
 
-def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> Pool:
+def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | RayPool:
     if how.ray is not None:
-        from materialist.jobs.ray_pool import RayPool
-
         return RayPool(how.ray, SINGLE_THREAD, workers=how.workers, gpu=device != "cpu")
     return LocalPool(environments(min(how.workers or default_workers(device, size), tasks), device))
 
@@ -163,21 +160,13 @@ def visible_gpus() -> list[str]:
     return [str(k) for k in range(count.value)]
 
 
-def _check_files(recipe: Path) -> None:
-    """Refuse edits whose files every photo lacks. Raises InputError."""
-    missing = [file for file in missing_files(read_recipe(recipe), "{name}") if "{name}" not in file]
-    if missing:
-        raise InputError(f"There is no file {missing[0]}, which {recipe} names; put it there, or change the edits.")
-
-
-def _lacking(recipe: Path, tasks: list[PhotoTask], *, none_done: bool) -> str | None:
+def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
     """A sentence on photos whose edits name a file that is missing. Raises InputError where all photos are such."""
-    steps = read_recipe(recipe)
-    found = [(task, missing[0]) for task in tasks if (missing := missing_files(steps, task.name))]
+    found = [(task, missing[0]) for task in tasks if (missing := missing_files(recipe, task.name))]
     if not found:
         return None
     task, file = found[0]
-    if none_done and len(found) == len(tasks):
+    if len(found) == len(tasks):
         raise InputError(f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
                          "there, and add --resume.")  # fmt: skip
     return (f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
@@ -197,21 +186,19 @@ class _Run:
         self._tasks = {task.id: task for task in tasks}
         self._stages: dict[str, str] = {}
         self._tries: dict[str, int] = {}
-        self._through = self._failed = 0
-        self._before = {task.id: ledger.last.get(task.id) for task in tasks}
-        self.start = self._worked = time.monotonic()
-        self._written, self._writing = self._worked, 0.0
+        self._ended: dict[str, str] = {}
+        self.start = self._worked = self._written = time.monotonic()
 
-    def work(self, pool: Pool) -> None:
+    def work(self, pool: LocalPool | RayPool) -> None:
         """Run until every photo is over, or an error occurs that would fail all of them."""
         try:
             while self._waiting or self._stages:
                 while self._waiting and pool.free() > 0:
                     self._begin(pool, self._waiting.popleft())
                 self.tell(None)
-                for key, message in pool.wait(1.0):
+                for key, message in pool.wait(1.0) if self._stages else ():
                     self._hear(self._tasks[key], message)
-                if time.monotonic() - self._written > max(PACE.refresh, PACE.share * self._writing):
+                if time.monotonic() - self._written > PACE.refresh:
                     self.write()
         finally:
             pool.close()
@@ -223,32 +210,30 @@ class _Run:
 
     def write(self) -> None:
         """Write the summary and the page."""
-        begun = time.monotonic()
         outcome = self.outcome()
         write_summary(outcome)
         write_pages(outcome)
         self._written = time.monotonic()
-        self._writing = self._written - begun
 
-    def _begin(self, pool: Pool, task: PhotoTask) -> None:
+    def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:
+        places = ([] if task.inverted else [task.scene]) + ([] if task.edits is None else [task.picture])
+        for place in places:
+            if place.exists() and place.name not in self._ledger.owned:
+                reason = f"{place} exists and is not of this batch; move it away."
+                self._end(task, FAILED, {"error": "OutputError", "reason": reason, "bug": False, "stage": "begin"})
+                return
         self._tries[task.id] = self._tries.get(task.id, 0) + 1
         self._stages[task.id] = "begin"
-        before = self._ledger.last.get(task.id, {})
-        # What lies there and is of nobody else is this batch's from now on, however this try ends.
-        own = {"own_scene": _own(before, "own_scene", "scene_bytes") or not task.scene.exists(),
-               "own_picture": _own(before, "own_picture", "picture_hash")
-               or (task.edits is not None and not task.picture.exists())}  # fmt: skip
-        # The facts of a scene that is kept stay in the ledger's last entry until there is another.
-        known = {key: before[key] for key in _OF_THE_SCENE if key in before} if task.inverted else {}
-        self._ledger.append("begin", id=task.id, name=task.name, **known, **own)
-        task = replace(task, replace_scene=own["own_scene"], replace_picture=own["own_picture"])
+        self._ledger.append(
+            "begin", id=task.id, name=task.name, owned=[place.name for place in places], **self._known(task)
+        )
         pool.begin(task.id, process, {"task": task})
 
     def _hear(self, task: PhotoTask, message: Message) -> None:
         if message.kind in (PROGRESS, FOUND):
             self._stages[task.id] = str(message.facts.get("stage", self._stages[task.id]))
             return
-        facts, stage = message.facts, self._stages.pop(task.id, None)
+        facts, stage = message.facts, self._stages.pop(task.id)
         if message.kind == LOST and self._tries[task.id] < PACE.tries:
             self._waiting.appendleft(task)
             self.tell(f"{task.id}: {facts['reason']} It is begun again.")
@@ -257,53 +242,41 @@ class _Run:
             _stop_if_for_all(facts)
         if message.kind == LOST:
             facts = {**facts, "reason": f"{facts['reason']} It was begun {PACE.tries} times.", "stage": stage}
-        if "photo_hash" in facts and is_url(task.location):
-            facts = {**facts, "photo_version": fingerprint(task.location)}
-        before = self._ledger.last.get(task.id, {})
-        kind = DONE if message.kind == DONE else FAILED
-        known = {key: before[key] for key in (*_OF_THE_SCENE, *_OWN) if key in before}
-        if kind == FAILED:  # where it left nothing, what is there next time is somebody else's
-            known |= {key: known[key] and place.exists() for key, place in zip(_OWN, (task.scene, task.picture))
-                      if key in known}  # fmt: skip
-        self._ledger.append(kind, id=task.id, name=task.name, attempts=self._tries[task.id], **{**known, **facts})
-        self._through += 1
-        self._failed += kind == FAILED
-        self.tell(_line(task, kind, facts), urgent=kind == FAILED)
+        self._end(task, DONE if message.kind == DONE else FAILED, facts)
+
+    def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:
+        tries = self._tries.get(task.id, 0)
+        self._ledger.append(event, id=task.id, name=task.name, attempts=tries, **{**self._known(task), **facts})
+        self._ended[task.id] = event
+        if event == FAILED:
+            line = f"failed: {facts['reason']}"
+        else:
+            quality = f", {facts['psnr']:.1f} dB" if facts.get("psnr") is not None else ""
+            line = f"done in {facts['seconds']:.1f} s{quality}"
+        self.tell(f"{task.id}: {line}", urgent=event == FAILED)
+
+    def _known(self, task: PhotoTask) -> dict[str, Any]:
+        """Facts of a scene that is kept while its edit is made again; the ledger's last entry has them always."""
+        before = self._ledger.last.get(task.id, {}) if task.inverted else {}
+        return {key: before[key] for key in _OF_THE_SCENE if key in before}
 
     def tell(self, news: str | None, urgent: bool = False) -> None:
-        """Reporter the state, and what has happened."""
-        total, over = len(self._photos), self._kept + self._through
-        rate = self._through / max(time.monotonic() - self._worked, 1e-9)
+        """Report the state, and what has happened."""
+        total, failed = len(self._photos), list(self._ended.values()).count(FAILED)
+        over = self._kept + len(self._ended)
+        rate = len(self._ended) / max(time.monotonic() - self._worked, 1e-9)
         left = (total - over) / rate if rate else None
         running = {self._tasks[id].name: stage for id, stage in self._stages.items()}
-        self._watch(Status(total, over - self._failed, self._failed, rate, left, running, news, urgent))
+        self._watch(Status(total, over - failed, failed, rate, left, running, news, urgent))
 
     def _row(self, photo: Listed) -> Row:
-        entry = self._ledger.last.get(photo.id, {})
-        task = self._tasks.get(photo.id)
+        entry, task = self._ledger.last.get(photo.id, {}), self._tasks.get(photo.id)
         name = task.name if task else entry.get("name", "")
-        stale = entry.get("event") not in (DONE, FAILED) or self._before.get(photo.id) is entry
-        status = "open" if stale else entry["event"]
+        status = "done" if task is None else self._ended.get(photo.id, "open")
         return Row({**entry, "id": photo.id, "name": name, "status": status})
 
 
 _OF_THE_SCENE = ("invert_seconds", "photo_version", "scene_bytes", "photo_hash")
-"""Facts of a scene that was kept while its edit was redone."""
-_OWN = ("own_scene", "own_picture")
-"""Whether what lies at a place is of this batch."""
-
-
-def _own(entry: dict[str, Any], key: str, written: str) -> bool:
-    """Whether the last entry on a photo says that this batch made what lies there; old ledgers have only `written`."""
-    return bool(entry.get(key, written in entry))
-
-
-def _line(task: PhotoTask, kind: str, facts: dict[str, Any]) -> str:
-    """A line of the log."""
-    if kind == FAILED:
-        return f"{task.id}: failed: {facts['reason']}"
-    quality = f", {facts['psnr']:.1f} dB" if facts.get("psnr") is not None else ""
-    return f"{task.id}: done in {facts['seconds']:.1f} s{quality}"
 
 
 def _stop_if_for_all(facts: dict[str, Any]) -> None:

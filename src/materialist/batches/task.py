@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import hashlib
 import io
-import os
 import resource
 import time
 from collections.abc import Callable
@@ -18,10 +17,10 @@ import numpy as np
 
 from materialist.batches import results
 from materialist.batches.edits import edits_for, edits_key
-from materialist.batches.remote import is_url, local_copy
+from materialist.batches.remote import fingerprint, is_url, local_copy
 from materialist.batches.results import file_hash, package_hash, whole_size
 from materialist.color import srgb_levels
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable
 from materialist.types import Array, Scene
 
@@ -60,10 +59,6 @@ class PhotoTask:
     """Paths per pixel of each rendering of the edit."""
     inverted: bool = False
     """The package is there, whole and of this photo and these options: only the edit is missing."""
-    replace_scene: bool = False
-    """A scene that lies there is of this batch, and may be replaced."""
-    replace_picture: bool = False
-    """The same of an edited photo."""
     function: str = INVERSION
 
     @property
@@ -84,8 +79,6 @@ class PhotoTask:
 def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     """Do a task. Returns the facts for the ledger and the summary; raises the errors of the inversion and the edit."""
     start, processor = time.perf_counter(), time.process_time()
-    if task.edits is not None and not task.replace_picture and task.picture.exists():
-        raise OutputError(f"{task.picture} exists and is not of this batch; move it away.")
     scene, facts = _scene(task, report)
     pictures = [scene.photo.linear, scene.rerender]
     warnings = [*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings]
@@ -113,23 +106,21 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     gc.collect()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     facts["cpu_seconds"] = time.process_time() - processor
-    return facts | {"seconds": time.perf_counter() - start, "peak_rss_mb": peak, "process": os.getpid()}
+    return facts | {"seconds": time.perf_counter() - start, "peak_rss_mb": peak}
 
 
 def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
-    """The inverted photo, and the hash of its file."""
+    """The inverted photo, and facts for the ledger where it was inverted now."""
     from materialist.io.package import load_scene, save_scene
     from materialist.io.photo import read_photo
 
     if task.inverted:
-        scene = load_scene(task.scene)
-        return scene, {"photo_hash": _hash(scene.photo.source)}
-    if not task.replace_scene and task.scene.exists():
-        raise OutputError(f"{task.scene} exists and is not of this batch; move it away.")
-    ensure_writable(task.scene, task.replace_scene)
+        return load_scene(task.scene), {}
+    ensure_writable(task.scene, force=True)
     options = task.named_options()
     size, fov = options.pop("size", 512), options.pop("fov", "auto")
     report("read", 0, 1)
+    photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
         photo = read_photo(file if str(file) != task.location else task.location, size=size, fov=fov)
     place = task.id if is_url(task.location) else task.location
@@ -139,8 +130,10 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     module, _, attribute = task.function.partition(":")
     scene = getattr(import_module(module), attribute)(photo, size=size, fov=fov, progress=report, **options)
     report("save", 0, 1)
-    save_scene(scene, task.scene, force=task.replace_scene)
-    return scene, {"photo_hash": _hash(photo.source), "invert_seconds": time.perf_counter() - begun}
+    save_scene(scene, task.scene, force=True)
+    photo_hash = hashlib.sha256(photo.source or b"").hexdigest()
+    seconds = time.perf_counter() - begun
+    return scene, {"photo_hash": photo_hash, "photo_version": photo_version, "invert_seconds": seconds}
 
 
 def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
@@ -161,23 +154,18 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
     return picture, warnings_since(scene, edited)
 
 
-def _hash(source: bytes | None) -> str:
-    return hashlib.sha256(source or b"").hexdigest()
-
-
 def _write_strip(path: Path, pictures: list[Array]) -> None:
     """Small pictures of linear [H, W, 3] side by side, as a JPEG."""
-    import cv2
     from PIL import Image
 
-    columns: list[Array] = []
-    for picture in pictures:
-        scale = min(THUMBNAIL[0] / picture.shape[1], THUMBNAIL[1] / picture.shape[0])
-        size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
-        columns.append(srgb_levels(np.asarray(cv2.resize(np.clip(picture, 0, 1), size, interpolation=cv2.INTER_AREA))))
-    height = max(one.shape[0] for one in columns)
-    white = {"mode": "constant", "constant_values": 255}
-    padded = [np.pad(one, ((0, height - one.shape[0]), (0, 4), (0, 0)), **white) for one in columns]  # type: ignore[call-overload]
+    small = [Image.fromarray(srgb_levels(np.clip(picture, 0, 1))) for picture in pictures]
+    for one in small:
+        one.thumbnail(THUMBNAIL, Image.Resampling.BOX)
+    strip = Image.new("RGB", (sum(one.width + 4 for one in small) - 4, max(one.height for one in small)), "white")
+    left = 0
+    for one in small:
+        strip.paste(one, (left, 0))
+        left += one.width + 4
     encoded = io.BytesIO()
-    Image.fromarray(np.concatenate(padded, 1)[:, :-4]).save(encoded, "JPEG", quality=85)
+    strip.save(encoded, "JPEG", quality=85)
     results.replace_file(path, encoded.getvalue())

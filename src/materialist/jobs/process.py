@@ -14,10 +14,8 @@ from multiprocessing import Pipe
 from multiprocessing.connection import wait
 from typing import IO, Any
 
-from materialist.jobs.worker import READY
-
 LOST = "lost"
-"""Kind of the last message: the process has ended. Its facts are those of `exit_report`, and `unready`."""
+"""Kind of the last message: the process has ended. Its facts are those of `exit_report`."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Worker:
             raise
         finally:
             theirs.close()
-        self._errors, self._ready, self._number = errors, False, 0
+        self._errors, self._number = errors, 0
 
     @property
     def pid(self) -> int:
@@ -80,14 +78,9 @@ class Worker:
         found = []
         try:
             while self.connection.poll():
-                kind, facts, number = self.connection.recv()
-                self._ready = True
-                if kind != READY:
-                    found.append(Message(kind, facts, number))
+                found.append(Message(*self.connection.recv()))
         except (EOFError, OSError):
-            code = self.close()
-            facts = {**exit_report(code, self._errors), "unready": not self._ready and code > 0}
-            found.append(Message(LOST, facts, self._number))
+            found.append(Message(LOST, exit_report(self.close(), self._errors), self._number))
         return found
 
     def messages(self) -> Iterator[Message]:
@@ -117,7 +110,7 @@ class Worker:
 
 
 def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
-    """The reason of a process's end, from its exit code and its last line of stderr; keys as of `worker.failure`."""
+    """Why a process ended, from its exit code and its last line of stderr; keys as of `worker.failure`."""
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""

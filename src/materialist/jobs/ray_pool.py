@@ -10,22 +10,21 @@ from materialist.errors import SetupError
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import Reporter, run
 
-PATIENCE = 10.0
-"""Seconds that a cluster has to accept a connection."""
-LOCAL = "local"
-"""The address of a cluster of this machine alone, which ends with the pool."""
-
 
 class RayPool:
-    """Tasks on the cluster at an address (`ray://HOST:10001`, `HOST:6379`, `auto`) or `local`. See `pool.Pool`.
+    """Tasks on the cluster at an address (`ray://HOST:10001`, `HOST:6379`, `auto`) or `local`.
 
     A task takes one processor, or one GPU with `gpu` where the cluster has any. Ray's own retries are off: the batch
     counts them. Raises SetupError where Ray is not installed or does not answer.
     """
 
     def __init__(self, address: str, environment: dict[str, str], *, workers: int | None = None, gpu: bool = True):
-        ray = self._ray = _ray()
-        local = address == LOCAL
+        try:
+            import ray
+        except ModuleNotFoundError as error:
+            raise SetupError("--ray needs Ray; install it with: pip install 'materialist[ray]'") from error
+        self._ray = ray
+        local = address == "local"  # a cluster of this machine alone, which ends with the pool
         _check_reachable(address)
         try:
             # 'local', not the address of a cluster that happens to run on this machine: it was not asked for.
@@ -90,14 +89,6 @@ def _check_reachable(address: str) -> None:
     if not host or not port.isdigit():
         return
     try:
-        socket.create_connection((host.strip("[]"), int(port)), PATIENCE).close()
+        socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
     except (OSError, OverflowError) as error:
         raise SetupError(f"The Ray cluster at '{address}' does not answer: {error}.") from error
-
-
-def _ray() -> Any:
-    try:
-        import ray
-    except ModuleNotFoundError as error:
-        raise SetupError("--ray needs Ray; install it with: pip install 'materialist[ray]'") from error
-    return ray

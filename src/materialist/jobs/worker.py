@@ -1,8 +1,8 @@
 """The worker process: `python -m materialist.jobs.worker FD NICENESS IDLE` does the tasks that come over a socket.
 
-It receives `(task, arguments, number)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest.
-It ends when the other end of the socket is closed, also in the middle of a task: a coordinator that was killed leaves
-no process behind. `multiprocessing` and pools on top of it (pebble) would run the caller's main module again in each
+It receives `(number, task)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest.
+The process ends when the other end of the socket is closed, also in the middle of a task: a coordinator that was killed
+leaves none behind. `multiprocessing` and pools on top of it (pebble) would run the caller's main module again in each
 worker and import torch before the environment of a worker is set, so only its connections are used.
 """
 
@@ -21,7 +21,7 @@ from typing import Any
 
 from materialist.errors import MaterialistError
 
-READY, PROGRESS, FOUND, DONE, FAILED = "ready", "progress", "found", "done", "failed"
+PROGRESS, FOUND, DONE, FAILED = "progress", "found", "done", "failed"
 """Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Reporter.found`; of
 DONE: what the task returned; of FAILED: see `failure`."""
 INTERVAL = 0.1
@@ -57,9 +57,21 @@ def main(descriptor: int, niceness: int, idle: float) -> None:
     os.nice(niceness)
     connection: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    send = _sender(connection)
-    send((READY, {}, 0))
-    threading.Thread(target=_receive, args=(connection, tasks), daemon=True).start()
+
+    def receive() -> None:
+        try:
+            while True:
+                tasks.put(connection.recv_bytes())
+        except (EOFError, OSError):
+            os._exit(3)  # nobody waits for the result
+
+    def send(message: Any) -> None:
+        try:
+            connection.send(message)
+        except OSError:
+            os._exit(3)
+
+    threading.Thread(target=receive, daemon=True).start()
     while True:
         try:
             content = tasks.get(timeout=idle or None)
@@ -68,24 +80,6 @@ def main(descriptor: int, niceness: int, idle: float) -> None:
         while not tasks.empty():
             content = tasks.get()
         _do(content, send, lambda: not tasks.empty())
-
-
-def _receive(connection: Connection, tasks: queue.SimpleQueue[bytes]) -> None:
-    try:
-        while True:
-            tasks.put(connection.recv_bytes())
-    except (EOFError, OSError):
-        os._exit(3)  # nobody waits for the result
-
-
-def _sender(connection: Connection) -> Callable[[Any], None]:
-    def send(message: Any) -> None:
-        try:
-            connection.send(message)
-        except OSError:
-            os._exit(3)
-
-    return send
 
 
 def _do(content: bytes, send: Callable[[Any], None], waiting: Callable[[], bool]) -> None:
