@@ -72,6 +72,11 @@ class Photo:
     stops: int = 0
     """Exposure of `linear` and `original` over the values of an HDR file, see `io.photo.read_photo`."""
 
+    @property
+    def name(self) -> str:
+        """The name of its file, without folders."""
+        return (self.path or "photo").replace("\\", "/").rsplit("/", 1)[-1]
+
 
 @dataclass(frozen=True)
 class Materials:
@@ -241,3 +246,8 @@ class Scene:
     """Lights beside the environment map; a photograph has none until somebody adds one."""
     bodies: tuple[Body, ...] = ()
     """Closed things beside the depth surface; a photograph has none until somebody adds one."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """Those of the photo, the prior, the fit and the edits, each once."""
+        return list(dict.fromkeys((*self.photo.warnings, *self.prior.warnings, *self.report.warnings)))

@@ -6,9 +6,8 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.io.datasets import open_source, open_sources
+from materialist.io.datasets import InteriorVerse, open_source, open_sources
 from materialist.io.exr import write_exr
-from materialist.io.interiorverse import InteriorVerse
 from materialist.types import Camera
 
 

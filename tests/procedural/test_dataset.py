@@ -116,12 +116,12 @@ def test_resume_makes_what_is_missing_and_nothing_else(made, options):
     gone, kept = sample_path(made, 2), sample_path(made, 3)
     before, stamp = arrays(made, 2), kept.stat().st_mtime_ns
     gone.unlink()
-    (made / "samples" / "0000005.99.tmp").write_bytes(b"half a sample")
+    (made / "samples" / ".0000005.npz.0.partial-99-0.npz").write_bytes(b"half a sample")
     result = produce(made, options, count=6, resume=True)
     assert (result.rendered, result.existing) == (1, 5)
     assert all(np.array_equal(v, arrays(made, 2)[k]) for k, v in before.items())
     assert kept.stat().st_mtime_ns == stamp
-    assert not list((made / "samples").glob("*.tmp"))
+    assert not list((made / "samples").glob(".*"))
 
 
 def test_only_one_kind_of_scene_when_asked(options):
@@ -224,7 +224,7 @@ def test_the_splits_share_no_file(tmp_path):
 def test_the_sheet(made, tmp_path):
     assert write_data_sheet(made, tmp_path / "sheet.png", count=3) == 3
     assert (tmp_path / "sheet.png").stat().st_size > 5000
-    with pytest.raises(InputError, match="no folder 'samples'"):
+    with pytest.raises(InputError, match="holds no samples yet"):
         write_data_sheet(tmp_path, tmp_path / "none.png")
     shutil.copytree(made, tmp_path / "copy")
     os.truncate(sample_path(tmp_path / "copy", 2), 900)

@@ -153,7 +153,7 @@ def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmap
 
 def lost(data: Path, split: str) -> dict[str, Any]:
     """How many scenes of an InteriorVerse split are not there, and how many pictures have been scored without them."""
-    from materialist.io.interiorverse import InteriorVerse, is_interiorverse
+    from materialist.io.datasets import InteriorVerse, is_interiorverse
 
     if photo_folders(data) or not is_interiorverse(data):
         return {}

@@ -53,7 +53,7 @@ def invert(
     with StageProgress(quiet=run.as_json) as progress:
         scene = pipeline.invert(picture, options, progress=progress)
     save_scene(scene, output, force=run.force)
-    warnings = list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
+    warnings = scene.warnings
     seconds = time.monotonic() - start
     quality = scene.report.metrics.get("rerender_psnr_path")
     figure = f", re-rendering {quality:.1f} dB" if quality is not None else ""

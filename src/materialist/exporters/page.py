@@ -40,11 +40,11 @@ def page(scene: Scene, parts: list[Part]) -> str:
     Everything that came from outside is escaped, and a policy in the page forbids any request.
     """
     assets = files("materialist.exporters") / "assets"
-    camera, title = scene.camera, _title(scene)
+    camera, title = scene.camera, scene.photo.name
     values = {
         "title": html.escape(title),
         "subtitle": html.escape(_subtitle(scene)),
-        "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in _warnings(scene)),
+        "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in scene.warnings),
         "width": str(camera.width),
         "height": str(camera.height),
         "photo": _image(srgb_levels(scene.photo.linear), quality=94),
@@ -78,20 +78,12 @@ def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
             yield key, value
 
 
-def _title(scene: Scene) -> str:
-    return (scene.photo.path or "photo").replace("\\", "/").rsplit("/", 1)[-1]
-
-
 def _subtitle(scene: Scene) -> str:
     camera, native = scene.camera, scene.photo.original.shape
     return (
         f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
         f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}"
     )
-
-
-def _warnings(scene: Scene) -> list[str]:
-    return list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
 
 
 def _maps(scene: Scene) -> str:

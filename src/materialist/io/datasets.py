@@ -1,13 +1,41 @@
-"""Which kind of data set a folder holds, and several sets as one."""
+"""Data sets in folders: procedural samples, and InteriorVerse (Zhu et al. 2022), which the paper's network learnt from.
+
+InteriorVerse in its published layout:
+
+    FOLDER/                       dataset_85 or dataset_120: the number is the horizontal field of view in degrees
+        train.txt val.txt test.txt    names of scenes, one a line
+        SCENE/NNN_im.exr              linear HDR radiance
+        SCENE/NNN_albedo.exr          linear, in [0, 1]
+        SCENE/NNN_material.exr        R roughness, G metallic
+        SCENE/NNN_depth.exr           planar, millimetres, inf where there is nothing
+        SCENE/NNN_normal.exr          camera frame, +X right, +Y up, +Z to the viewer: ours
+        SCENE/NNN_mask.exr            1 where the maps hold
+
+Copies named scenes_85 and scenes_120 are the same. The published splits lost meaning in 2026, when part of the data was
+lost: scenes that a list names and the folder lacks are passed over, and told in `missing`.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.io.interiorverse import InteriorVerse, is_interiorverse
+from materialist.io.exr import read_exr
 from materialist.io.samples import Sample, SampleFolder, Source
+from materialist.types import Array, Camera
+
+SPLITS = ("train", "val", "test")
+PARTS = ("dataset_85", "dataset_120", "scenes_85", "scenes_120")
+MILLIMETRES = 1e-3
+"""Metres in a millimetre: depth is given in metres, as the paper's limit of 20 asks."""
+WHITE = 0.9
+"""Where the 97th percentile of a picture's brightest channel is put: the renderings have no exposure of their own."""
+MAPS = ("im", "albedo", "material", "depth", "normal")
 
 
 def open_source(folder: str | Path, *, split: str = "train") -> Source:
@@ -27,51 +55,150 @@ def open_source(folder: str | Path, *, split: str = "train") -> Source:
     )
 
 
-class SampleSets:
-    """Several sets of `materialist train data` as one. A sample keeps the number that it has in its own."""
-
-    def __init__(self, sets: Sequence[SampleFolder]):
-        self.sets = sets
-
-    def __len__(self) -> int:
-        return sum(map(len, self.sets))
-
-    def read(self, index: int) -> Sample:
-        """Sample number `index`: those of the first set come first."""
-        part, place = self._place(index)
-        return part.read(place)
-
-    def number(self, index: int) -> int:
-        """The number in the name of sample number `index`."""
-        part, place = self._place(index)
-        return part.number(place)
-
-    def refresh(self) -> None:
-        """List all folders again."""
-        for part in self.sets:
-            part.refresh()
-
-    def seed(self) -> list[int | None]:
-        """The seeds that the sets were made with."""
-        return [part.seed() for part in self.sets]
-
-    def _place(self, index: int) -> tuple[SampleFolder, int]:
-        for part in self.sets:
-            if 0 <= index < len(part):
-                return part, index
-            index -= len(part)
-        raise IndexError(index)
-
-
 def open_sources(folders: Sequence[Path]) -> Source:
     """The data set in one folder, or the procedural sets of several as one. Raises InputError, also for an
     InteriorVerse among several."""
-    if len(folders) == 1:
-        return open_source(folders[0])
-    sets = []
-    for folder in folders:
-        found = open_source(folder)
-        if not isinstance(found, SampleFolder):
+    sources = [open_source(folder) for folder in folders]
+    if len(sources) == 1:
+        return sources[0]
+    for folder, source in zip(folders, sources, strict=True):
+        if isinstance(source, InteriorVerse):
             raise InputError(f"{folder} is InteriorVerse; only sets of materialist train data can be put together.")
-        sets.append(found)
-    return SampleSets(sets)
+    return SampleFolder(*folders)
+
+
+class InteriorVerse:
+    """One split of one or both parts of the data set."""
+
+    def __init__(self, folder: str | Path, split: str = "train"):
+        """Open FOLDER, or its dataset_85 and dataset_120. Raises InputError for an unknown split or another layout."""
+        if split not in SPLITS:
+            raise InputError(f"InteriorVerse has no split '{split}'; choose one of {', '.join(SPLITS)}.")
+        self.folder, self.split = Path(folder), split
+        self.pictures: list[Path] = []
+        self.missing: list[str] = []
+        self.bare = 0
+        """Pictures of scenes that are there, without one of their maps."""
+        self.refresh()
+        if not self.pictures:
+            raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
+
+    def __len__(self) -> int:
+        return len(self.pictures)
+
+    def refresh(self) -> None:
+        """List the folder again."""
+        self.pictures, self.missing, self.bare = [], [], 0
+        for part in parts(self.folder):
+            for scene in _scenes(part / f"{self.split}.txt"):
+                found = sorted((part / scene).glob("*_im.exr"))
+                whole = [path for path in found if all(_sibling(path, name).is_file() for name in MAPS)]
+                self.pictures += whole
+                self.bare += len(found) - len(whole)
+                if not found:
+                    self.missing.append(f"{part.name}/{scene}")
+
+    def notes(self) -> list[str]:
+        """What of the split is not there, in words."""
+        found = []
+        if self.missing:
+            names = ", ".join(self.missing[:3])
+            found.append(f"{len(self.missing)} scenes of the split '{self.split}' are not there ({names} ...).")
+        if self.bare:
+            found.append(f"{self.bare} pictures of the split '{self.split}' lack a map, and are left out.")
+        return found
+
+    def validation(self) -> InteriorVerse | None:
+        """The split that scores are taken on while this one is trained on; None where it holds no pictures."""
+        try:
+            return InteriorVerse(self.folder, "val") if self.split == "train" else None
+        except InputError:
+            return None
+
+    def read(self, index: int) -> Sample:
+        """Picture number `index`; depth in metres. Raises InputError naming a file that is missing or misshapen."""
+        path = self.pictures[index]
+        maps = {name: _map(path, name) for name in MAPS}
+        height, width = maps["im"].shape[:2]
+        for name, values in maps.items():
+            if values.shape[:2] != (height, width):
+                raise InputError(f"{_sibling(path, name)} is {values.shape[:2]}, but its picture is {(height, width)}.")
+        return _sample(maps, _mask(path, (height, width)), Camera(width, height, field_of_view(path)))
+
+
+def is_interiorverse(folder: Path) -> bool:
+    """Whether the folder looks like InteriorVerse: a list of scenes in it or in one of its parts."""
+    return bool(parts(folder))
+
+
+def parts(folder: Path) -> list[Path]:
+    """The folder itself and its parts, where they have lists of scenes."""
+    found = [folder, *(folder / part for part in PARTS)]
+    return [place for place in found if any((place / f"{split}.txt").is_file() for split in SPLITS)]
+
+
+def field_of_view(path: Path) -> float:
+    """Horizontal field of view, degrees: the number in the name of the part that the picture lies in, else 85."""
+    for parent in path.parents:
+        found = re.fullmatch(r"(?:dataset|scenes)_(\d+)", parent.name)
+        if found:
+            return float(found[1])
+    return 85.0
+
+
+def _sample(maps: dict[str, Array], valid: Array, camera: Camera) -> Sample:
+    """The maps in our conventions; a pixel counts when its mask, depth and normal say so."""
+    depth = maps["depth"][..., 0] * MILLIMETRES
+    length = np.linalg.norm(maps["normal"][..., :3], axis=-1)
+    surface = valid & np.isfinite(depth) & (depth > 0) & np.isfinite(length) & (length > 0.5)
+    normal = np.where(surface[..., None], maps["normal"][..., :3] / np.maximum(length, 1e-6)[..., None], 0)
+    rays = pixel_rays(camera)
+    # Sheets that are modelled without a back show some normals from behind.
+    normal *= np.where((normal * rays).sum(-1, keepdims=True) > 0, -1, 1)
+    image = np.maximum(np.nan_to_num(maps["im"][..., :3], posinf=6e4), 0)
+    bright = float(np.percentile(image.max(-1), 97))
+    unit = lambda a: np.clip(np.nan_to_num(a), 0, 1).astype(np.float32)  # noqa: E731
+    return Sample(
+        image=(image * (WHITE / max(bright, 1e-6))).astype(np.float32),
+        albedo=unit(maps["albedo"][..., :3]),
+        roughness=unit(maps["material"][..., 0]),
+        metallic=unit(maps["material"][..., 1]),
+        normal=normal.astype(np.float32),
+        depth=np.where(surface, depth, 0).astype(np.float32),
+        mask=surface.astype(np.float32),
+        rays=rays[..., :2].copy(),
+    )
+
+
+def _map(path: Path, name: str) -> Array:
+    """[H, W, C] float32 values of the picture's map; raises InputError when it is missing or lacks channels."""
+    file = _sibling(path, name)
+    if not file.is_file():
+        raise InputError(f"{file} is missing; every InteriorVerse picture needs {', '.join(MAPS)}.")
+    values = read_exr(file)
+    values = values[..., None] if values.ndim == 2 else values
+    needed = {"depth": 1, "material": 2}.get(name, 3)
+    if values.shape[2] < needed:
+        raise InputError(f"{file} has {values.shape[2]} channels, but {needed} are needed.")
+    return values
+
+
+def _mask(path: Path, size: tuple[int, int]) -> Array:
+    """[H, W] bool; all true when there is no mask file."""
+    file = _sibling(path, "mask")
+    if not file.is_file():
+        return np.ones(size, bool)
+    values = read_exr(file)
+    values = values[..., 0] if values.ndim == 3 else values
+    if values.shape != size:
+        raise InputError(f"{file} is {values.shape}, but its picture is {size}.")
+    return values > 0.5
+
+
+def _scenes(file: Path) -> list[str]:
+    """Names in a list of scenes; none when the part has no such list."""
+    return file.read_text("utf-8").split() if file.is_file() else []
+
+
+def _sibling(path: Path, name: str) -> Path:
+    return path.with_name(path.name.removesuffix("_im.exr") + f"_{name}.exr")

@@ -1,20 +1,21 @@
-"""Labelled pictures to train on: what one is, and the folder format of the procedural data set."""
+"""Labelled pictures to train on: what one is, and folders of procedural ones, which say what decided their content."""
 
 from __future__ import annotations
 
 import json
 import zipfile
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.atomic import whole_file
+from materialist.io.atomic import whole_file, writing
 from materialist.types import Array, Camera, Materials, Prediction
 
 
@@ -69,40 +70,40 @@ class Source(Protocol):
 
 
 class SampleFolder:
-    """DIR/dataset.json and DIR/samples/NNNNNNN.npz, as `materialist train data` writes them."""
+    """Sets of `materialist train data` as one: DIR/dataset.json and DIR/samples/NNNNNNN.npz of each folder DIR.
 
-    def __init__(self, folder: str | Path):
-        self.folder = Path(folder)
-        if not (self.folder / "samples").is_dir():
-            raise InputError(f"{self.folder} holds no folder 'samples'; make a data set with: materialist train data.")
+    Samples lie in the order of the folders and of their names. Raises InputError where there are none.
+    """
+
+    def __init__(self, *folders: str | Path):
+        self.folders = [Path(folder) for folder in folders]
         self.paths: list[Path] = []
         self.refresh()
-        if not self.paths:
-            raise InputError(f"{self.folder} holds no samples yet; make some with: materialist train data.")
 
     def __len__(self) -> int:
         return len(self.paths)
 
     def read(self, index: int) -> Sample:
-        """Sample number `index` in the order of names."""
+        """Sample number `index`."""
         return read_sample(self.paths[index])
 
     def number(self, index: int) -> int:
-        """The number in the name of sample number `index`."""
+        """The number in the name of sample number `index`, which is that in its own set."""
         return int(self.paths[index].stem)
 
     def refresh(self) -> None:
-        """List the folder again."""
-        self.paths = sorted((self.folder / "samples").glob("[0-9]*.npz"))
+        """List the folders again."""
+        self.paths = []
+        for folder in self.folders:
+            found = sorted((folder / "samples").glob("[0-9]*.npz"))
+            if not found:
+                raise InputError(f"{folder} holds no samples yet; make some with: materialist train data.")
+            self.paths += found
 
-    def seed(self) -> int | None:
-        """The seed that the set was made with, when dataset.json tells."""
-        try:
-            content = json.loads((self.folder / "dataset.json").read_text("utf-8"))
-        except (OSError, ValueError):
-            return None
-        found = content.get("seed", content.get("options", {}).get("seed"))
-        return found if isinstance(found, int) else None
+    def seed(self) -> list[int | None]:
+        """The seeds that the sets were made with; None where dataset.json does not tell."""
+        contents = [described(folder / "dataset.json") or {} for folder in self.folders]
+        return [content.get("seed", content.get("options", {}).get("seed")) for content in contents]
 
 
 def read_sample(path: Path) -> Sample:
@@ -154,3 +155,33 @@ def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
     """An .npz of arrays, whole or not at all. Raises OutputError where it cannot be written."""
     with whole_file(path, force=True) as temporary, open(temporary, "wb") as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:
+    """Make FOLDER, and write the description of its set to FOLDER/name.
+
+    Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things, OutputError
+    when it cannot be written.
+    """
+    with writing(folder):
+        if folder.is_dir() and any(folder.iterdir()):
+            old = described(folder / name)
+            if old is None:
+                raise InputError(f"{folder} holds other things than such a set; name another folder.")
+            for key in keys:
+                if old.get(key) != description[key]:
+                    raise InputError(
+                        f"{folder} was begun with {key} {old.get(key)}, not {description[key]}; go on with that or "
+                        "name another folder."
+                    )
+        with whole_file(folder / name, force=True) as file:
+            file.write_text(json.dumps(description, indent=1) + "\n", "utf-8")
+
+
+def described(file: Path) -> dict[str, Any] | None:
+    """The description in a file; None where there is none, or a damaged one."""
+    try:
+        found = json.loads(file.read_text("utf-8"))
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None

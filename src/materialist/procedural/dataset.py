@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError, OutputError
-from materialist.io.described import claim, described
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import SampleFolder, write_arrays
+from materialist.io.samples import SampleFolder, claim, described, write_arrays
 from materialist.procedural.objects import things
 from materialist.procedural.sample import KINDS, SPLITS, Options, make_sample
 
@@ -95,7 +94,7 @@ def produce(
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
     (folder / "samples").mkdir(exist_ok=True)
-    for stale in (folder / "samples").glob("*.tmp"):
+    for stale in (folder / "samples").glob(".*.partial-*"):
         stale.unlink(missing_ok=True)
     missing = [k for k in range(count) if not sample_path(folder, k).exists()]
     start, done = time.monotonic(), 0

@@ -153,7 +153,7 @@ def report(scene: Scene) -> str:
         f"Worked at {camera.width} × {camera.height} pixels; field of view {camera.fov:.1f}° ({source}); first guess "
         f"by `{scene.prior.predictor}`."
     )
-    notes = list(dict.fromkeys((*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings)))
+    notes = scene.warnings
     lines += ["", "**What to beware of**", *(f"- {_safe(note)}" for note in notes)] if notes else []
     return "\n".join(lines)
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.described import claim
-from materialist.io.samples import SampleFolder, read_arrays, read_sample, write_arrays
+from materialist.io.samples import SampleFolder, claim, read_arrays, read_sample, write_arrays
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import features
 from materialist.procedural.dataset import identity
@@ -62,7 +61,7 @@ def produce(data: Path, folder: Path, progress: Progress = lambda *_: None) -> i
     set, OutputError for one that cannot be written.
     """
     source = SampleFolder(data)
-    said = identity(source.folder)
+    said = identity(data)
     claim(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
     for number, path in enumerate(source.paths):

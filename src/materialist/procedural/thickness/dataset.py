@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.io.described import claim
-from materialist.io.samples import read_arrays, write_arrays
+from materialist.io.samples import claim, read_arrays, write_arrays
 from materialist.procedural.objects.glassware import SPLITS, make_shape
 from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.procedural.thickness.view import draw_example
