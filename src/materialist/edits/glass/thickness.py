@@ -24,11 +24,12 @@ METHODS = ("auto", "network", "symmetry", "half-turn")
 
 @dataclass(frozen=True)
 class WallSettings:
-    """The wall of a hollow object, as parts of its size; tuned by eye."""
+    """The wall of a hollow object, as parts of its size, and what an object is; tuned by eye."""
 
     usual: float = 0.05  # where nothing tells it
     least: float = 0.015  # bounds on what RefractionNet says
     most: float = 0.12
+    part: float = 0.01  # share of the largest part of a mask from which a part is an object of its own
 
 
 WALL = WallSettings()
@@ -48,6 +49,21 @@ class ObjectThickness:
     """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
     revolution: Revolution | None = None
     """The whole object, where it is a surface of revolution."""
+
+
+def objects_in(mask: Array) -> list[Array]:
+    """[H, W] bool masks of the connected objects under a mask [H, W] bool; together they are the mask.
+
+    Specks count to the nearest object.
+    """
+    from scipy.ndimage import distance_transform_edt, label
+
+    number, _ = label(mask, np.ones((3, 3)))
+    area = np.bincount(number.ravel())
+    area[0] = 0
+    large = np.flatnonzero(area >= max(WALL.part * area.max(), 1))
+    rows, columns = distance_transform_edt(~np.isin(number, large), return_distances=False, return_indices=True)
+    return [mask & (number[rows, columns] == k) for k in large]
 
 
 def object_thickness(

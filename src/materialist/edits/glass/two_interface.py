@@ -25,16 +25,15 @@ from materialist.envmap import bilinear, environment
 from materialist.errors import InputError
 from materialist.geometry.silhouette import surface_in
 from materialist.geometry.slopes import back_normals
+from materialist.options import Glass
 from materialist.types import Array, Camera
 
-BACKS = ("mirrored", "same")
-"""What the back's normal is: the front's mirrored at the picture plane (lenses, vases), or its opposite (panes)."""
 LONGEST = 3.0
 """Longest way through the object, in units of its largest thickness."""
 STEPS = 96
 """Places along a ray where it is compared with the background's depth."""
-SIDES = (3, 5)
-"""Rays a pixel, along either side: of clear glass, and of a rough surface, whose every ray meets other facets."""
+SIDES = (2, 4)
+"""Rays a pixel along either side: of clear glass, and of a rough surface, whose rays meet different facets."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +65,8 @@ class Crossing:
 
 
 def two_interface(
-    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, background_depth: Array,
-    background: Array, envmap: Array, *, ior: float = 1.5, transmission: float = 1.0,
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0), roughness: float = 0.0, back: str | Array = "mirrored",
+    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, behind: Behind, options: Glass,
+    back: Array | None = None,
 ) -> Array:  # fmt: skip
     """The object under the mask as glass.
 
@@ -77,55 +75,34 @@ def two_interface(
         normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
         mask: [H, W] bool or weights.
         thickness: [H, W] scene units, >= 0: along the camera ray; of a back without normals of its own also d1.
-        background_depth: [H, W] planar depth without the object, 0 for sky.
-        background: [H, W, 3] linear radiance without the object.
-        envmap: [h, 2h, 3] linear radiance: reflections, and what rays meet that leave the picture.
-        ior: index of refraction, 1 to 3. transmission: T in [0, 1]. tint: linear RGB in [0, 1].
-        roughness: perceptual r in [0, 1]; alpha = r^2.
-        back: see BACKS; or the back's own outward normals [H, W, 3], unit, read at the exit's place in the picture:
-            then d1 is the way to the surface that `thickness` tells.
+        options: `ior`, `tint` and `roughness` count here.
+        back: [H, W, 3] unit outward normals of the back, read at the exit's place in the picture; d1 is then the
+            distance to the surface that `thickness` describes. None: the paper's assumption, -N_p of the front there.
 
     Returns:
         [H, W, 3] float32 linear radiance inside the mask, 0 outside.
 
     Raises:
-        InputError: options out of range, or maps of another size than the camera's.
+        InputError: maps of another size than the camera's.
     """
-    kind, own = (back, None) if isinstance(back, str) else ("mirrored", back)
-    _check(ior, transmission, tint, roughness, kind)
     inside = surface_in(mask, depth, camera)
-    for name, value in (("thickness", thickness), ("background depth", background_depth), ("normals", normal),
-                        ("background", background), ("back", normal if own is None else own)):  # fmt: skip
+    for name, value in (("thickness", thickness), ("background depth", behind.depth), ("normals", normal),
+                        ("background", behind.picture), ("back", normal if back is None else back)):  # fmt: skip
         if value.shape[:2] != inside.shape:
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
-    behind = Behind(background, background_depth, envmap)
-    front = Front(camera, normal, depth, inside, own, None if own is None else thickness)
+    front = Front(camera, normal, depth, inside, back, None if back is None else thickness)
     d1 = thickness[inside]
-    middle = cross(front, d1, ior=ior, back=kind)
-    place, in_picture = meeting(middle.exit, middle.direction, behind, camera)
-    through = radiance(place, in_picture, middle.direction, behind)
-    mean = through.mean(0)
-
-    def shown(crossing: Crossing, through: Array) -> Array:
-        inside_still = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
-        seen = crossing.share[:, None] * through + inside_still * mean
+    side, tint = SIDES[options.roughness > 0], np.asarray(options.tint, float)
+    total = np.zeros((int(inside.sum()), 3))
+    for k in range(side**2):
+        front.through((np.array([k % side, k // side]) + 0.5) / side - 0.5)
+        crossing = cross(front, d1, ior=options.ior, alpha=options.roughness**2, sample=(k, side**2))
+        through = look(crossing.exit, crossing.direction, behind, camera)
+        trapped = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
         mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
-        return seen * transmission * np.asarray(tint, float) + mirror
-
-    colour = shown(middle, through)
-    spread = crowding(place, inside)
-    several = np.full(len(spread), roughness > 0) | (spread > 0)
-    side = SIDES[roughness > 0]
-    count = side**2 if several.any() else 0
-    rays = []
-    for k in range(count):
-        front.through(spread[several, None] * ((np.array([k % side, k // side]) + 0.5) / side - 0.5), several)
-        crossing = cross(front, d1[several], ior=ior, alpha=roughness**2, sample=(k, count), back=kind)
-        rays.append(shown(crossing, look(crossing.exit, crossing.direction, behind, camera)))
-    if rays:
-        colour[several] = np.mean(rays, axis=0)
+        total += (crossing.share[:, None] * through + trapped * through.mean(0)) * tint + mirror
     result = np.zeros((*inside.shape, 3), np.float32)
-    result[inside] = colour
+    result[inside] = total / side**2
     return result
 
 
@@ -165,9 +142,9 @@ class Front:
             ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
             self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
 
-    def through(self, offset: Array, which: Array | slice = np.s_[:]) -> None:
-        """Look through the pixels `which`, [N] bool, at this distance [n, 2] (x right, y down) from their centres."""
-        place = self._centres[which] + offset
+    def through(self, offset: Array) -> None:
+        """Look through the pixels at this distance [2] (x right, y down) from their centres."""
+        place = self._centres + offset
         middle = np.array([self.camera.width, self.camera.height]) / 2
         x, y = ((place - middle) / self.camera.focal).T
         rays = np.stack([x, -y, -np.ones_like(x)], -1)
@@ -179,12 +156,9 @@ class Front:
         """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
         return _facing(self._read(self._normals, point), _unit(point))
 
-    def back_at(self, point: Array, kind: str) -> Array:
-        """[N, 3] the back's outward unit normal at points [N, 3]: its own where it is known, else see BACKS."""
-        if self._backs is not None:
-            return self._read(self._backs, point)
-        front = self.normal_at(point)
-        return -front if kind == "same" else reflect(front, _unit(point))
+    def back_at(self, point: Array) -> Array:
+        """[N, 3] the back's outward unit normal at points [N, 3]: its own, or the opposite of the front's."""
+        return -self.normal_at(point) if self._backs is None else self._read(self._backs, point)
 
     def way(self, inner: Array, d1: Array) -> Array:
         """[N] d1 of rays of unit directions [N, 3] inside: to the back where it is known, else d1 [N] as it is."""
@@ -199,9 +173,7 @@ class Front:
         return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
 
 
-def cross(
-    front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1), back: str = "mirrored"
-) -> Crossing:
+def cross(front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1)) -> Crossing:
     """Rays through both surfaces; d1 [N] scene units.
 
     `sample` (k, n) is the k-th of n facets of rough surfaces.
@@ -215,7 +187,7 @@ def cross(
     reflectance = fresnel * _unmasked(mirrored, front.normal, alpha, below=False)
     share = (1 - fresnel) * _unmasked(inner, front.normal, alpha, below=True)
     exit_point = front.point + front.way(inner, d1)[:, None] * inner
-    outward = front.back_at(exit_point, back)
+    outward = front.back_at(exit_point)
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
     against = -_facing(outward, -inner)
     facet = visible_facet(inner, against, alpha, points[2], points[3])
@@ -234,19 +206,9 @@ def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool
 
 
 def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
-    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment."""
-    return radiance(*meeting(origin, direction, behind, camera), direction, behind)
+    """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment.
 
-
-def radiance(place: Array, in_picture: Array, direction: Array, behind: Behind) -> Array:
-    """[N, 3] of rays that end in the picture at `place` [N, 2], or go to the environment along unit [N, 3]."""
-    return np.where(in_picture[:, None], bilinear(behind.picture, place), environment(direction, behind.envmap))
-
-
-def meeting(origin: Array, direction: Array, behind: Behind, camera: Camera) -> tuple[Array, Array]:
-    """[N, 2] where in the picture of the background rays end, S(x2), and [N] bool whether they end in it.
-
-    Where a ray that meets no surface looks at the picture's sky, the picture knows it better than the environment map.
+    A ray that meets no surface, but ends in the picture's sky, reads the picture.
     """
     distance = background_distance(origin, direction, behind.depth, camera)
     met = np.isfinite(distance)
@@ -255,26 +217,8 @@ def meeting(origin: Array, direction: Array, behind: Behind, camera: Camera) -> 
     size = np.array([camera.width, camera.height])
     sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
     sky[sky] = bilinear(behind.depth[..., None], place[sky])[:, 0] == 0
-    return place, met | sky
-
-
-def crowding(place: Array, inside: Array) -> Array:
-    """[N] 0 to 1: over how much of a pixel its rays are to be spread, from where its centre's and its neighbours' end.
-
-    One lookup between pixels is the mean of one pixel by itself: more is needed where the picture is crowded together.
-
-    place: [N, 2] pixels. inside: [H, W] bool, true for N pixels.
-    """
-    whole = np.full((*inside.shape, 2), np.nan)
-    whole[inside] = place
-    widest = np.zeros(inside.shape)
-    for axis in (0, 1):
-        step = np.nan_to_num(np.linalg.norm(np.diff(whole, axis=axis), axis=-1))  # 0 to what is outside
-        for beside in ((1, 0), (0, 1)):
-            pad = [(0, 0), (0, 0)]
-            pad[axis] = beside
-            widest = np.maximum(widest, np.pad(step, pad))
-    return np.clip(widest[inside] - 1, 0, 1)
+    seen = (met | sky)[:, None]
+    return np.where(seen, bilinear(behind.picture, place), environment(direction, behind.envmap))
 
 
 def background_distance(origin: Array, direction: Array, depth: Array, camera: Camera) -> Array:
@@ -320,14 +264,3 @@ def _facing(normal: Array, direction: Array) -> Array:
 
 def _unit(vector: Array) -> Array:
     return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
-
-
-def _check(ior: float, transmission: float, tint: tuple[float, float, float], roughness: float, back: str) -> None:
-    if not 1 <= ior <= 3:
-        raise InputError(f"The index of refraction is {ior:g}; give 1 to 3 (water 1.33, glass 1.5, diamond 2.4).")
-    if not (0 <= transmission <= 1 and 0 <= roughness <= 1):
-        raise InputError(f"Transmission is {transmission:g}, roughness {roughness:g}; both are 0 to 1.")
-    if not (len(tint) == 3 and all(0 <= c <= 1 for c in tint)):
-        raise InputError(f"The tint is {tint}; give three numbers from 0 to 1: R, G, B.")
-    if back not in BACKS:
-        raise InputError(f"The back is {back!r}; choose one of {', '.join(BACKS)}.")
