@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shape_measures import volume
 
-from materialist.procedural.objects.implicit import creature, surface
+from materialist.procedural.objects.glassware import creature, level_set
 
 
 def open_edges(solid):
@@ -19,8 +19,7 @@ def open_edges(solid):
 
 def test_a_ball_has_its_volume_its_radius_and_its_normals():
     centre, radius = np.array([0.1, -0.2, 0.05]), 0.7
-    corner = np.array([1.0, 1.1, 1.2])  # no cubic cells
-    ball = surface(lambda p: np.linalg.norm(p - centre, axis=-1) - radius, -corner, corner, points=48)
+    ball = level_set(lambda p: np.linalg.norm(p - centre, axis=-1) - radius, 1.1, points=48)
     out = ball.vertices - centre
     np.testing.assert_allclose(np.linalg.norm(out, axis=-1), radius, atol=0.01)
     assert volume(ball) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.02) and open_edges(ball) == 0
@@ -28,7 +27,7 @@ def test_a_ball_has_its_volume_its_radius_and_its_normals():
 
 
 def test_what_the_box_cuts_is_closed_there():
-    block = surface(lambda p: p[..., 1], -np.ones(3), np.ones(3), points=20)
+    block = level_set(lambda p: p[..., 1], 1.0, points=20)
     assert open_edges(block) == 0 and volume(block) == pytest.approx(4, rel=0.15)
 
 

@@ -13,14 +13,13 @@ from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
 from materialist.types import Array
 
-NOTE = """`solid` is the mean absolute error of the thickness over its mean, of each view; `pixel` the mean of
-|found - true| / true over pixels; `walls` that of the walls of hollow shapes; `back` the mean angle between the found
-and the true normals where the camera rays leave the object. Means over views. `held-out`: procedural shapes that no
-training set has, their maps bent and blurred as predicted ones are. Captured meshes (`DIR/meshes/GROUP`, `--data`):
-exact maps. `symmetry` is the paper's prior: front and back alike, mirrored across the view of the object's middle."""
+NOTE = """`solid` is the mean absolute error of the thickness over its mean, of each view; `walls` that of the walls of
+hollow shapes; `back` the mean angle between the found and the true normals where the camera rays leave the object.
+Means over views. `held-out`: procedural shapes that no training set has, their maps bent and blurred as predicted ones
+are. Captured meshes (`DIR/meshes/GROUP`, `--data`): exact maps. `symmetry` is the paper's prior: front and back alike,
+mirrored across the view of the object's middle."""
 COLUMNS = (
     Column("solid", "solid", "lower"),
-    Column("pixel", "solid, pixel", "lower"),
     Column("hollow", "walls", "lower"),
     Column("back", "back, degrees", "lower", 1),
 )
@@ -74,8 +73,8 @@ def _rows(group: str, name: str, network: Any, lessons: dict[str, Array]) -> lis
     each = errors(network, lessons)
     rows = []
     for k in range(len(each["solid"])):
-        own = {"solid": "solid", "pixel": "solid_pixel", "hollow": "hollow", "back": "back"}
-        prior = {"solid": "symmetry", "pixel": "symmetry_pixel", "back": "back_symmetry"}
+        own = {"solid": "solid", "hollow": "hollow", "back": "back"}
+        prior = {"solid": "symmetry", "back": "back_symmetry"}
         for method, names in (("RefractionNet", own), ("symmetry", prior)):
             figures = {key: float(each[source][k]) for key, source in names.items() if source in each}
             figures = {key: value for key, value in figures.items() if np.isfinite(value)}

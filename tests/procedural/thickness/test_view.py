@@ -9,7 +9,7 @@ from materialist.errors import InputError
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.procedural.objects import shapes as solids
 from materialist.procedural.objects.glassware import Shape, make_shape
-from materialist.procedural.thickness import dataset, view
+from materialist.procedural.thickness import dataset
 from materialist.procedural.thickness.ray_paths import ShapeTracer
 
 
@@ -37,12 +37,12 @@ def test_shapes_depend_on_their_numbers_alone():
 
 @pytest.fixture(scope="module")
 def ball():
-    return Shape(solids.moved(solids.ball(96), scale=0.5), False, "ball", True)
+    return Shape(solids.moved(solids.ball(96), scale=0.5), hollow=False, upright=True)
 
 
 def test_a_balls_view_is_consistent(ball):
-    lesson = view.draw_example(ball, ShapeTracer(ball.solid), np.random.default_rng(1), exact=True)
-    maps, target = lesson.maps.astype(float), lesson.target.astype(float)
+    view = dataset.draw_view(ball, ShapeTracer(ball.solid), np.random.default_rng(1), exact=True)
+    maps, target = (array.astype(float) for array in view)
     assert maps.shape == (CHANNELS, SIDE, SIDE) and target.shape == (ANSWERS, SIDE, SIDE)
     inside = maps[MASK] > 0.5
     assert np.array_equal(inside, target[0] > 0)
@@ -63,7 +63,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
     """The network must not learn one exact frame: a window a few percent larger doubled its error."""
     sides = []
     for seed in range(16):
-        maps = view.draw_example(ball, ShapeTracer(ball.solid), np.random.default_rng(seed)).maps
+        maps, _ = dataset.draw_view(ball, ShapeTracer(ball.solid), np.random.default_rng(seed))
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
     framed = SIDE / (1 + 2 * MARGIN)
@@ -72,14 +72,14 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
 
 def test_stretching_the_rays_is_stretching_the_shape(ball):
     rng = np.random.default_rng(4)
-    pose = view.draw_pose(rng, upright=True)
+    pose = dataset.draw_pose(rng, upright=True)
     stretched = replace(ball.solid, vertices=ball.solid.vertices @ pose.stretch.T)
     normals = solids.smooth_normals(stretched.vertices, stretched.faces)
     stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
     plain = replace(pose, stretch=np.eye(3))
-    rays = view.window_rays(stretched.vertices @ pose.to_camera.T + pose.centre)
-    a, normal_a, back_a = view.look(ShapeTracer(ball.solid), pose, rays)
-    b, normal_b, back_b = view.look(ShapeTracer(stretched), plain, rays)
+    rays = dataset.window_rays(stretched.vertices @ pose.to_camera.T + pose.centre)
+    a, normal_a, back_a = dataset.look(ShapeTracer(ball.solid), pose, rays)
+    b, normal_b, back_b = dataset.look(ShapeTracer(stretched), plain, rays)
     both = np.isfinite(a.first) & np.isfinite(b.first)
     assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from materialist.procedural.objects import shapes
-from materialist.procedural.objects.implicit import creature
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
@@ -27,7 +26,6 @@ class Shape:
     solid: Solid
     hollow: bool
     """Whether it has an inside, which only then has walls to learn from."""
-    kind: str
     upright: bool
     """Whether it stands as it is; other shapes are seen from everywhere."""
 
@@ -35,22 +33,23 @@ class Shape:
 def make_shape(index: int, split: str = "train", seed: int = 0) -> Shape:
     """Shape number `index` of a split; the same numbers give the same shape, and no two splits share one."""
     rng = np.random.default_rng([seed, SPLITS[split], index])
-    kinds = list(_KINDS)
-    kind = kinds[index % len(kinds)]
-    solid, hollow = _KINDS[kind](rng)
-    return Shape(centred(solid), hollow, kind, kind not in _ANY_WAY)
+    make, hollow, upright = _KINDS[index % len(_KINDS)]
+    return Shape(centred(make(rng)), hollow, upright)
+
+
+def centred(solid: Solid) -> Solid:
+    """The solid about the origin, its longest side 1."""
+    low, high = solid.vertices.min(0), solid.vertices.max(0)
+    return replace(solid, vertices=(solid.vertices - (low + high) / 2) / (high - low).max())
 
 
 def _profile(rng: np.random.Generator, points: int, low: float = 0.25) -> Array:
-    """[P, 2] smooth outline (radius, height) through random points, height 0 to 1."""
+    """[40, 2] smooth outline (radius, height) through random radii at even heights, height 0 to 1."""
     from scipy.interpolate import PchipInterpolator
 
-    heights = np.concatenate([[0], np.sort(rng.uniform(0.08, 0.92, points)), [1]])
-    heights = heights[np.concatenate([[True], np.diff(heights) > 0.05])]
-    heights[-1] = 1
-    radii = rng.uniform(low, 1, len(heights))
     y = np.linspace(0, 1, 40)
-    return np.stack([PchipInterpolator(heights, radii)(y) * rng.uniform(0.18, 0.55), y], -1)
+    radius = PchipInterpolator(np.linspace(0, 1, points + 2), rng.uniform(low, 1, points + 2))(y)
+    return np.stack([radius * rng.uniform(0.18, 0.55), y], -1)
 
 
 def _turned(outline: Array) -> Solid:
@@ -59,77 +58,69 @@ def _turned(outline: Array) -> Solid:
     return shapes.lathe(closed, 56)
 
 
-def _body(rng: np.random.Generator) -> tuple[Solid, bool]:
-    """Solid of revolution: balusters, chess men, drops, bulbs."""
+def _body(rng: np.random.Generator) -> Solid:
+    """Solid of revolution: balusters, chess men, drops, bulbs; some with round ends."""
     outline = _profile(rng, int(rng.integers(1, 7)), 0.12)
-    if rng.random() < 0.6:  # round ends instead of flat ones
-        t = np.linspace(0, 1, len(outline))
-        ends = [rng.choice([0.02, rng.uniform(0.05, 0.5)]) for _ in range(2)]
-        outline[:, 0] *= np.sqrt(np.clip(t / ends[0], 0, 1)) * np.sqrt(np.clip((1 - t) / ends[1], 0, 1)) + 1e-3
-    return _turned(outline), False
+    if rng.random() < 0.6:
+        t, ends = outline[:, 1], rng.uniform(0.02, 0.5, 2)
+        outline[:, 0] *= np.sqrt(np.clip(t / ends[0], 0, 1) * np.clip((1 - t) / ends[1], 0, 1)) + 1e-3
+    return _turned(outline)
 
 
 def _wall(rng: np.random.Generator, outline: Array) -> Solid:
     """An open vessel with that outside [P, 2], its wall 3 to 14 % of its width."""
     wall = outline[:, 0].max() * rng.uniform(0.06, 0.28)
-    bottom = wall * rng.uniform(0.6, 2.0)
     inner = np.stack([np.maximum(outline[:, 0] - wall, 0.012), outline[:, 1]], -1)
-    inner = inner[outline[:, 1] > bottom][::-1]
+    inner = inner[outline[:, 1] > wall * rng.uniform(0.6, 2.0)][::-1]
     lip = (outline[-1] + inner[0]) / 2 + [0, 0.3 * wall]
-    ends = [[[1e-4, outline[0, 1]]], outline, [lip], inner, [[1e-4, inner[-1, 1]]]]
-    return shapes.lathe(np.concatenate(ends), 56)
+    return _turned(np.concatenate([outline, [lip], inner]))
 
 
-def _vase(rng: np.random.Generator) -> tuple[Solid, bool]:
-    return _wall(rng, _profile(rng, int(rng.integers(1, 5)))), True
+def _vase(rng: np.random.Generator) -> Solid:
+    return _wall(rng, _profile(rng, int(rng.integers(1, 5))))
 
 
-def _cup(rng: np.random.Generator) -> tuple[Solid, bool]:
-    """Tumblers, cups and bowls: the outline only widens, or hardly narrows."""
+def _cup(rng: np.random.Generator) -> Solid:
+    """Tumblers, cups and bowls: the outline only widens, or hardly narrows; some with a round bottom."""
     y = np.linspace(0, 1, 40)
-    foot, top, bend = rng.uniform(0.5, 1.05), 1.0, rng.uniform(0.3, 2.2)
-    outline = np.stack([(foot + (top - foot) * y**bend) * rng.uniform(0.3, 1.1), y], -1)
+    foot = rng.uniform(0.5, 1.05)
+    radius = (foot + (1 - foot) * y ** rng.uniform(0.3, 2.2)) * rng.uniform(0.3, 1.1)
     if rng.random() < 0.4:
-        outline[:, 0] *= np.clip(y / rng.uniform(0.1, 0.5), 0.02, 1) ** 0.5  # a round bottom
-    return _wall(rng, outline), True
+        radius = radius * np.clip(y / rng.uniform(0.1, 0.5), 0.02, 1) ** 0.5
+    return _wall(rng, np.stack([radius, y], -1))
 
 
-def _mug(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _mug(rng: np.random.Generator) -> Solid:
     """A cup with a handle: a bent tube that ends in the wall."""
-    solid, _ = _cup(rng)
-    width = np.abs(solid.vertices[:, 0]).max()
-    t = np.linspace(-1.3, 1.3, 24)
+    solid = _cup(rng)
+    width, t = np.abs(solid.vertices[:, 0]).max(), np.linspace(-1.3, 1.3, 24)
     reach, high = width * rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.35)
     line = np.stack([width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1)
-    return shapes.joined([solid, _tube(line, width * rng.uniform(0.06, 0.14), 12)]), True
+    return shapes.joined([solid, _tube(line, width * rng.uniform(0.06, 0.14), 12)])
 
 
-def _goblet(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _goblet(rng: np.random.Generator) -> Solid:
     """Foot, stem and bowl."""
-    foot, stem, bowl = rng.uniform(0.2, 0.32), rng.uniform(0.025, 0.06), rng.uniform(0.2, 0.38)
-    rise, wall = rng.uniform(0.3, 0.55), rng.uniform(0.015, 0.04)
+    foot, stem, bowl, rise, wall = rng.uniform([0.2, 0.025, 0.2, 0.3, 0.015], [0.32, 0.06, 0.38, 0.55, 0.04])
     y = np.linspace(0, 1, 24)
     curve = np.sin(np.pi / 2 * np.clip(y * rng.uniform(1.0, 1.4), 0, 1.35)) ** rng.uniform(0.5, 0.9)
     cup = np.stack([np.maximum(bowl * curve, stem), rise + (1 - rise) * y], -1)
-    outline = np.concatenate([[[foot, 0], [foot, 0.02], [stem * 1.5, 0.06], [stem, 0.12], [stem, rise - 0.03]], cup])
-    inner = cup[6:][::-1] - [wall, 0]
-    profile = np.concatenate([[[1e-4, 0]], outline, np.maximum(inner, [0.005, 0]), [[1e-4, inner[-1, 1]]]])
-    return shapes.lathe(profile, 56), True
+    outline = [[foot, 0], [foot, 0.02], [stem * 1.5, 0.06], [stem, 0.12], [stem, rise - 0.03]]
+    return _turned(np.concatenate([outline, cup, np.maximum(cup[6:][::-1] - [wall, 0], [0.005, 0])]))
 
 
-def _bottle(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _bottle(rng: np.random.Generator) -> Solid:
     """Closed bottle or jar: shoulder and neck, with a cavity."""
-    body, neck = rng.uniform(0.14, 0.3), rng.uniform(0.04, 0.1)
-    shoulder, start = rng.uniform(0.45, 0.8), rng.uniform(0.03, 0.1)
+    body, neck, shoulder, start = rng.uniform([0.14, 0.04, 0.45, 0.03], [0.3, 0.1, 0.8, 0.1])
     y = np.linspace(0, 1, 48)
     blend = np.clip((y - shoulder) / rng.uniform(0.05, 0.25), 0, 1)
     radius = body + (neck - body) * (3 * blend**2 - 2 * blend**3)
     radius = radius * np.sqrt(np.clip(0.5 + y / start * 0.5, 0, 1))
     wall = body * rng.uniform(0.06, 0.2)
-    outside = _turned(np.stack([radius, y], -1))
     keep = (y > wall) & (y < 1 - wall) & (radius > 1.3 * wall)
     inside = _turned(np.stack([radius - wall, y], -1)[keep])
-    return shapes.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)]), True
+    outside = _turned(np.stack([radius, y], -1))
+    return shapes.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)])
 
 
 def _tube(line: Array, radius: Array | float, n: int) -> Solid:
@@ -138,114 +129,118 @@ def _tube(line: Array, radius: Array | float, n: int) -> Solid:
     return replace(solid, faces=solid.faces[:, ::-1])
 
 
-def _superquadric(rng: np.random.Generator) -> tuple[Solid, bool]:
-    return shapes.superquadric(rng.uniform(0.35, 1, 3), rng.uniform(0.15, 1.6), rng.uniform(0.15, 1.6), 36), False
+def _superquadric(rng: np.random.Generator) -> Solid:
+    return shapes.superquadric(rng.uniform(0.35, 1, 3), rng.uniform(0.15, 1.6), rng.uniform(0.15, 1.6), 36)
 
 
-def _box(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _box(rng: np.random.Generator) -> Solid:
     extent = rng.uniform(0.25, 1, 3)
-    return shapes.slab(extent, float(rng.choice([0.0, 0.04, 0.15])) * extent.min()), False
+    return shapes.slab(extent, float(rng.choice([0.0, 0.04, 0.15])) * extent.min())
 
 
-def _frustum(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _frustum(rng: np.random.Generator) -> Solid:
     """Pyramids, cones, prisms and what is left of them when the top is cut off, upright or on their heads."""
-    corners = int(rng.choice([3, 4, 4, 5, 6, 48]))
-    angle = 2 * np.pi * (np.arange(corners) + 0.5) / corners
-    around = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], -1) * [
-        rng.uniform(0.25, 0.7),
-        0,
-        rng.uniform(0.25, 0.7),
-    ]
-    top = rng.choice([1e-3, rng.uniform(0.1, 1)])
-    low, high = around, top * around + [*rng.normal(0, 0.05, 1), 1, *rng.normal(0, 0.05, 1)]
-    if rng.random() < 0.2:
-        upwards = np.array([0.0, 1, 0])
-        low, high = high - upwards, around + upwards
-    sides = [np.stack([low[k - 1], low[k], high[k], high[k - 1]]) for k in range(corners)]
-    return shapes.joined([_flat(side[::-1]) for side in sides] + [_flat(low), _flat(high[::-1])]), False
+    low, high, deep = rng.uniform(0.25, 0.7), rng.choice([1e-2, rng.uniform(0.05, 0.7)]), rng.uniform(0.4, 1)
+    profile = np.array([(1e-3, 0), (low, 0), (high, 1), (1e-3, 1)])
+    solid = shapes.lathe(profile, int(rng.choice([3, 4, 4, 5, 6, 48])))
+    corners = (solid.vertices * [1, 1, deep])[solid.faces]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-12)
+    own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
+    return Solid(corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2)))
 
 
-def _flat(corners: Array) -> Solid:
-    """A convex polygon [N, 3] with corners of its own, to be seen from where they run anticlockwise."""
-    across = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    if len(corners) == 4:  # one side may be as good as none
-        across = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-    normal = np.broadcast_to(across / max(float(np.linalg.norm(across)), 1e-12), corners.shape)
-    k = np.arange(1, len(corners) - 1)
-    faces = np.stack([0 * k, k, k + 1], -1).astype(np.int32)
-    return Solid(corners, faces, normal.copy(), np.zeros((len(corners), 2)))
+def _blob(rng: np.random.Generator) -> Solid:
+    return shapes.blob(rng, rng.uniform(0.5, 1, 3), rng.uniform(0.08, 0.45), 56)
 
 
-def _blob(rng: np.random.Generator) -> tuple[Solid, bool]:
-    return shapes.blob(rng, rng.uniform(0.5, 1, 3), rng.uniform(0.08, 0.45), 56), False
-
-
-def _ring(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _ring(rng: np.random.Generator) -> Solid:
     """Torus, lying, standing or tilted."""
-    t = np.linspace(0, 2 * np.pi, 49)
-    radius = rng.uniform(0.22, 0.38)
-    line = radius * np.stack([np.cos(t), np.sin(t) * rng.uniform(0.6, 1), 0 * t], -1)
-    return shapes.moved(_tube(line, rng.uniform(0.25, 0.75) * radius, 24), tip=rng.uniform(0, 1.6)), False
+    ring = shapes.torus(0.3, rng.uniform(0.25, 0.75) * 0.3, 24)
+    squeezed = shapes.warped(ring, lambda p: p * [1, 1, rng.uniform(0.6, 1)])
+    return shapes.moved(squeezed, tip=rng.uniform(0, 1.6))
 
 
-def twisted(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _twisted(rng: np.random.Generator) -> Solid:
     """Twisted, bent and tapered prisms."""
-    solid = shapes.superquadric(
-        np.array([0.5, 1, rng.uniform(0.2, 0.5)]), rng.uniform(0.1, 0.6), rng.uniform(0.2, 1), 40
-    )
-    twist, bend, taper = rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
+    extent = np.array([0.5, 1, rng.uniform(0.2, 0.5)])
+    solid = shapes.superquadric(extent, rng.uniform(0.1, 0.6), rng.uniform(0.2, 1), 40)
+    twist, bend, taper = rng.uniform([-3, -0.5, -0.6], [3, 0.5, 0.6])
 
     def warp(p: Array) -> Array:
         angle, scale = twist * p[:, 1], 1 + taper * (p[:, 1] - 0.5)
         x, z = (p[:, 0] * np.cos(angle) - p[:, 2] * np.sin(angle), p[:, 0] * np.sin(angle) + p[:, 2] * np.cos(angle))
         return np.stack([x * scale + bend * p[:, 1] ** 2, p[:, 1], z * scale], -1)
 
-    return shapes.warped(solid, warp), False
+    return shapes.warped(solid, warp)
 
 
-def _figure(rng: np.random.Generator) -> tuple[Solid, bool]:
-    """Several bodies grown together, often alike on the left and on the right: toys, animals, fruit."""
-    trunk = shapes.moved(shapes.ball(32), scale=1)
-    parts = [replace(trunk, vertices=trunk.vertices * rng.uniform(0.2, 0.45, 3))]
-    for _ in range(int(rng.integers(1, 5))):
-        direction = rng.normal(size=3)
-        direction /= np.linalg.norm(direction)
-        at = direction * rng.uniform(0.2, 0.45)
-        extent = rng.uniform(0.06, 0.28, 3)
-        for side in (1, -1) if rng.random() < 0.6 and abs(at[0]) > 0.08 else (1,):
-            limb = shapes.moved(shapes.ball(24), turn=rng.uniform(0, 3), tip=rng.uniform(0, 3))
-            parts.append(replace(limb, vertices=limb.vertices * extent + at * [side, 1, 1]))
-    body = shapes.joined(parts)
-    return replace(body, normals=shapes.smooth_normals(body.vertices, body.faces)), False
-
-
-def _creature(rng: np.random.Generator) -> tuple[Solid, bool]:
-    return creature(rng), False
-
-
-def _stick(rng: np.random.Generator) -> tuple[Solid, bool]:
+def _stick(rng: np.random.Generator) -> Solid:
     """Bars, tubes, cones, hooks: round along a bent line."""
-    t = np.linspace(0, 1, 28)
-    line = np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0)
-    bent = np.stack([np.interp(t, np.linspace(0, 1, 4), c) for c in line.T], -1)
-    kernel = np.hanning(13)[1:-1] / np.hanning(13).sum()
-    padded = np.pad(bent, ((5, 5), (0, 0)), mode="edge")
-    bent = np.stack([np.convolve(c, kernel, "valid") for c in padded.T], -1) + t[:, None] * 1e-3
+    from scipy.interpolate import CubicSpline
+
+    t, knots = np.linspace(0, 1, 28), np.linspace(0, 1, 4)
+    line = CubicSpline(knots, np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0))(t)
     radius = np.interp(t, [0, rng.uniform(0.2, 0.8), 1], rng.uniform(0.06, 0.3, 3))
     radius[[0, -1]] = 1e-3
-    return _tube(bent, radius * np.linalg.norm(bent[-1] - bent[0]).clip(0.5), 20), False
+    return _tube(line, radius * np.linalg.norm(line[-1] - line[0]).clip(0.5), 20)
 
 
-_KINDS: dict[str, Callable[[np.random.Generator], tuple[Solid, bool]]] = {
-    "body": _body, "vase": _vase, "superquadric": _superquadric, "figure": _figure, "cup": _cup, "blob": _blob,
-    "bottle": _bottle, "twisted": twisted, "box": _box, "mug": _mug, "goblet": _goblet, "figure 2": _figure,
-    "body 2": _body, "ring": _ring, "stick": _stick, "blob 2": _blob, "creature": _creature, "creature 2": _creature,
-    "creature 3": _creature, "frustum": _frustum,
-}  # fmt: skip
-_ANY_WAY = ("superquadric", "blob", "blob 2", "twisted", "box", "ring", "stick", "figure 2", "creature 2")
+def creature(rng: np.random.Generator) -> Solid:
+    """Trunk, head, limbs and tail that melt into each other, mostly alike on the left and on the right, skin rough."""
+    build = rng.uniform(0.12, 0.3, 3) * [1, rng.uniform(1, 1.9), 1]
+    thick = build.min()
+    limbs = [(build * [0, -0.5, 0], build * [0, 0.5, 0], thick, thick)]
+    neck = np.array([0, 1, rng.uniform(-0.3, 1.2)]) * build * rng.uniform(0.9, 1.3)
+    if rng.random() < 0.8:
+        head = rng.uniform(0.08, 0.2)
+        limbs += [(0.5 * neck, neck, 0.7 * head, 0.8 * head), (neck, neck * 1.1, head, head)]
+        ear = neck + head * rng.uniform([0.4, 0.5, -0.4], [1.2, 2.2, 0.4])
+        limbs += [(neck, ear * [side, 1, 1], 0.3 * head, 0.15 * head) for side in (-1, 1) if rng.random() < 0.5]
+    for _ in range(int(rng.integers(1, 5))):
+        start = rng.uniform([0, -0.8, -0.8], 0.8) * build
+        end = start + rng.uniform([0.0, -0.45, -0.3], [0.35, 0.25, 0.35])
+        first, last = rng.uniform(0.03, 0.11, 2)
+        sides = (-1, 1) if rng.random() < 0.75 else (1,)
+        limbs += [(start * [side, 1, 1], end * [side, 1, 1], first, last) for side in sides]
+    melt, skin = rng.uniform(0.015, 0.07), shapes.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
+    foot = -build[1] - rng.uniform(0, 0.1)
+
+    def field(p: Array) -> Array:
+        total = _limb(p, *limbs[0])
+        for limb in limbs[1:]:  # rounded over where they meet (Quilez's polynomial smooth minimum)
+            other = _limb(p, *limb)
+            share = np.clip(0.5 + 0.5 * (other - total) / melt, 0, 1)
+            total = other + (total - other) * share - melt * share * (1 - share)
+        return np.maximum(total + skin(p), foot - p[..., 1])  # it stands
+
+    return level_set(field, 1.3)
 
 
-def centred(solid: Solid) -> Solid:
-    """The solid about the origin, its longest side 1."""
-    low, high = solid.vertices.min(0), solid.vertices.max(0)
-    return replace(solid, vertices=(solid.vertices - (low + high) / 2) / (high - low).max())
+def _limb(p: Array, start: Array, end: Array, first: float, last: float) -> Array:
+    """[...] about the distance of points [..., 3] from a capsule that goes from one radius to another."""
+    along = end - start
+    t = np.clip((p - start) @ along / max(float(along @ along), 1e-9), 0, 1)
+    return np.linalg.norm(p - start - t[..., None] * along, axis=-1) - (first + t * (last - first))
+
+
+def level_set(field: Callable[[Array], Array], reach: float, points: int = 72) -> Solid:
+    """The zero of a function of points [..., 3], negative inside, within a box of that half side about the origin."""
+    from skimage.measure import marching_cubes
+
+    axis = np.linspace(-reach, reach, points)
+    values = field(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1))
+    closed = np.pad(values[1:-1, 1:-1, 1:-1], 1, constant_values=1e-3)
+    vertices, faces, *_ = marching_cubes(closed, 0.0, spacing=(axis[1] - axis[0],) * 3)
+    vertices, faces = vertices.astype(np.float64) - reach, faces.astype(np.int32)
+    return Solid(vertices, faces, shapes.smooth_normals(vertices, faces), vertices[:, :2].copy())
+
+
+_KINDS: tuple[tuple[Callable[[np.random.Generator], Solid], bool, bool], ...] = (
+    (_body, False, True), (_vase, True, True), (_superquadric, False, False), (creature, False, True),
+    (_cup, True, True), (_blob, False, True), (_bottle, True, True), (_twisted, False, False), (_box, False, False),
+    (_mug, True, True), (_goblet, True, True), (creature, False, False), (_body, False, True), (_ring, False, False),
+    (_stick, False, False), (_blob, False, False), (creature, False, True), (creature, False, False),
+    (_vase, True, True), (_frustum, False, True),
+)  # fmt: skip
+"""What makes a shape, whether the shape is hollow, and whether it stands."""

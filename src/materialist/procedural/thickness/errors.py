@@ -10,25 +10,15 @@ from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
+from materialist.procedural.thickness.dataset import draw_views
 from materialist.procedural.thickness.ray_paths import ShapeTracer
-from materialist.procedural.thickness.view import draw_example
 from materialist.types import Array
-
-THIN = 0.05
-"""Thickness, in units of the object's size, below which a pixel has no relative error of its own."""
 
 
 def relative_error(found: Array, truth: Array, inside: Array) -> Array:
     """[N] mean absolute error over mean true thickness, of maps [N, S, S] within inside [N, S, S]."""
     error = (np.abs(found - truth) * inside).sum((1, 2))
     return error / np.maximum((truth * inside).sum((1, 2)), 1e-6)
-
-
-def pixel_error(found: Array, truth: Array, inside: Array) -> Array:
-    """[N] mean over pixels of |found - truth| / truth, where the truth is above THIN."""
-    counted = inside & (truth > THIN)
-    each = np.where(counted, np.abs(found - truth) / np.maximum(truth, THIN), 0)
-    return each.sum((1, 2)) / np.maximum(counted.sum((1, 2)), 1)
 
 
 def degrees(found: Array, truth: Array, inside: Array) -> Array:
@@ -38,18 +28,16 @@ def degrees(found: Array, truth: Array, inside: Array) -> Array:
 
 
 def mean_errors(network, views: dict[str, Array]) -> dict[str, float]:
-    """Means of `errors` over views, and medians as NAME_median."""
-    each = errors(network, views)
-    figures = {name: float(np.nanmean(values)) for name, values in each.items()}
-    return figures | {f"{k}_median": float(np.nanmedian(each[k])) for k in ("solid", "symmetry", "hollow") if k in each}
+    """Means of `errors` over views."""
+    return {name: float(np.nanmean(values)) for name, values in errors(network, views).items()}
 
 
 def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array]:
     """Figures [N] of every view (see `dataset.make_views`).
 
     `solid`, `hollow`: relative errors, the latter NaN for shapes that are not, and left out where none is; `symmetry`:
-    of the mirrored thickness as the solid one; `solid_pixel`, `symmetry_pixel`: `pixel_error`; `back`,
-    `back_symmetry`: degrees by which the back's normals are off, those predicted and those of the front mirrored.
+    of the mirrored thickness as the solid one; `back`, `back_symmetry`: degrees by which the back's normals are off,
+    those predicted and those of the front mirrored.
     """
     import torch
 
@@ -65,9 +53,7 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     front /= np.maximum(np.linalg.norm(front, axis=1, keepdims=True), 1e-6)
     figures = {
         "solid": relative_error(found[:, 0], target[:, 0], inside),
-        "solid_pixel": pixel_error(found[:, 0], target[:, 0], inside),
         "symmetry": relative_error(maps[:, MIRROR], target[:, 0], inside),
-        "symmetry_pixel": pixel_error(maps[:, MIRROR], target[:, 0], inside),
         "back": degrees(found[:, BACK_X:], target[:, BACK_X:], inside),
         "back_symmetry": degrees(front, target[:, BACK_X:], inside),
     }
@@ -84,12 +70,7 @@ def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str
         raise InputError(f"{folder} holds no .ply meshes; give a folder that does.")
     found: dict[str, dict[str, Array]] = {}
     for file in files:
-        shape = Shape(centred(mesh(file)), False, file.stem, True)
-        tracer, rng = ShapeTracer(shape.solid), np.random.default_rng([seed, len(found)])
-        examples = [draw_example(shape, tracer, rng, exact=True) for _ in range(views)]
-        found[file.stem] = {
-            "maps": np.stack([x.maps for x in examples]),
-            "target": np.stack([x.target for x in examples]),
-            "hollow": np.zeros(views, bool),
-        }
+        shape = Shape(centred(mesh(file)), hollow=False, upright=True)
+        rng = np.random.default_rng([seed, len(found)])
+        found[file.stem] = draw_views(shape, ShapeTracer(shape.solid), rng, views, exact=True)
     return found
