@@ -13,7 +13,6 @@ from materialist.predict import get_predictor
 from materialist.types import Camera, Photo
 
 H, W = 20, 32
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "official_indoor"
 
 
 def photo(height: int = H, width: int = W) -> Photo:
@@ -69,13 +68,6 @@ def test_png_maps_are_decoded_by_their_meaning(tmp_path, dtype):
     assert any("depth steps" in w for w in prediction.warnings) == (dtype == np.uint8)
 
 
-def test_an_exr_wins_over_a_png(tmp_path):
-    maps = good_maps()
-    cv2.imwrite(str(tmp_path / "roughness.png"), np.zeros((H, W), np.uint8))
-    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
-    assert np.array_equal(prediction.materials.roughness, maps["roughness"])
-
-
 def test_missing_maps_are_neutral_and_told(tmp_path):
     maps = good_maps()
     spec = write(tmp_path, albedo=maps["albedo"], depth=np.full((H, W), 2.0, np.float32))
@@ -121,13 +113,6 @@ def test_another_aspect_ratio_is_refused_with_both_sizes(tmp_path):
     maps = good_maps() | {"metallic": np.zeros((W, W), np.float32)}
     with pytest.raises(InputError, match=r"32x32 and the photo is 32x20"):
         get_predictor(write(tmp_path, **maps)).predict(photo())
-
-
-@pytest.mark.parametrize(("w", "h", "scale"), [(512, 341, 4), (300, 199, 3), (97, 65, 2)])
-def test_rounded_sizes_count_as_the_same_aspect(tmp_path, w, h, scale):
-    small = (round(h / scale), round(w / scale))
-    prediction = get_predictor(write(tmp_path, **good_maps(*small))).predict(photo(h, w))
-    assert prediction.depth.shape == (h, w)
 
 
 @pytest.mark.parametrize(
@@ -179,14 +164,6 @@ def test_damaged_files_are_named(tmp_path):
     (tmp_path / "roughness.png").write_bytes(b"")
     with pytest.raises(InputError, match=r"roughness\.png"):
         get_predictor(spec).predict(photo())
-
-
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
-def test_published_maps_are_read():
-    linear = np.full((512, 512, 3), 0.3, np.float32)
-    prediction = get_predictor(f"maps:{SHARED / 'maps'}").predict(Photo(linear, Camera(512, 512, 35.0), linear))
-    assert prediction.warnings == ()
-    assert prediction.depth.min() > 16 and np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-4)
 
 
 def test_normals_without_a_negative_value_are_normals_when_they_have_unit_length(tmp_path):

@@ -96,14 +96,13 @@ def download_model(
     from materialist.predict.models import adopt, download, hub_model
 
     if source is not None:
-        folder, taken = adopt(hub_model(name), source)
-        lines = [f"{name}: {taken / 1e6:.0f} MB taken from {source}; it lies in {folder}"]
-        report_success("models download", as_json, lines, folder=str(folder), bytes=taken)
-        return
-    with StageProgress(quiet=as_json) as progress:
-        folder, fetched = download(hub_model(name), force=force, progress=progress)
-    lines = [f"{name}: {fetched / 1e6:.0f} MB fetched; checksums are right; it lies in {folder}"]
-    report_success("models download", as_json, lines, folder=str(folder), bytes=fetched)
+        folder = adopt(hub_model(name), source)
+    else:
+        with StageProgress(quiet=as_json) as progress:
+            folder = download(hub_model(name), force=force, progress=progress)
+    report_success(
+        "models download", as_json, [f"{name} lies in {folder}; its checksums are written"], folder=str(folder)
+    )
 
 
 @models.command("verify")

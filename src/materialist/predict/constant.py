@@ -6,32 +6,26 @@ from collections.abc import Collection
 
 import numpy as np
 
-from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
-from materialist.types import Array, Photo, Prediction
+from materialist.predict.protocol import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, Predictor
+from materialist.types import Array, Photo
 
 VALUES = {
     "albedo": (0.5, 0.5, 0.5),
     "roughness": NEUTRAL_ROUGHNESS,
     "metallic": NEUTRAL_METALLIC,
-    "normal": (0.0, 0.0, 1.0),
+    "normal": (0.0, 0.0, 0.0),
     "depth": 3.0,
 }
-"""Grey paint, the paper's neutral roughness and metallic, and a plane that faces the camera (depth in scene units)."""
+"""Grey paint, the paper's neutral roughness and metallic, and a plane across the view (depth in scene units)."""
 
 
-class ConstantPredictor:
+class ConstantPredictor(Predictor):
     """Neutral materials on a plane that faces the camera."""
 
-    gives = MAPS
     name = "constant"
-    normals_follow_depth = True
-
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """All maps; the picture and `seed` change nothing."""
-        return whole(self, photo)
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
-        """The wanted maps, with a warning that names them."""
+        """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""
         size = photo.linear.shape[:2]
         maps = {}
         for name in wanted:

@@ -10,7 +10,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import Part
+from materialist.predict.protocol import Part, Predictor
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 
@@ -18,7 +18,7 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of sRGB values in [0, 1], as the network was trained."""
 
 
-class DepthAnything:
+class DepthAnything(Predictor):
     """Gives depth alone.
 
     Args:
@@ -29,15 +29,14 @@ class DepthAnything:
 
     def __init__(self, where: str = "", *, device: str = "auto"):
         self._where, self._device = where, device
-        self._label = where or "V2 Small"
 
     @property
     def name(self) -> str:
         """'depth-anything (which one)'."""
-        return f"depth-anything ({self._label})"
+        return f"depth-anything ({self._where or 'V2 Small'})"
 
     def prepare(self, wanted: Collection[str]) -> None:
-        """Raises SetupError or WeightsError now when `parts` would later."""
+        """Raise SetupError or WeightsError where the library or the model is missing."""
         hub.locate(self._where, "depth-anything")
         hub.library("transformers")
 
@@ -45,9 +44,9 @@ class DepthAnything:
         """Planar depth at the photo's size; `seed` changes nothing.
 
         The network sees sRGB values. A metric model's depth is taken as it is, in metres; a relative one gives inverse
-        depth without scale and shift, see `relative.from_inverse`.
+        depth without scale and shift, see `relative.from_relative`.
         """
-        folder, self._label = hub.locate(self._where, "depth-anything")
+        folder, _ = hub.locate(self._where, "depth-anything")
         digest = hub.checked(folder)
         model = hub.load(hub.library("transformers").DepthAnythingForDepthEstimation, folder)
         values = _run(model, photo.linear, on_gpu(self._device))

@@ -8,7 +8,7 @@ from typing import Any
 
 from materialist.errors import SetupError, WeightsError
 from materialist.predict.models import KNOWN, hub_model, is_hub_id, require
-from materialist.predict.weights import CHECKSUMS, INSTEAD, SHOWN, verify_folder
+from materialist.predict.weights import CHECKSUMS, INSTEAD, reason, verify_folder
 
 INSTALL = "pip install 'materialist[hub]'"
 
@@ -30,11 +30,12 @@ def locate(where: str, default: str) -> tuple[Path, str]:
 
     Raises WeightsError when it is not there; nothing is downloaded.
     """
-    known = any(where == model.name for model in KNOWN)
-    if where and not known and Path(where).expanduser().is_dir():
-        return Path(where).expanduser(), Path(where).name
-    if where and not known and not is_hub_id(where):
-        raise WeightsError(f"There is no folder {where} with a model; give one, or a hub id as owner/name.")
+    if where and not any(where == model.name for model in KNOWN):
+        folder = Path(where).expanduser()
+        if folder.is_dir():
+            return folder, folder.name
+        if not is_hub_id(where):
+            raise WeightsError(f"There is no folder {where} with a model; give one, or a hub id as owner/name.")
     model = hub_model(where or default)
     return require(model), model.repo
 
@@ -50,29 +51,25 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     The libraries themselves fill what is missing with random numbers and only log it. Tensors too many do no harm:
     older files carry some that are no longer used. Raises WeightsError.
     """
-    where = folder / subfolder if subfolder else folder
+    if subfolder:
+        options["subfolder"] = subfolder
     try:
-        extra = {"subfolder": subfolder} if subfolder else {}
-        model, info = cls.from_pretrained(folder, local_files_only=True, output_loading_info=True, **extra, **options)
-    # The libraries raise whatever their readers raise on damaged files.
-    except Exception as error:
+        model, info = cls.from_pretrained(folder, local_files_only=True, output_loading_info=True, **options)
+    except Exception as error:  # the libraries raise whatever their readers raise on damaged files
         raise WeightsError(
-            f"{where} does not hold a {cls.__name__} that can be read ({_reason(error)}); fetch it again with: "
-            f"materialist models download NAME --force, or {INSTEAD}."
+            f"{folder / subfolder} does not hold a {cls.__name__} that can be read ({reason(error)}); fetch it again "
+            f"with: materialist models download NAME --force, or {INSTEAD}."
         ) from error
-    faults = []
-    if names := sorted(map(str, info.get("missing_keys") or ())):
-        faults.append(f"lacks {', '.join(names[:SHOWN])}" + (" and more" if len(names) > SHOWN else ""))
-    if odd := sorted(
-        str(item[0] if isinstance(item, tuple | list) else item) for item in info.get("mismatched_keys", ())
-    ):
-        faults.append(f"has tensors of another shape: {', '.join(odd[:SHOWN])}")
-    if faults:
-        raise WeightsError(f"{where} is not a whole {cls.__name__}: it {', '.join(faults)}; fetch it again.")
+    absent = [*(info.get("missing_keys") or ()), *(info.get("mismatched_keys") or ())]
+    if absent:
+        raise WeightsError(
+            f"{folder / subfolder} is not a whole {cls.__name__}: it lacks {', '.join(map(str, absent[:4]))}, or has "
+            "it in another shape; fetch it again."
+        )
     return model
 
 
-def pipeline(name: str, folder: Path, gpu: bool, what: str | None = None, **options: Any) -> Any:
+def pipeline(name: str, folder: Path, gpu: bool, what: str = "", **options: Any) -> Any:
     """The pipeline `name` of diffusers in a folder, every component whole; half precision on the GPU only.
 
     `what` is what errors call it, by default its name. Raises SetupError, WeightsError.
@@ -80,24 +77,19 @@ def pipeline(name: str, folder: Path, gpu: bool, what: str | None = None, **opti
     import torch
 
     diffusers, transformers = library("diffusers"), library("transformers")
+    kinds = {
+        "unet": diffusers.UNet2DConditionModel, "vae": diffusers.AutoencoderKL,
+        "text_encoder": transformers.CLIPTextModel,
+    }  # fmt: skip
     components = {}
-    for part, cls in (
-        ("unet", diffusers.UNet2DConditionModel),
-        ("vae", diffusers.AutoencoderKL),
-        ("text_encoder", transformers.CLIPTextModel),
-    ):
+    for part, cls in kinds.items():
         variant = {"variant": "fp16"} if any((folder / part).glob("*.fp16.*")) else {}
         components[part] = load(cls, folder, part, **variant).to(torch.float16 if gpu else torch.float32)
     try:
         made = getattr(diffusers, name).from_pretrained(folder, local_files_only=True, **components, **options)
     except Exception as error:  # whatever its readers raise on a damaged configuration
         raise WeightsError(
-            f"{folder} does not hold a whole {what or name} ({_reason(error)}); fetch it again."
+            f"{folder} does not hold a whole {what or name} ({reason(error)}); fetch it again."
         ) from error
     made.set_progress_bar_config(disable=True)
     return made.to("cuda" if gpu else "cpu")
-
-
-def _reason(error: Exception) -> str:
-    """The first line of what a library says."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

@@ -12,9 +12,10 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.image import read_map as read_data
 from materialist.predict import resample
-from materialist.predict.normals import normals_from_depth
-from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, whole
-from materialist.types import Array, Photo, Prediction
+from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, Predictor
+from materialist.types import Array, Photo
+
+NEUTRAL = {"roughness": NEUTRAL_ROUGHNESS, "metallic": NEUTRAL_METALLIC}
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,8 @@ class MapSettings:
 SETTINGS = MapSettings()
 
 
-class MapsPredictor:
+class MapsPredictor(Predictor):
     """Reads albedo, roughness, metallic, normal and depth as .exr or .png from a folder."""
-
-    gives = MAPS
 
     def __init__(self, folder: str | Path):
         if not str(folder):
@@ -47,83 +46,46 @@ class MapsPredictor:
         """'maps:DIR'."""
         return f"maps:{self.folder}"
 
-    @property
-    def normals_follow_depth(self) -> bool:
-        """Whether its normals are derived from its depth."""
-        return self._find("normal") is None
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted maps at the working size of the photo; `seed` changes nothing.
 
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """The maps at the working size of the photo; `seed` changes nothing.
-
-        A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal comes from depth;
+        A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal is unknown;
         warnings tell both, and every resampling and clipping. Raises InputError when albedo or depth is missing, a map
         has another aspect ratio than the photo, or its values cannot be meant.
         """
-        return whole(self, photo)
-
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
-        """Only the wanted maps, as `predict`; the folder need not hold any other. Raises InputError as `predict`."""
         size, maps = photo.linear.shape[:2], dict[str, Array]()
         warnings: list[str] = []
-        for name in sorted(wanted, key=lambda name: name == "normal"):  # normals may need the depth
-            if name == "roughness":
-                maps[name] = self._scalar(name, NEUTRAL_ROUGHNESS, size, warnings)
-            elif name == "metallic":
-                maps[name] = self._scalar(name, NEUTRAL_METALLIC, size, warnings)
+        for name in wanted:
+            path = next((p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None)
+            if path is not None:
+                maps[name] = _fitted(self.read(name, path, warnings), name, size, path, warnings)
             elif name == "normal":
-                own = None if "depth" in maps else self._fitted(name, size, warnings)
-                # Beside the depth of another source, unknown normals are derived from that depth.
-                maps[name] = self._normal(photo, maps.get("depth"), warnings) if own is None else own
+                warnings.append("There is no normal map: the normals were derived from depth.")
+                maps[name] = np.zeros((*size, 3), np.float32)
+            elif name in NEUTRAL:
+                warnings.append(f"There is no {name} map: the neutral {name} {NEUTRAL[name]} was used everywhere.")
+                maps[name] = np.full(size, NEUTRAL[name], np.float32)
             else:
-                maps[name] = self._needed(name, size, warnings)
+                raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
         return Part(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
 
-    def _normal(self, photo: Photo, depth: Array | None, warnings: list[str]) -> Array:
-        """[H, W, 3] unit normals; where they are unknown, and where there is no file, from depth."""
-        size = photo.linear.shape[:2]
-        normal = self._fitted("normal", size, warnings)
-        known = normal is not None and np.linalg.norm(normal, axis=-1, keepdims=True) > 0.5
-        if normal is not None and np.all(known):
-            return normal
-        depth = self._needed("depth", size, warnings) if depth is None else depth
-        from_depth = normals_from_depth(depth, photo.camera, radius=2)
-        if normal is None:
-            warnings.append("There is no normal map: the normals were derived from depth.")
-            return from_depth
-        return np.where(known, normal, from_depth)
+    def read(self, name: str, path: Path, warnings: list[str]) -> Array:
+        """The values of a map at their own size, checked and mended. Raises InputError."""
+        return _CHECKS[name](read_map(path, name), path, warnings)
 
-    def _scalar(self, name: str, neutral: float, size: tuple[int, int], warnings: list[str]) -> Array:
-        """Roughness or metallic [H, W], or its neutral value where there is no file."""
-        found = self._fitted(name, size, warnings)
-        if found is not None:
-            return found
-        warnings.append(f"There is no {name} map: the neutral {name} {neutral} was used everywhere.")
-        return np.full(size, neutral, np.float32)
 
-    def _needed(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
-        """Albedo or depth, as `_fitted`; raises InputError when it is missing."""
-        found = self._fitted(name, size, warnings)
-        if found is None:
-            raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
-        return found
-
-    def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array | None:
-        """One map, read, checked and brought to the photo's size [H, W]; None when it is missing."""
-        path = self._find(name)
-        if path is None:
-            return None
-        values = _CHECKS[name](read_map(path, name), path, warnings)
-        if values.shape[:2] != size:
-            check_aspect(values, size, path)
-            warnings.append(
-                f"{path.name} is {values.shape[1]}x{values.shape[0]} and was resampled to {size[1]}x{size[0]}."
-            )
-            values = {"normal": resample.normals, "depth": resample.depth}.get(name, resample.values)(values, size)
+def _fitted(values: Array, name: str, size: tuple[int, int], path: Path, warnings: list[str]) -> Array:
+    """A map [h, w, ...] brought to the photo's size (H, W). Raises InputError for another aspect ratio."""
+    (h, w), (height, width) = values.shape[:2], size
+    if (h, w) == size:
         return values
-
-    def _find(self, name: str) -> Path | None:
-        """DIR/name.exr, else DIR/name.png, else None."""
-        return next((p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None)
+    slack = 1.5 * max(1.0, height / h, width / w)  # pixels, for sizes that were rounded
+    if abs(w * height / h - width) > slack and abs(h * width / w - height) > slack:
+        raise InputError(
+            f"{path} is {w}x{h} and the photo is {width}x{height}: give maps of the photo's aspect ratio (no cropping)."
+        )
+    warnings.append(f"{path.name} is {w}x{h} and was resampled to {width}x{height}.")
+    return {"normal": resample.normals, "depth": resample.depth}.get(name, resample.values)(values, size)
 
 
 def read_map(path: Path, name: str) -> Array:
@@ -148,16 +110,6 @@ def read_map(path: Path, name: str) -> Array:
             raise InputError(f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey.")
         values = values[..., 0]
     return np.ascontiguousarray(values)
-
-
-def check_aspect(values: Array, size: tuple[int, int], path: Path) -> None:
-    """Raises InputError unless a map [h, w, ...] has the aspect ratio of the photo's `size` (H, W), up to rounding."""
-    (h, w), (height, width) = values.shape[:2], size
-    slack = 1.5 * max(1.0, height / h, width / w)
-    if abs(w * height / h - width) > slack and abs(h * width / w - height) > slack:
-        raise InputError(
-            f"{path} is {w}x{h} and the photo is {width}x{height}: give maps of the photo's aspect ratio (no cropping)."
-        )
 
 
 def _check_finite(values: Array, path: Path) -> None:

@@ -12,9 +12,10 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import MAPS, Part, whole
+from materialist.predict.mix import MixedPredictor
+from materialist.predict.protocol import Part, Predictor
 from materialist.predict.relative import planar
-from materialist.types import Array, Photo, Prediction
+from materialist.types import Array, Photo
 
 GIVES = {
     "MarigoldIntrinsicsPipeline": ("albedo", "roughness", "metallic"),
@@ -22,74 +23,45 @@ GIVES = {
     "MarigoldDepthPipeline": ("depth",),
 }
 """Pipeline class, as model_index.json names it -> the maps it gives."""
+MODELS = ("marigold-appearance", "marigold-normals", "marigold-depth")
+"""The published models, in the order of `GIVES`."""
 
 
-class Marigold:
-    """All maps, from three models; only those are loaded whose maps are wanted."""
+def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
+    """The Marigold model in a folder or of a hub id; all maps from the three published ones where `where` is "".
 
-    gives = MAPS
-    name = "marigold"
-
-    def __init__(self, *, device: str = "auto"):
-        models = ("marigold-appearance", "marigold-normals", "marigold-depth")
-        self._parts = [MarigoldPart(model, device=device, gives=gives) for model, gives in zip(models, GIVES.values())]
-
-    def prepare(self, wanted: Collection[str]) -> None:
-        """Raises SetupError or WeightsError now when `parts` would later."""
-        for part, names in self._shared(wanted):
-            part.prepare(names)
-
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
-        """The wanted maps; the normals come before the depth, which is scaled by them."""
-        maps: dict[str, Array] = {}
-        sources: dict[str, str] = {}
-        warnings: list[str] = []
-        for part, names in self._shared(wanted):
-            found = part.parts(photo, names, seed=seed, normal=maps.get("normal", normal))
-            maps |= found.maps
-            sources |= found.sources
-            warnings += found.warnings
-        return Part(maps, sources, tuple(warnings))
-
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """All maps; the same seed starts the diffusion from the same noise."""
-        return whole(self, photo, seed=seed)
-
-    def _shared(self, wanted: Collection[str]) -> list[tuple[MarigoldPart, list[str]]]:
-        shares = ((part, [name for name in part.gives if name in wanted]) for part in self._parts)
-        return [(part, names) for part, names in shares if names]
-
-
-class MarigoldPart:
-    """One Marigold model.
-
-    Args:
-        where: a folder with a diffusers pipeline, or a hub id.
-        gives: the maps, where they are known before the model is there; else its model_index.json says.
+    Raises WeightsError where `where` is no Marigold model on this machine.
     """
+    if where:
+        return Marigold(where, GIVES[_pipeline_class(hub.locate(where, "")[0])], device=device)
+    parts = {model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())}
+    return MixedPredictor({name: model for model, part in parts.items() for name in part.gives}, parts)
 
-    def __init__(self, where: str, *, device: str = "auto", gives: tuple[str, ...] = ()):
-        self._where, self._device = where, device
-        self.gives = gives or GIVES[_pipeline_class(hub.locate(where, "")[0])]
+
+class Marigold(Predictor):
+    """One Marigold model: a folder with a pipeline of diffusers or a hub id, and the maps that it gives."""
+
+    def __init__(self, where: str, gives: tuple[str, ...], *, device: str = "auto"):
+        self.where, self.gives, self.device = where, gives, device
 
     @property
     def name(self) -> str:
         """'marigold (which model)'."""
-        return f"marigold ({self._where})"
+        return f"marigold ({self.where})"
 
     def prepare(self, wanted: Collection[str]) -> None:
-        """Raises SetupError or WeightsError now when `parts` would later."""
-        hub.locate(self._where, "")
+        """Raise SetupError or WeightsError where a library or the model is missing."""
+        hub.locate(self.where, "")
         hub.library("diffusers")
         hub.library("transformers")
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
-        """The wanted maps at the photo's size. The model sees sRGB values."""
+        """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
-        folder, label = hub.locate(self._where, "")
+        folder, label = hub.locate(self.where, "")
         source = f"marigold ({label}){hub.checked(folder)}"
-        kind, gpu = _pipeline_class(folder), on_gpu(self._device)
+        kind, gpu = _pipeline_class(folder), on_gpu(self.device)
         pipeline = hub.pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
         output = pipeline(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction

@@ -8,14 +8,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.predict.weights import CHECKSUMS, INSTEAD, read_checksums, sha256, write_checksums
+from materialist.predict.weights import CHECKSUMS, INSTEAD, reason, sha256
 
 WEIGHTS = (".safetensors", ".pth", ".pt", ".bin", ".ckpt")
 SETTINGS = (".json", ".txt", ".model")
@@ -33,7 +31,7 @@ class HubModel:
     repo: str
     """owner/name on the hub."""
     main_file: str
-    """A file that a complete download has."""
+    """A file that a complete download has; "" where that is not known."""
     purpose: str
     licence: str
     megabytes: int
@@ -62,7 +60,7 @@ def models_folder() -> Path:
 
 def is_hub_id(text: str) -> bool:
     """Whether `text` reads as owner/name and not as a file."""
-    return bool(re.fullmatch(r"[\w.-]+/[\w.-]+", text)) and not text.startswith(".") and not _is_weights_name(text)
+    return bool(re.fullmatch(r"[\w.-]+/[\w.-]+", text)) and not text.startswith(".") and not text.endswith(WEIGHTS)
 
 
 def hub_model(name: str) -> HubModel:
@@ -105,81 +103,77 @@ def require(model: HubModel) -> Path:
     )
 
 
-def weights_file(folder: Path, main: str = "") -> Path:
-    """The one file of weights in a folder, safetensors before pickles, else the one named `main`, else the first.
-
-    Raises WeightsError when there is none.
-    """
-    found = sorted(path for path in folder.glob("*") if path.is_file() and _is_weights_name(path.name))
-    safe = [path for path in found if path.suffix == ".safetensors"]
+def weights_file(folder: Path) -> Path:
+    """The file of weights in a folder, safetensors before pickles. Raises WeightsError when there is none."""
+    found = [path for end in WEIGHTS for path in sorted(folder.glob(f"*{end}"))]
     if not found:
         raise WeightsError(f"{folder} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}.")
-    return min(safe or found, key=lambda path: path.name != main)
+    return found[0]
 
 
 def download(
-    model: HubModel, *, force: bool = False, progress: Callable[[str, int, int], None] | None = None
-) -> tuple[Path, int]:
-    """Fetch the files that the model needs into its folder; returns the folder and the bytes fetched now.
+    model: HubModel, *, force: bool = False, progress: Callable[[str, int, int], None] = lambda *_: None
+) -> Path:
+    """Fetch the files that the model needs into its folder, which is returned.
 
     Every file is compared with the hub's own sha256 where it gives one; the list of all checksums is written last.
-    An interrupted download is taken up again; `force` fetches everything again. Raises WeightsError when the hub
-    cannot be reached, has no such model, or sends other files than it promised; OutputError when the disk is full or
-    read-only.
+    An interrupted download is taken up again; `force` fetches everything again. `progress` is told (file, megabytes
+    done, megabytes in all). Raises WeightsError when the hub cannot be reached, has no such model, or sends other files
+    than it promised; OutputError when the disk is full or read-only.
     """
     from huggingface_hub import HfApi
+    from tqdm import tqdm
 
-    folder, fetched = folder_of(model), _Fetched(progress)
-    with _hub_errors(model):
-        api = HfApi(endpoint=endpoint(), library_name="materialist")
+    class Bar(tqdm):  # as huggingface_hub makes one for each file; this one draws nothing
+        def __init__(self, *args, desc: str = "", total: int = 0, initial: int = 0, **_):
+            super().__init__(*args, disable=True)
+            self.told, self.size, self.done = desc.rpartition("/")[2], total or 0, initial
+
+        def update(self, n: float | None = 1) -> None:
+            self.done += int(n or 0)
+            progress(self.told, self.done >> 20, max(1, self.size >> 20))
+
+    api, folder = HfApi(os.environ.get("HF_ENDPOINT"), library_name="materialist"), folder_of(model)
+    try:
         listing = api.model_info(model.repo, files_metadata=True, timeout=TIMEOUT).siblings or []
         promised = {file.rfilename: file.lfs.sha256 if file.lfs else None for file in listing}
-        wanted, known = chosen(promised), read_checksums(folder)
-        if not any(name.endswith(WEIGHTS) for name in wanted):
-            raise WeightsError(f"{endpoint()}/{model.repo} holds no file of weights; check the id.")
+        wanted = chosen(promised)
         for name in wanted:
-            file = folder / name
-            damaged = file.is_file() and name in known and sha256(file) != known[name]
-            api.hf_hub_download(
-                model.repo, name, local_dir=folder, force_download=force or damaged, tqdm_class=fetched.bar(name)
-            )
-            if promised[name] not in (None, digest := sha256(file)):
-                file.unlink()
-                raise WeightsError(
-                    f"{name} came damaged from {endpoint()}/{model.repo}: sha256 {digest}, expected {promised[name]}; "
-                    "run the same command again."
-                )
-        write_checksums(folder, wanted)
-    return folder, fetched.bytes
+            api.hf_hub_download(model.repo, name, local_dir=folder, force_download=force, tqdm_class=Bar)
+            if promised[name] not in (None, sha256(folder / name)):
+                (folder / name).unlink()
+                raise ValueError(f"{name} came damaged: its sha256 is not {promised[name]}")
+    except Exception as error:  # several HTTP libraries raise their own
+        if isinstance(error, OSError) and error.errno is not None and not isinstance(error, ConnectionError):
+            raise _unwritable(folder, error) from error
+        raise WeightsError(
+            f"{model.repo} cannot be fetched from {api.endpoint} ({reason(error)}); run the same command again, or "
+            f"fetch {model.main_file or 'its files'} elsewhere into a folder and take them from there: materialist "
+            f"models download {model.name} --from FOLDER; or {INSTEAD}."
+        ) from error
+    if not any(name.endswith(WEIGHTS) for name in wanted):
+        raise WeightsError(f"{api.endpoint}/{model.repo} holds no file of weights; check the id.")
+    _write_checksums(folder, wanted)
+    return folder
 
 
-def adopt(model: HubModel, source: Path) -> tuple[Path, int]:
+def adopt(model: HubModel, source: Path) -> Path:
     """As `download`, of files that were fetched elsewhere into the folder `source`; the hub is not asked.
 
     Raises InputError where the folder lacks the model's files, OutputError when the disk is full or read-only.
     """
-    if not source.is_dir():
-        raise InputError(f"There is no folder {source}; give the one that holds the files of {model.repo}.")
     wanted = chosen(path.relative_to(source).as_posix() for path in sorted(source.rglob("*")) if path.is_file())
-    needed = {model.main_file} - {""} if not model.main_file.endswith(WEIGHTS) else set()
-    if not any(name.endswith(WEIGHTS) for name in wanted) or not needed <= set(wanted):
+    if not any(name.endswith(WEIGHTS) for name in wanted) or model.main_file not in ("", *wanted):
         raise InputError(f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again.")
     folder = folder_of(model)
-    with _hub_errors(model):
-        for name in wanted:
-            target = folder / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            if not (target.is_file() and target.samefile(source / name)):
-                partial = target.with_name(target.name + ".partial")
-                shutil.copyfile(source / name, partial)
-                partial.replace(target)
-        write_checksums(folder, wanted)
-    return folder, sum((folder / name).stat().st_size for name in wanted)
-
-
-def endpoint() -> str:
-    """The hub: $HF_ENDPOINT, else huggingface.co."""
-    return os.environ.get("HF_ENDPOINT", "https://huggingface.co").rstrip("/")
+    try:
+        for name in wanted if source.resolve() != folder.resolve() else ():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source / name, folder / name)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    _write_checksums(folder, wanted)
+    return folder
 
 
 def chosen(names: Iterable[str]) -> list[str]:
@@ -187,74 +181,23 @@ def chosen(names: Iterable[str]) -> list[str]:
 
     Half precision before full (it is the same network at half the size), safetensors before pickles.
     """
-    names = list(names)
-    folders: dict[PurePosixPath, list[str]] = {}
-    for name in names:
-        if name.endswith(WEIGHTS):
-            folders.setdefault(PurePosixPath(name).parent, []).append(name)
-    picked = [name for name in names if name.endswith(SETTINGS) and not name.startswith(".cache/")]
-    for files in folders.values():
-        picked += next(
-            group
-            for end in (".fp16.safetensors", ".safetensors", ".fp16.bin", *WEIGHTS)
-            if (group := [name for name in files if name.endswith(end)])
-        )
+    names = [name for name in names if not name.startswith(".cache/")]
+    picked = [name for name in names if name.endswith(SETTINGS)]
+    weights = [name for name in names if name.endswith(WEIGHTS)]
+    for folder in dict.fromkeys(PurePosixPath(name).parent for name in weights):
+        files = [name for name in weights if PurePosixPath(name).parent == folder]
+        ends = (".fp16.safetensors", ".safetensors", ".fp16.bin", *WEIGHTS)
+        picked += next(group for end in ends if (group := [name for name in files if name.endswith(end)]))
     return picked
 
 
-class _Fetched:
-    """Counts fetched bytes, and tells `progress` (file, megabytes done, megabytes in all)."""
-
-    def __init__(self, progress: Callable[[str, int, int], None] | None):
-        self.progress, self.bytes = progress, 0
-
-    def bar(self, name: str) -> Any:
-        """A progress bar, as huggingface_hub makes one for each file, which draws nothing."""
-        from tqdm import tqdm
-
-        outer = self
-
-        class Bar(tqdm):
-            def __init__(self, *args: Any, **kwargs: Any):
-                self.done, self.size = kwargs.get("initial") or 0, kwargs.get("total") or 0
-                super().__init__(*args, **{**kwargs, "disable": True})
-
-            def update(self, n: float | None = 1) -> bool | None:
-                self.done += int(n or 0)
-                outer.bytes += int(n or 0)
-                if outer.progress:
-                    outer.progress(name, self.done >> 20, max(1, self.size >> 20))
-                return None
-
-        return Bar
+def _write_checksums(folder: Path, names: Iterable[str]) -> None:
+    """Write the list for these files of the folder; a download without it is not complete."""
+    lines = [f"{sha256(folder / name)}  {name}\n" for name in sorted(names)]
+    (folder / CHECKSUMS).write_text("".join(lines), "utf-8")
 
 
-@contextmanager
-def _hub_errors(model: HubModel) -> Iterator[None]:
-    """Errors of the hub and of the disk as WeightsError and OutputError, with the way out."""
-    from huggingface_hub.errors import HfHubHTTPError
-
-    folder, page = folder_of(model), f"{endpoint()}/{model.repo}"
-    try:
-        yield
-    except (WeightsError, KeyboardInterrupt):
-        raise
-    except Exception as error:  # several HTTP libraries raise their own
-        if isinstance(error, HfHubHTTPError) and error.response is not None:
-            code = error.response.status_code
-            why = "there is no such public model" if code in (401, 403, 404) else "try again later"
-            raise WeightsError(f"{page} answers {code}: {why}; or {INSTEAD}.") from error
-        if isinstance(error, OSError) and error.errno is not None and not isinstance(error, ConnectionError):
-            raise OutputError(
-                f"{folder} cannot be written ({error.strerror or error}); free space, or set MATERIALIST_MODELS."
-            ) from error
-        reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-        raise WeightsError(
-            f"{page} cannot be fetched ({reason}); run the same command again, or fetch "
-            f"{model.main_file or 'its files'} elsewhere into a folder and take them from there: materialist models "
-            f"download {model.name} --from FOLDER; or {INSTEAD}."
-        ) from error
-
-
-def _is_weights_name(name: str) -> bool:
-    return name.endswith(WEIGHTS)
+def _unwritable(folder: Path, error: OSError) -> OutputError:
+    return OutputError(
+        f"{folder} cannot be written ({error.strerror or error}); free space, or set MATERIALIST_MODELS."
+    )

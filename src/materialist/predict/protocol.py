@@ -1,11 +1,14 @@
-"""What a predictor is: names of the maps, and the interfaces that every predictor implements."""
+"""What a predictor is: names of the maps, and the base class of all predictors."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
+import numpy as np
+
+from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Materials, Photo, Prediction
 
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
@@ -13,22 +16,6 @@ NEUTRAL_ROUGHNESS = 0.5
 """The paper's neutral start (section "Predicted Material Properties on Envmap Estimation")."""
 NEUTRAL_METALLIC = 0.1
 """The paper's neutral start, as above."""
-SKY_NOTE = "of the picture was taken for sky and has no surface."
-"""End of the warning that a predictor gives where its depth is 0."""
-
-
-@runtime_checkable
-class Predictor(Protocol):
-    """Turns a photograph into a prior: materials, normals and depth (paper, section "MatNet")."""
-
-    @property
-    def name(self) -> str:
-        """The name of the predictor in the report."""
-        ...
-
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """All maps at the photo's working size, in the conventions of `Prediction`; equal seeds give equal maps."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -36,39 +23,44 @@ class Part:
     """Some of the maps of a photograph."""
 
     maps: dict[str, Array]
-    """Name -> [H, W, 3] or [H, W] float32, in the conventions of `Prediction`."""
+    """Name -> [H, W, 3] or [H, W] float32, in the conventions of `Prediction`; a normal of 0 is unknown."""
     sources: dict[str, str]
     """Name -> origin of the map, for the scene's provenance."""
     warnings: tuple[str, ...] = ()
 
 
-class PartPredictor(Protocol):
-    """Gives some of the maps, and computes only the wanted ones.
+class Predictor(ABC):
+    """Turns a photograph into a prior: materials, normals and depth (paper, section "MatNet")."""
 
-    A PartPredictor may also have `prepare(wanted)`, which raises SetupError or WeightsError before the first photo
-    where a library or a network is missing.
-    """
-
-    @property
-    def gives(self) -> tuple[str, ...]:
-        """Names of the maps that the predictor can give."""
-        ...
+    gives: tuple[str, ...] = MAPS
+    """Names of the maps that the predictor can give."""
+    field_of_view: float | None = None
+    """Horizontal, degrees, where the predictor knows it."""
 
     @property
+    @abstractmethod
     def name(self) -> str:
         """The name of the predictor in the report."""
-        ...
 
+    @abstractmethod
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
-        """The wanted maps at the photo's working size.
+        """The wanted maps at the photo's working size; equal seeds give equal maps.
 
         `normal` [H, W, 3], where known, sets the scale of a relative depth (docs/predictors.md, "Relative depth").
         """
-        ...
 
+    def prepare(self, wanted: Collection[str]) -> None:  # noqa: B027 (most predictors load all they need when made)
+        """Raise SetupError or WeightsError before the first photo where a library or a network is missing."""
 
-def whole(source: PartPredictor, photo: Photo, *, seed: int = 0) -> Prediction:
-    """All five maps of one source."""
-    part = source.parts(photo, MAPS, seed=seed)
-    materials = Materials(*(part.maps[name] for name in MAPS[:3]))
-    return Prediction(materials, part.maps["normal"], part.maps["depth"], source.name, part.warnings, part.sources)
+    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
+        """All five maps at the photo's working size. Normals that are unknown are derived from the depth."""
+        part = self.parts(photo, MAPS, seed=seed)
+        maps, sources = part.maps, {name: part.sources[name] for name in MAPS}
+        normal = maps["normal"]
+        known = np.linalg.norm(normal, axis=-1, keepdims=True) > 0.5
+        if not known.all():
+            normal = np.where(known, normal, normals_from_depth(maps["depth"], photo.camera, radius=2))
+        if not known.any():
+            sources["normal"] = f"derived from the depth of {sources['depth']}"
+        materials = Materials(maps["albedo"], maps["roughness"], maps["metallic"])
+        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources)

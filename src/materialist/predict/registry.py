@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from importlib import import_module
 
 from materialist.errors import InputError
 from materialist.predict.protocol import MAPS, Predictor
 
 CHOICES = "auto, bundled[:FILE], matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR, constant"
+CLASSES = {
+    "auto": "bundled.predictor:BundledPredictor",
+    "bundled": "bundled.predictor:BundledPredictor",
+    "matnet": "matnet.predictor:MatNetPredictor",
+    "marigold": "marigold:open_marigold",
+    "depth-anything": "depth_anything:DepthAnything",
+    "moge": "moge:MogeFolder",
+    "maps": "maps:MapsPredictor",
+    "constant": "constant:ConstantPredictor",
+}
+"""Name before the colon of a spec -> module and what makes it of the text behind the colon."""
+NETWORKS = ("auto", "bundled", "matnet", "marigold", "depth-anything")
+"""Names of predictors that compute on a device."""
 
 
 def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | None) -> Predictor:
@@ -21,86 +33,35 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
             `get_predictor("matnet", albedo="marigold")`; None means `spec`.
 
     Raises:
-        InputError: an unknown name, or a folder that is not there.
+        InputError: an unknown name, a folder that is not there, or a source that does not give its map.
         SetupError: an optional library is missing.
         WeightsError: weights are missing or damaged. Nothing is ever downloaded here.
     """
-    named = {name: part for name, part in parts.items() if part is not None}
-    if not named:
-        source = _open(spec, device)
-        if not isinstance(source, Predictor):
-            gives = ", ".join(source.gives)
-            options = " ".join(f"--{name} {spec}" for name in source.gives)
-            raise InputError(f"'{spec}' gives only {gives}: use it for these beside another predictor, with {options}.")
-        if hasattr(source, "prepare"):
-            source.prepare(MAPS)
-        return source
+    if unknown := [name for name in parts if name not in MAPS]:
+        raise InputError(f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}.")
+    chosen = {name: parts.get(name) or spec for name in MAPS}
+    sources = {one: _open(one, device) for one in dict.fromkeys(chosen.values())}
+    for one, source in sources.items():
+        if lacking := [name for name in MAPS if chosen[name] == one and name not in source.gives]:
+            options = " ".join(f"--{name} {one}" for name in source.gives)
+            raise InputError(
+                f"'{one}' gives only {', '.join(source.gives)}, not {lacking[0]}: use it beside another predictor, "
+                f"with {options}."
+            )
     from materialist.predict.mix import MixedPredictor
 
-    if unknown := [name for name in named if name not in MAPS]:
-        raise InputError(f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}.")
-    chosen = {name: named.get(name, spec) for name in MAPS}
-    return MixedPredictor(chosen, {one: _open(one, device) for one in dict.fromkeys(chosen.values())})
+    found = MixedPredictor(chosen, sources) if len(sources) > 1 else next(iter(sources.values()))
+    found.prepare(MAPS)
+    return found
 
 
-def _open(spec: str, device: str) -> Any:
-    """The Predictor or PartPredictor named by `spec`. Raises as `get_predictor`."""
+def _open(spec: str, device: str) -> Predictor:
+    """The predictor of one source. Raises as `get_predictor`."""
     name, _, argument = spec.partition(":")
-    if name not in _OPENERS or (argument and name in ("auto", "constant")):
+    if name not in CLASSES or (argument and name in ("auto", "constant")):
         raise InputError(f"There is no predictor '{spec}'; choose one of {CHOICES}.")
-    return _OPENERS[name](argument, device)
-
-
-def _constant(argument: str, device: str) -> Any:
-    from materialist.predict.constant import ConstantPredictor
-
-    return ConstantPredictor()
-
-
-def _maps(argument: str, device: str) -> Any:
-    from materialist.predict.maps import MapsPredictor
-
-    return MapsPredictor(argument)
-
-
-def _bundled(argument: str, device: str) -> Any:
-    from materialist.predict.bundled.predictor import BundledPredictor
-
-    return BundledPredictor(argument, device=device)
-
-
-def _matnet(argument: str, device: str) -> Any:
-    from materialist.predict.matnet.predictor import MatNetPredictor
-
-    return MatNetPredictor(argument, device=device)
-
-
-def _marigold(argument: str, device: str) -> Any:
-    from materialist.predict.marigold import Marigold, MarigoldPart
-
-    return MarigoldPart(argument, device=device) if argument else Marigold(device=device)
-
-
-def _depth_anything(argument: str, device: str) -> Any:
-    from materialist.predict.depth_anything import DepthAnything
-
-    return DepthAnything(argument, device=device)
-
-
-def _moge(argument: str, device: str) -> Any:
-    from materialist.predict.moge import MogeFolder
-
-    return MogeFolder(argument)
-
-
-_OPENERS: dict[str, Callable[[str, str], Any]] = {
-    "auto": _bundled,
-    "bundled": _bundled,
-    "matnet": _matnet,
-    "marigold": _marigold,
-    "depth-anything": _depth_anything,
-    "moge": _moge,
-    "maps": _maps,
-    "constant": _constant,
-}
-"""Name before the colon -> function of the text behind the colon and the device."""
+    module, _, kind = CLASSES[name].partition(":")
+    make = getattr(import_module(f"materialist.predict.{module}"), kind)
+    if name == "constant":
+        return make()
+    return make(argument, device=device) if name in NETWORKS else make(argument)

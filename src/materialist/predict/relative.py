@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -26,63 +25,40 @@ class RelativeSettings:
 SETTINGS = RelativeSettings()
 
 
-def from_inverse(inverse: Array, camera: Camera, normal: Array | None = None) -> tuple[Array, float]:
-    """Planar depth of an affine-invariant inverse depth: 1 / depth = s * inverse + t with s > 0 and t unknown.
-
-    Scale is a convention: the nearest surface is at 1. The shift follows from the ratio of the farthest surface to the
-    nearest: the ratio whose surface has the given normals, else `RelativeSettings.ratio`.
-
-    Args:
-        inverse: [H, W] float32, any unit, larger is nearer.
-        normal: [H, W, 3] unit normals from elsewhere; zero where unknown.
-
-    Returns:
-        depth [H, W] float32 > 0, and the ratio.
-    """
-    nearness = _unit(inverse)
-
-    def depth(ratio: float, t: Array) -> Array:
-        # The guard keeps outliers behind the farthest surface at a finite distance.
-        return 1 / np.maximum(t * (1 - 1 / ratio) + 1 / ratio, 0.5 / ratio)
-
-    return _scaled(nearness, depth, camera, normal)
-
-
-def from_affine(relative: Array, camera: Camera, normal: Array | None = None) -> tuple[Array, float]:
-    """As `from_inverse`, of an affine-invariant depth: depth = s * relative + t, larger is farther."""
-    farness = 1 - _unit(-relative)
-
-    def depth(ratio: float, t: Array) -> Array:
-        return np.maximum(1 + t * (ratio - 1), 0.5)
-
-    return _scaled(farness, depth, camera, normal)
-
-
 def planar(
     values: Array, camera: Camera, normal: Array | None, *, inverse: bool, name: str
 ) -> tuple[Array, str, tuple[str, ...]]:
     """Planar depth of a relative one, the note for its source, and the warning that the report gives."""
-    depth, ratio = (from_inverse if inverse else from_affine)(values, camera, normal)
-    how = "fitted to the normals" if normal is not None else "assumed"
+    depth, ratio, fitted = from_relative(values, camera, normal, inverse=inverse)
+    how = "fitted to the normals" if fitted else "assumed"
     warning = f"Depth from {name} is relative: far / near = {ratio:.1f} was {how}."
     return depth, f", far / near {ratio:.1f} {how}", (warning,)
 
 
-def _unit(values: Array) -> Array:
-    """[H, W] with the settings' percentiles at 0 and 1; a constant map becomes 1."""
-    low, high = np.percentile(values, SETTINGS.percentiles)
-    if high - low <= 1e-6 * max(abs(low), abs(high), 1e-6):
-        return np.ones(values.shape, np.float32)
-    return ((values - low) / (high - low)).astype(np.float32)
+def from_relative(
+    values: Array, camera: Camera, normal: Array | None = None, *, inverse: bool
+) -> tuple[Array, float, bool]:
+    """Planar depth of an affine-invariant depth d = s values + t, or inverse depth 1 / d, with s > 0 and t unknown.
 
+    Scale is a convention: the nearest surface is at 1. The shift follows from the ratio of the farthest surface to the
+    nearest: the ratio whose surface has the least mean angle to the given normals. (The mean and not the median: a wall
+    that faces the camera has its normals at every ratio and may be most of the picture.)
 
-def _scaled(t: Array, depth: Callable, camera: Camera, normal: Array | None) -> tuple[Array, float]:
-    """`depth(ratio, t)` at the ratio whose surface has the least mean angle to the normals, tried on a small copy.
+    Args:
+        values: [H, W] float32, any unit.
+        normal: [H, W, 3] unit normals from elsewhere; zero where unknown.
 
-    The mean and not the median, because a wall that faces the camera has its normals at every ratio and may be most of
-    the picture.
+    Returns:
+        depth [H, W] float32 > 0, the ratio, and whether it was fitted to the normals.
     """
-    ratio = SETTINGS.ratio
+    low, high = np.percentile(values, SETTINGS.percentiles)
+    t = ((values - low) / max(high - low, 1e-6 * max(abs(low), abs(high), 1e-6))).astype(np.float32)
+
+    def depth(ratio: float, t: Array) -> Array:
+        if inverse:  # the guards keep outliers at a finite distance, and before the camera
+            return (1 / np.maximum(t * (1 - 1 / ratio) + 1 / ratio, 0.5 / ratio)).astype(np.float32)
+        return np.maximum(1 + t * (ratio - 1), 0.5).astype(np.float32)
+
     if normal is not None:
         scale = min(1.0, SETTINGS.side / max(t.shape))
         size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
@@ -98,4 +74,5 @@ def _scaled(t: Array, depth: Callable, camera: Camera, normal: Array | None) -> 
 
         if known.sum() >= 16:
             ratio = float(min(np.geomspace(*SETTINGS.range, SETTINGS.trials), key=error))
-    return depth(ratio, t).astype(np.float32), ratio
+            return depth(ratio, t), ratio, True
+    return depth(SETTINGS.ratio, t), SETTINGS.ratio, False

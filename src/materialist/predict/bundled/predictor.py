@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from materialist.predict.bundled import WEIGHTS
 from materialist.predict.bundled.inference import infer, rays_of
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import SKY_NOTE
+from materialist.predict.protocol import MAPS, Part, Predictor
 from materialist.predict.weights import sha256
-from materialist.types import Photo, Prediction
+from materialist.types import Array, Photo
 
 
-class BundledPredictor:
+class BundledPredictor(Predictor):
     """The bundled network, or one of its kind from `train export`.
 
     Args:
@@ -47,19 +48,19 @@ class BundledPredictor:
         """What the report calls it: how long it was trained, and the start of its checksum."""
         return self.source
 
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """The network's maps at the photo's size; deterministic, `seed` changes nothing.
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted of the network's maps at the photo's size; deterministic, `seed` changes nothing.
 
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        rays = rays_of(photo.camera)
-        found = infer(self.network, photo.linear, rays, device=self.device)
-        m = found.materials
-        if not all(np.isfinite(a).all() for a in (m.albedo, m.roughness, m.metallic, found.normal, found.depth)):
+        found = infer(self.network, photo.linear, rays_of(photo.camera), device=self.device)
+        maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
+        if not all(np.isfinite(maps[name]).all() for name in MAPS):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
-        notes = []
-        sky = float((found.depth == 0).mean())
-        if sky > 0:
-            notes.append(f"{sky:.0%} {SKY_NOTE}")
-        return Prediction(m, found.normal, found.depth, predictor=self.name, warnings=tuple(notes))
+        sky, warnings = found.depth == 0, ()
+        if "depth" not in wanted:  # there may be a surface in the depth of another source
+            maps["normal"] = np.where(sky[..., None], 0, found.normal).astype(np.float32)
+        elif sky.any():
+            warnings = (f"{sky.mean():.0%} of the picture was taken for sky and has no surface.",)
+        return Part({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings)

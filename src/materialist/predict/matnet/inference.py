@@ -7,7 +7,6 @@ import numpy as np
 import torch
 from torch.nn import functional as F
 
-from materialist.errors import InputError
 from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.network import MatNet
 from materialist.types import Array
@@ -30,10 +29,6 @@ def infer(network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE) -> di
         albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges. The
         normals are interpolated and not normalised again.
     """
-    if linear.ndim != 3 or linear.shape[2] != 3:
-        raise InputError(f"MatNet takes a picture [H, W, 3], not {linear.shape}.")
-    if input_size < PATCH:
-        raise InputError(f"input_size is {input_size}; give at least {PATCH}.")
     height, width = linear.shape[:2]
     rows, columns = network_size(height, width, input_size)
     small = cv2.resize(linear, (columns, rows), interpolation=cv2.INTER_CUBIC)
@@ -57,15 +52,6 @@ def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple
         return near if near >= input_size else int(np.ceil(scale * side / PATCH)) * PATCH
 
     return fitted(height), fitted(width)
-
-
-LEAST_DEPTH = 1e-3
-"""Depth below which a network's answer is not believed."""
-
-
-def trained_depth(output: Array) -> Array:
-    """Planar depth [H, W] > 0 from the output of a network trained here, which is depth itself, as SiLog asks."""
-    return np.maximum(output, LEAST_DEPTH).astype(np.float32)
 
 
 def planar_depth(output: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +10,18 @@ import torch
 
 from materialist.errors import WeightsError
 from materialist.predict.device import on_gpu
-from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth, trained_depth
+from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth
 from materialist.predict.matnet.network import SIZES, MatNet
 from materialist.predict.models import hub_model, is_hub_id, require, weights_file
-from materialist.predict.weights import INSTEAD, load_weights, metadata, read_content, state_of, verify_file
-from materialist.types import Materials, Photo, Prediction
+from materialist.predict.protocol import Part, Predictor
+from materialist.predict.weights import INSTEAD, load_weights, metadata, read_state, verify_file
+from materialist.types import Array, Photo
 
 FORMAT = "materialist-matnet-1"
 """What a file of `train export` calls itself in its metadata: its depth output is depth."""
 
 
-class MatNetPredictor:
+class MatNetPredictor(Predictor):
     """MatNet with weights from a file, a folder, or a model that was downloaded from a hub.
 
     Args:
@@ -34,9 +36,8 @@ class MatNetPredictor:
     def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
         path = _locate(str(where))
         digest = verify_file(path)
-        content = read_content(path)
-        state = state_of(content, path)
-        self.trained_here = _trained_here(content, path)
+        state = read_state(path)
+        self.trained_here = metadata(path).get("format") == FORMAT
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
@@ -52,44 +53,34 @@ class MatNetPredictor:
         """What the report calls it: size, file and the start of its checksum."""
         return self.source
 
-    def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
-        """The network's maps at the photo's size; `seed` changes nothing.
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+        """The wanted of the network's maps at the photo's size; `seed` changes nothing.
 
         The network sees linear values, as in training (InteriorVerse). Its albedo is linear, its normals are in our
         camera frame already (the published renderer puts its camera at the origin, looking down -Z, and uses them as
-        they are), roughness is perceptual. Materials are clipped to [0, 1]; for depth see `planar_depth`, and
-        `trained_depth` for weights of `train matnet --config paper`.
+        they are), roughness is perceptual. Materials are clipped to [0, 1]; for depth see `planar_depth`. Weights of
+        `train matnet --config paper` answer with depth itself, as their loss asks.
         """
         maps = infer(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):
             raise WeightsError(f"MatNet gave values that are not finite; check the weights ({self.source}).")
         length = np.linalg.norm(maps["normal"], axis=-1, keepdims=True)
-        normal = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), np.array([0, 0, 1], np.float32))
-        clipped = {k: np.clip(maps[k], 0, 1) for k in ("albedo", "roughness", "metallic")}
-        depth = (trained_depth if self.trained_here else planar_depth)(maps["depth"])
-        return Prediction(Materials(**clipped), normal.astype(np.float32), depth, predictor=self.name)
-
-
-def _trained_here(content: object, path: Path) -> bool:
-    """Whether the weights are a checkpoint of `train matnet --config paper`, or what `train export` wrote of one."""
-    task = content.get("task") if isinstance(content, dict) else None
-    if isinstance(task, dict):
-        return task.get("name") == "paper"
-    return path.suffix == ".safetensors" and metadata(path).get("format") == FORMAT
+        found = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
+        found["normal"] = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0).astype(np.float32)
+        found["depth"] = np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
+        return Part({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
 
 
 def _locate(where: str) -> Path:
     """The file of weights that `where` means. Raises WeightsError."""
-    if not where:
-        return weights_file(require(hub_model("matnet")), hub_model("matnet").main_file)
     path = Path(where).expanduser()
-    if path.is_dir():
-        return weights_file(path)
-    if path.is_file():
+    if where and path.is_file():
         return path
-    if is_hub_id(where):
-        return weights_file(require(hub_model(where)))
-    raise WeightsError(
-        f"There is no file {where}; --predictor matnet:FILE needs MatNet's weights (a .safetensors or .pth file), "
-        f"--predictor matnet alone the published ones (materialist models download matnet); or {INSTEAD}."
-    )
+    if where and path.is_dir():
+        return weights_file(path)
+    if where and not is_hub_id(where):
+        raise WeightsError(
+            f"There is no file {where}; --predictor matnet:FILE needs MatNet's weights (a .safetensors or .pth file), "
+            f"--predictor matnet alone the published ones (materialist models download matnet); or {INSTEAD}."
+        )
+    return weights_file(require(hub_model(where or "matnet")))
