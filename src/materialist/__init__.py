@@ -38,25 +38,11 @@ _HOME = {
     "settle": "edits.drop.drop_rest",
     "composite": "edits.composite.composite",
     "batch": "batches.run",
-    **dict.fromkeys(("Drop", "Glass", "Insertion", "InvertOptions", "MaterialEdit", "Relight", "Removal"), "options"),
+    **dict.fromkeys(["Drop", "Glass", "Insertion", "InvertOptions", "MaterialEdit", "Relight", "Removal"], "options"),
+    **dict.fromkeys(["Body", "Camera", "FitReport", "Geometry", "Lamp", "Materials", "Mesh", "Photo"], "types"),
+    **dict.fromkeys(["Prediction", "Scene", "Surface"], "types"),
     **dict.fromkeys(
-        (
-            "Body",
-            "Camera",
-            "FitReport",
-            "Geometry",
-            "Lamp",
-            "Materials",
-            "Mesh",
-            "Photo",
-            "Prediction",
-            "Scene",
-            "Surface",
-        ),
-        "types",
-    ),
-    **dict.fromkeys(
-        ("InputError", "MaterialistError", "OutputError", "SceneError", "SetupError", "WeightsError"), "errors"
+        ["InputError", "MaterialistError", "OutputError", "SceneError", "SetupError", "WeightsError"], "errors"
     ),
 }
 """Public name -> module that defines it."""

@@ -200,22 +200,11 @@ def _whole(declared: Option, called: str, value: Any) -> int:
 
 def _shift(declared: Option, called: str, value: Any) -> float | str:
     """A number in the range, or a text with a sign that shifts by as much as the range is wide."""
-    if not (isinstance(value, str) and value.strip()[:1] in ("+", "-")):
-        try:
-            return _number(declared, called, value)
-        except InputError as error:
-            if isinstance(value, str) and "must be a number" in str(error):
-                raise InputError(
-                    f"The {called} must be a number in [0, 1], or a shift such as +0.5, not {value!r}."
-                ) from error
-            raise
-    width = declared.high - declared.low
-    _number(replace(declared, low=-width, high=width), f"{called} shift", value)
-    return value.strip()
-
-
-def _colour(declared: Option, called: str, value: Any) -> Colour:
-    return parse_colour(value, called)
+    if isinstance(value, str) and value.strip()[:1] in ("+", "-"):
+        width = declared.high - declared.low
+        _number(replace(declared, low=-width, high=width), f"{called} shift", value)
+        return value.strip()
+    return _number(replace(declared, choices=("a shift such as +0.5",)), called, value)
 
 
 def _paint(declared: Option, called: str, value: Any) -> str:
@@ -261,23 +250,19 @@ def _lamp(declared: Option, called: str, value: Any) -> Any:
     return numbers(value, 5, called) if isinstance(value, str | list | tuple) else value
 
 
-def _anything(declared: Option, called: str, value: Any) -> Any:
-    return value
-
-
 _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
     "number": _number,
     "whole": _whole,
     "shift": _shift,
     "numbers": lambda declared, called, value: numbers(value, declared.count, called),
-    "colour": _colour,
+    "colour": lambda declared, called, value: parse_colour(value, called),
     "paint": _paint,
     "switch": _switch,
     "word": _word,
     "size": _size,
     "lamp": _lamp,
-    "file": _anything,
-    "any": _anything,
+    "file": lambda declared, called, value: value,
+    "any": lambda declared, called, value: value,
     "name": lambda declared, called, value: value if callable(value) else str(value),
 }
 """Kind of an option -> (option, its name in messages, value) -> checked value."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -26,62 +26,51 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
     """
     hints = get_type_hints(function, include_extras=True)
     named = inspect.signature(function).parameters
-    flags: list[inspect.Parameter] = []
-    groups: list[_Group] = []
-    for parameter in named.values():
-        kind: Any = hints[parameter.name]
-        if is_dataclass(kind):
-            group = _Group(parameter.name, kind, _flags(kind, parameter.default, set(named)))
-            groups.append(group)
-            flags += group.flags
-        else:
-            flags.append(parameter.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY))
+    flags = {key: _flags(hints[key], parameter, set(named)) for key, parameter in named.items()}
 
     @wraps(function)
     def command(**values: Any) -> Any:
-        made = {group.name: group.build(values) for group in groups}
-        return function(**{key: value for key, value in values.items() if key in named} | made)
+        return function(**{key: _value(hints[key], own, values) for key, own in flags.items()})
 
-    command.__signature__ = inspect.Signature(flags)  # type: ignore[attr-defined]
-    command.__annotations__ = {flag.name: flag.annotation for flag in flags}
+    every = [flag for own in flags.values() for flag in own]
+    command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+    command.__annotations__ = {flag.name: flag.annotation for flag in every}
     app.command(name or function.__name__, **settings)(command)
 
 
-@dataclass(frozen=True)
-class _Group:
-    """A dataclass parameter and the flags that stand for it."""
+def _flags(kind: Any, parameter: inspect.Parameter, taken: set[str]) -> list[inspect.Parameter]:
+    """The flags of a parameter; the default of a dataclass is an instance with other defaults of its fields.
 
-    name: str
-    kind: Any
-    flags: list[inspect.Parameter]
-
-    def build(self, values: dict[str, Any]) -> Any:
-        own = {flag.name: values[flag.name] for flag in self.flags}
-        if not issubclass(self.kind, OperationOptions):
-            return self.kind(**own)
-        known = declarations(self.kind)
-        absent = lambda value: value is None or value is False or value == []  # noqa: E731
-        given = {key: value for key, value in own.items() if key in known and not absent(value)}
-        for key in own.keys() - known.keys():  # the flag of a word that a switch also takes
-            if own[key]:
-                field, _, word = key.partition("__")
-                given[field] = word
-        shared = {key: values[key] for key, (told, _) in known.items() if told.flag is None and key in values}
-        return self.kind.read(given, flags=True, **shared)
-
-
-def _flags(kind: Any, given: Any, taken: set[str]) -> list[inspect.Parameter]:
-    """The flags of a dataclass; `given` is an instance with other defaults, `taken` holds names of other parameters."""
+    An option whose name is `taken` by another parameter gets its value from the function.
+    """
+    if not hasattr(kind, "__dataclass_fields__"):
+        return [_parameter(parameter.name, kind, parameter.default)]
     if issubclass(kind, OperationOptions):
         declared = {name: told for name, told in declarations(kind).items() if name not in taken}
         return [flag for name, (told, default) in declared.items() for flag in _option_flags(name, told, default)]
-    hints = get_type_hints(kind, include_extras=True)
-    found = []
-    for field in fields(kind):
-        default = getattr(given, field.name) if is_dataclass(given) else field.default
-        empty = inspect.Parameter.empty if default is MISSING else default
-        found.append(_parameter(field.name, hints[field.name], empty))
-    return found
+    hints, given = get_type_hints(kind, include_extras=True), parameter.default
+    defaults = {one.name: getattr(given, one.name) if is_dataclass(given) else one.default for one in fields(kind)}
+    return [
+        _parameter(name, hints[name], inspect.Parameter.empty if default is MISSING else default)
+        for name, default in defaults.items()
+    ]
+
+
+def _value(kind: Any, flags: list[inspect.Parameter], values: dict[str, Any]) -> Any:
+    """The argument that the flags of a parameter spell."""
+    own = {flag.name: values[flag.name] for flag in flags}
+    if not hasattr(kind, "__dataclass_fields__"):
+        return own[flags[0].name]
+    if not issubclass(kind, OperationOptions):
+        return kind(**own)
+    known: dict[str, tuple[Option, Any]] = declarations(kind)
+    given = {}
+    for key, value in own.items():
+        if value is not None and value is not False and value != []:
+            field, _, word = key.partition("__")  # the flag of a word that a switch also takes
+            given[field] = word or value
+    shared = {key: values[key] for key, (told, _) in known.items() if told.flag is None and key in values}
+    return kind.read(given, flags=True, **shared)
 
 
 def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Parameter]:
