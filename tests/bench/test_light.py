@@ -51,7 +51,7 @@ def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
     )
     rows = json.loads((out / "report.json").read_text())["rows"]
     assert [r["method"] for r in rows] == ["default"]
-    assert {c.key for c in light.COLUMNS} - set(rows[0]) == {"relit_psnr", "albedo_l1"}
+    assert {c.key for c in light.LightBench.columns} - set(rows[0]) == {"relit_psnr", "albedo_l1"}
     assert rows[0]["mesh_psnr"] > 10 and rows[0]["cpu_seconds"] > 0
     assert "| default | 1 |" in (out / "report.md").read_text()
 
@@ -62,7 +62,7 @@ def test_relit_inversions_and_the_paper_s_engine(mitsuba, tmp_path):
         "light", output=tmp_path / "out", scenes=1, lights=1, size=48, spp=64, methods="paper path 128x64", device="cpu"
     )
     rows = {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
-    each = [name + end for end in light.ADDED.values() for name in ("ceiling", "inversion")]
+    each = [name + end for end in light.COMPLETIONS.values() for name in ("ceiling", "inversion")]
     assert list(rows) == [*each, "paper path 128x64"]
     assert min(row["mesh_psnr"] for row in rows.values()) > 15
     assert rows["inversion"]["relit_psnr"] < rows["ceiling"]["relit_psnr"] + 1

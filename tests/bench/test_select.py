@@ -3,11 +3,9 @@
 import json
 
 import numpy as np
-import pytest
 
 from materialist import bench
 from materialist.bench.select import boxes, clicks
-from materialist.errors import InputError
 
 
 def test_clicks_are_in_the_middle_and_inside():
@@ -40,8 +38,3 @@ def test_boxes_are_exact_and_loose():
     mask = np.zeros((40, 50), bool)
     mask[10:30, 10:40] = True
     assert boxes(mask, 0.1) == {"exact box": (10, 10, 40, 30), "loose box": (8, 8, 42, 32)}
-
-
-def test_bad_input(tmp_path):
-    with pytest.raises(InputError, match="scenes is 0"):
-        bench.run("select", output=tmp_path / "report", scenes=0)

@@ -2,18 +2,8 @@
 
 import pytest
 
-from materialist import bench
 from materialist.bench import studio
-from materialist.errors import InputError, SetupError
-
-
-def test_options(tmp_path):
-    with pytest.raises(InputError, match="moves is 1"):
-        bench.run("studio", output=tmp_path / "x", moves=1)
-    with pytest.raises(InputError, match="two shares"):
-        studio._share("middle")
-    assert studio._share("0.25,0.5") == (0.25, 0.5)
-    assert studio._photo("example:coffee").name == "coffee.png"
+from materialist.errors import SetupError
 
 
 def test_without_a_browser(monkeypatch):
@@ -25,7 +15,7 @@ def test_without_a_browser(monkeypatch):
 
 def test_every_move_changes_the_picture():
     last = {"hue": 40.0, "saturation": 0.0, "value": 0.0, "roughness": 0.5, "metallic": 0.0}
-    for name, value in studio.values(600, 4, last.copy()):
+    for name, value in studio.slider_moves(600, 4, last.copy()):
         low, high = studio._RANGES[name]
         assert low <= value <= high
         assert abs(value - last[name]) >= 0.05 * (high - low)

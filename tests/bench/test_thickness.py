@@ -7,7 +7,6 @@ import torch
 import trimesh
 
 from materialist import bench
-from materialist.errors import InputError
 from materialist.predict.refraction.network import RefractionNet
 from materialist.predict.unet import UNetArchitecture
 
@@ -35,8 +34,3 @@ def test_shapes_and_meshes_have_rows(tmp_path, plain, mitsuba):
     assert network["back"] == pytest.approx(prior["back"], abs=0.01) and prior["back"] < 35
     assert prior["solid"] < network["solid"] < prior["solid"] + 0.2  # LEAST is added to it
     assert (tmp_path / "report" / "plot.png").is_file()
-
-
-def test_bad_input(tmp_path, plain):
-    with pytest.raises(InputError, match="shapes is 0"):
-        bench.run("thickness", output=tmp_path / "report", shapes=0, weights=plain)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from materialist import bench
-from materialist.bench.whdr import find, whdr
+from materialist.bench.whdr import whdr
 from materialist.errors import InputError
 
 
@@ -81,33 +81,14 @@ def test_the_benchmark_from_a_folder(tmp_path):
     assert means["photo"]["whdr"] == 0 and means["constant"]["whdr"] == 0.5
 
 
-def test_what_is_no_data_set(tmp_path):
-    with pytest.raises(InputError, match="no picture with judgements"):
-        find(tmp_path)
-    with pytest.raises(InputError, match="needs the IIW data set"):
-        bench.run("whdr", output=tmp_path / "report")
+@pytest.mark.parametrize(
+    "text",
+    ["[]", "no JSON", '{"intrinsic_points": [], "intrinsic_comparisons": [{"point1": 1}]}',
+     '{"intrinsic_points": [{"id": 1}], "intrinsic_comparisons": '
+     '[{"point1": 1, "point2": 7, "darker": "1", "darker_score": 1}]}'],
+)  # fmt: skip
+def test_what_is_no_judgement_is_told(tmp_path, text):
     cv2.imwrite(str(tmp_path / "1.png"), np.arange(4800).reshape(40, 40, 3).astype(np.uint8))
-    (tmp_path / "1.json").write_text(
-        '{"intrinsic_points": [{"id": 1}], "intrinsic_comparisons": [{"point1": 1, "point2": 7}]}'
-    )
-    with pytest.raises(InputError, match="point 7, which is not in the file"):
-        bench.run("whdr", data=tmp_path, output=tmp_path / "report1", predictor="constant")
-    (tmp_path / "1.json").write_text("[]")
-    with pytest.raises(InputError, match="IIW's layout"):
-        bench.run("whdr", data=tmp_path, output=tmp_path / "report2", predictor="constant")
-
-
-def test_a_picture_that_cannot_be_judged_costs_only_itself(tmp_path):
-    data = tmp_path / "iiw"
-    data.mkdir()
-    judged = {"intrinsic_points": _points((0.25, 0.5), (0.75, 0.5)), "intrinsic_comparisons": [_says(0, 1, "1")]}
-    lame = {**judged, "intrinsic_points": [{"id": k, "x": 0.1, "y": 0.1} for k in range(2)]}
-    picture = np.tile(np.linspace(60, 200, 60).astype(np.uint8)[None, :, None], (40, 1, 3))
-    for name, content in (("1", judged), ("2", lame), ("3", judged)):
-        cv2.imwrite(str(data / f"{name}.png"), picture)
-        (data / f"{name}.json").write_text(json.dumps(content))
-    (data / "3.png").write_bytes(b"no picture")
-    bench.run("whdr", data=data, output=tmp_path / "report", predictor="constant", size=60)
-    report = json.loads((tmp_path / "report" / "report.json").read_text())
-    assert {row["sample"] for row in report["rows"]} == {"1"} and report["settings"]["pictures"] == 1
-    assert "2.json" in report["settings"]["unreadable"] and "3.png" in report["settings"]["unreadable"]
+    (tmp_path / "1.json").write_text(text)
+    with pytest.raises(InputError, match=r"1.json.*IIW's layout"):
+        bench.run("whdr", data=tmp_path, output=tmp_path / "report", predictor="constant")

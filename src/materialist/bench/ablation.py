@@ -1,4 +1,14 @@
-"""`bench ablation`: the paper's tables about its own settings, on synthetic photos, with cached transport."""
+"""`bench ablation`: the paper's tables about its own settings, on synthetic photos, with cached transport.
+
+The paper's ablations, its protocol on our synthetic photos: `--preset paper` with cached transport in place of PRB,
+materials from the predictor under the light that the paper's fit finds for them. PSNR, SSIM and MSE compare the
+path-traced re-rendering with the photo, sRGB-encoded; L_re is the loss that is minimised, of the cached rendering
+(linear), at the end. `delta`: 200 steps, stopped early as in the paper (5 % in 20 steps); ARM moves all materials at
+once, RM&A roughness and metallic first, then albedo. `steps`: half of them on roughness and metallic, half on all.
+`init`: the material network's first weights. `field`: what the materials are written as, 200 steps; `w/o R, M`:
+roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov`: true maps and light on the mesh of
+the true depth at a wrong field of view, and the same under another light (relit).
+"""
 
 from __future__ import annotations
 
@@ -11,56 +21,39 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from materialist import metrics
-from materialist.bench.benchmark import Benchmark
-from materialist.bench.report import Column, Report, write
-from materialist.errors import InputError
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
+from materialist.bench.report import Column, Report
 from materialist.fit.engine import prepared_envmap
 from materialist.fit.invert import FULL, FitSetup, Inversion
 from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.losses import l1_l2, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
+from materialist.option_kinds import option
+from materialist.predict import get_predictor
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials, Prediction
 
 if TYPE_CHECKING:
     import torch
 
-NOTE = """The paper's ablations, its protocol on our synthetic photos: `--preset paper` with cached transport in place
-of PRB, materials from the predictor under the light that the paper's fit finds for them. PSNR, SSIM and MSE compare the
-path-traced re-rendering with the photo, sRGB-encoded; L_re is the loss that is minimised, of the cached rendering
-(linear), at the end. `delta`: 200 steps, stopped early as in the paper (5 % in 20 steps); ARM moves all materials at
-once, RM&A roughness and metallic first, then albedo. `steps`: half of them on roughness and metallic, half on all.
-`init`: the material network's first weights. `field`: what the materials are written as, 200 steps; `w/o R, M`:
-roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov`: true maps and light on the mesh of
-the true depth at a wrong field of view, and the same under another light (relit). `light`: true materials, seconds
-until L_re falls to the goal; a dash where it never did."""
-
-COLUMNS = (
-    Column("psnr", "PSNR", "higher", 2),
-    Column("ssim", "SSIM", "higher"),
-    Column("mse", "MSE", "lower", 4),
-    Column("loss", "L_re", "lower", 4),
-    Column("relit_psnr", "relit PSNR", "higher", 2),
-    Column("reached", "s to the goal", "lower", 1),
-    Column("steps", "steps", "", 0),
-)
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
-LIGHTS = {"mlp": "envmap, MLP", "texels": "envmap, texels", "sh": "SH coefficients"}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
-EARLY = {"patience": 20, "min_improvement": 0.05}
 
 
 @dataclass(frozen=True, kw_only=True)
 class AblationBench(Benchmark):
-    """The `tables` (names separated by commas) on `scenes` photos of `size` pixels.
+    """The paper's tables; with `data`, objects come from DATA/meshes and light from DATA/envmaps."""
 
-    `predictor` makes the first materials and the depth; `truth` takes the true ones. `longest` is how many steps the
-    smallest L_re is looked for (the paper: 3000), `goal` the L_re of the `light` table. With `data`, objects come from
-    DATA/meshes and light from DATA/envmaps. Raises InputError for a table that is not there.
-    """
-
-    least: ClassVar = {"scenes": 1, "size": 16, "spp": 1, "longest": 1}
+    columns = (
+        Column("psnr", "PSNR", "higher", 2),
+        Column("ssim", "SSIM", "higher"),
+        Column("mse", "MSE", "lower", 4),
+        Column("loss", "L_re", "lower", 4),
+        Column("relit_psnr", "relit PSNR", "higher", 2),
+        Column("steps", "steps", "", 0),
+    )
+    plotted = ("psnr", "loss")
 
     deltas: ClassVar = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)  # paper, table delta_ab
     steps: ClassVar = (50, 200, 1000, 2000)  # paper, table steps_ab
@@ -68,85 +61,67 @@ class AblationBench(Benchmark):
     fovs: ClassVar = (0.8, 1.0, 1.2)  # factors on the true field of view
     short: ClassVar = 200  # steps of every other table, paper
 
-    tables: str = "delta,steps,init,field,fov,light"
-    scenes: int = 3
-    size: int = 64
-    predictor: str = "bundled"
-    longest: int = 1000
-    goal: float = 0.03
-    spp: int = 128
+    tables: str = option("delta,steps,init,field,fov", "With commas.", kind="name")
+    scenes: int = option(3, "Photos.", **COUNT)
+    size: int = option(64, "Their width and height.", **SIZE)
+    predictor: str = option("bundled", "Of first materials and depth; `truth` takes the true ones.", kind="name")
+    longest: int = option(1000, "Steps in which the smallest L_re is looked for; the paper has 3000.", **COUNT)
+    spp: int = option(128, "Paths a pixel of pictures that are compared.", **COUNT)
 
-    def run(self, data: Path | None, output: Path) -> None:
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist.render.variant import setup
 
-        wanted = [name.strip() for name in self.tables.split(",") if name.strip()]
-        for name in wanted:
-            if name not in TABLES:
-                raise InputError(f"There is no table '{name}'; choose from {', '.join(TABLES)}.")
-        if not wanted:
-            raise InputError(f"--tables is empty; choose from {', '.join(TABLES)}.")
+        wanted = names("tables", self.tables, TABLES)
         setup(self.device)
-        rows: list[dict[str, Any]] = []
-        report = Report("Ablations", NOTE, self.settings(data), COLUMNS, rows, ("psnr", "loss"))
         for k in range(self.scenes):
             sample = make_sample(k, 0, k, size=self.size, data=data, seed=self.seed)
-            bench = _Photo(self, sample, k, data)
+            other = make_sample(k, 0, k + 1, size=self.size, data=data, seed=self.seed).envmap
+            photo = _Photo(self, sample, other)
             for name in wanted:
-                for row in TABLES[name](bench):
-                    rows.append({**row, "sample": sample.name})
-                    write(report, output)
+                for row in TABLES[name](photo):
+                    yield {**row, "sample": sample.name}
 
 
 class _Photo:
     """One photo: its prior, and the paper's light for it."""
 
-    def __init__(self, bench: AblationBench, sample: SyntheticSample, number: int, data: Path | None):
+    def __init__(self, bench: AblationBench, sample: SyntheticSample, other: Array):
+        """`other` [h, 2h, 3] is the light of the relit pictures."""
         import torch
 
-        self.sample, self.number, self.data = sample, number, data
-        self.bench, self.predictor, self.longest, self.goal = bench, bench.predictor, bench.longest, bench.goal
-        self.spp, self.seed, self.device = bench.spp, bench.seed, bench.device
+        self.bench, self.sample, self.other = bench, sample, other
         self.camera = sample.photo.camera
         self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
 
     @cached_property
     def prior(self) -> Prediction:
         """What the predictor says of the photo."""
-        if self.predictor == "truth":
+        if self.bench.predictor == "truth":
             return self.sample.truth
-        from materialist.bench.predictors import opened
-
-        return opened(self.predictor, self.device).predict(self.sample.photo, seed=self.seed)
-
-    def prepared(self, prior: Prediction) -> Any:
-        """Mesh, path tracer and traced transport of a prior."""
-        height = self.sample.envmap.shape[0]
-        setup = FitSetup(
-            self.sample.photo, prior, PAPER, FULL, envmap_height=height, seed=self.seed, device=self.device
-        )  # fmt: skip
-        prepared: Any = Inversion(setup).prepare()
-        prepared.fit.engine.cache.trace()
-        return prepared
+        predictor: Any = get_predictor(self.bench.predictor, device=self.bench.device)
+        return predictor.predict(self.sample.photo, seed=self.bench.seed)
 
     @cached_property
     def fitted(self) -> tuple[Any, Array]:
-        """The engine of the prior, and the light that the paper's fit finds for it."""
-        prepared = self.prepared(self.prior)
-        engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=self.seed)
-        fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=self.seed)
-        return prepared, prepared_envmap(light(PAPER.light.height), self.sample.envmap.shape[0])
+        """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
+        height, seed = self.sample.envmap.shape[0], self.bench.seed
+        shared: dict[str, Any] = {"envmap_height": height, "seed": seed, "device": self.bench.device}
+        prepared: Any = Inversion(FitSetup(self.sample.photo, self.prior, PAPER, FULL, **shared)).prepare()
+        engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=seed)
+        engine.cache.trace()
+        fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=seed)
+        return prepared, prepared_envmap(light(PAPER.light.height), height)
 
-    def materials(
-        self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False
-    ) -> dict[str, Any]:
+    def materials(self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
         import torch
 
         prepared, envmap = self.fitted
         engine: Any = prepared.fit.engine
-        prior = _maps(self.prior.materials, engine.pixels)
+        prior = _maps(self.prior.materials)
         if blind:
             prior[:, 3:] = 0.5
+        prior = prior[engine.pixels]
         held = prior if blind else remapped(prior)
         problem, photo = engine.material_problem(envmap), self.photo[engine.pixels]
         seen: list[float] = []
@@ -163,110 +138,84 @@ class _Photo:
         with torch.no_grad():
             maps = model()
             render(maps)
-        picture = prepared.fit.reference(_materials(maps, engine.pixels, self.prior), envmap, self.spp, self.seed + 1)
+        image = _maps(self.prior.materials).index_copy(0, engine.pixels, maps).numpy()
+        image = image.reshape(self.camera.height, self.camera.width, 5)
+        found = Materials(np.ascontiguousarray(image[..., :3]), image[..., 3].copy(), image[..., 4].copy())
+        picture = prepared.fit.reference(found, envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
 
-    def against_photo(self, method: str, picture: Array) -> dict[str, Any]:
+    def against_photo(self, method: str, picture: Array) -> Row:
         """A row of a picture [H, W, 3] against the photo, clipped as that is."""
         photo = self.sample.photo.linear
-        return {
-            "method": method, "psnr": metrics.psnr(picture, photo), "ssim": metrics.ssim(picture, photo),
-            "mse": metrics.mse(picture, photo),
-        }  # fmt: skip
+        compared = {name: getattr(metrics, name)(picture, photo) for name in ("psnr", "ssim", "mse")}
+        return {"method": method, **compared}
 
 
-def _stages(names: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tuple[MaterialStage, ...]:
+def _maps(materials: Materials) -> torch.Tensor:
+    """[H W, 5] albedo, roughness, metallic."""
+    import torch
+
+    maps = np.dstack((materials.albedo, materials.roughness, materials.metallic))
+    return torch.from_numpy(maps.reshape(-1, 5).astype(np.float32))
+
+
+def _stages(targets: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tuple[MaterialStage, ...]:
     """Stages that share the steps evenly; without `early` they run to the end."""
-    schedule = Schedule(learning_rate=3e-4, max_steps=max(1, steps // len(names)), **(early or {"patience": 0}))
-    return tuple(MaterialStage(targets, schedule) for targets in names)
+    schedule = Schedule(learning_rate=3e-4, max_steps=max(1, steps // len(targets)), **(early or {"patience": 0}))
+    return tuple(MaterialStage(target, schedule) for target in targets)
 
 
-def _delta(photo: _Photo) -> Iterator[dict[str, Any]]:
+def _delta(photo: _Photo) -> Iterator[Row]:
     """Table delta_ab."""
     for name, targets in (("ARM", EACH[1:]), ("RM&A", (EACH[0], ("albedo",)))):
         for delta in photo.bench.deltas:
-            settings = replace(PAPER.materials, delta=delta, stages=_stages(targets, photo.bench.short, **EARLY))
-            yield photo.materials(f"delta {delta:g}, {name}", settings)
+            stages = _stages(targets, photo.bench.short, patience=20, min_improvement=0.05)
+            yield photo.materials(f"delta {delta:g}, {name}", replace(PAPER.materials, delta=delta, stages=stages))
 
 
-def _steps(photo: _Photo) -> Iterator[dict[str, Any]]:
+def _steps(photo: _Photo) -> Iterator[Row]:
     """Table steps_ab."""
     for steps in photo.bench.steps:
         yield photo.materials(f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps)))
 
 
-def _init(photo: _Photo) -> Iterator[dict[str, Any]]:
+def _init(photo: _Photo) -> Iterator[Row]:
     """Figure ab_init: first weights of the material network."""
+    settings = replace(PAPER.materials, stages=_stages(EACH, photo.bench.short))
     for seed in range(photo.bench.inits):
-        yield photo.materials(
-            f"init {seed}", replace(PAPER.materials, stages=_stages(EACH, photo.bench.short)), seed=seed
-        )
+        yield photo.materials(f"init {seed}", settings, seed=seed)
 
 
-def _field(photo: _Photo) -> Iterator[dict[str, Any]]:
+def _field(photo: _Photo) -> Iterator[Row]:
     """Figure net_ab and table min_L_re."""
     for field, name in FIELDS.items():
         settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.short))
         yield photo.materials(f"{name}, {photo.bench.short} steps", settings)
     for field in ("maps", "mlp"):
-        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.longest))
+        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.longest))
         yield photo.materials(f"{FIELDS[field]} w/o R, M", settings, blind=True)
 
 
-def _fov(photo: _Photo) -> Iterator[dict[str, Any]]:
+def _fov(photo: _Photo) -> Iterator[Row]:
     """Table fov_syn_ab."""
     from materialist.geometry.build import build_geometry
     from materialist.render.scene import RenderScene
 
-    sample, truth = photo.sample, photo.sample.truth
-    size = truth.depth.shape
-    other = make_sample(photo.number, 0, photo.number + 1, size=size, data=photo.data, seed=photo.seed).envmap
-    relit = sample.render(other, spp=photo.spp, seed=photo.seed + 3)
-    for factor in photo.bench.fovs:
+    bench, sample, truth = photo.bench, photo.sample, photo.sample.truth
+    relit = sample.render(photo.other, spp=bench.spp, seed=bench.seed + 3)
+    for factor in bench.fovs:
         camera = replace(photo.camera, fov=factor * photo.camera.fov)
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=photo.seed)
-        mesh = RenderScene(geometry, camera, device=photo.device)
+        geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=bench.seed)
+        mesh = RenderScene(geometry, camera, device=bench.device)
         mesh.set_materials(truth.materials)
         mesh.set_envmap(sample.envmap)
-        row = photo.against_photo(f"fov x {factor:g}", mesh.render(spp=photo.spp, seed=photo.seed + 1))
-        mesh.set_envmap(other)
-        picture = mesh.render(spp=photo.spp, seed=photo.seed + 1)
+        row = photo.against_photo(f"fov x {factor:g}", mesh.render(spp=bench.spp, seed=bench.seed + 1))
+        mesh.set_envmap(photo.other)
+        picture = mesh.render(spp=bench.spp, seed=bench.seed + 1)
         yield {**row, "relit_psnr": metrics.psnr(picture, relit)}
 
 
-def _light(photo: _Photo) -> Iterator[dict[str, Any]]:
-    """Table sh: how fast the light explains the photo, true materials given."""
-    engine = photo.prepared(photo.sample.truth).fit.engine
-    problem = engine.light_problem(photo.sample.truth.materials)
-    schedule = Schedule(max_steps=max(photo.bench.short, photo.longest), patience=0)
-    for field, name in LIGHTS.items():
-        settings = replace(PAPER.light, field=field, height=256 if field == "mlp" else 32, schedule=schedule)
-        light = envmap_field(settings, seed=photo.seed)
-        result = fit_light(problem, photo.photo, light, settings, seed=photo.seed)
-        under = next((k for k, loss in enumerate(result.losses, 1) if loss <= photo.goal), None)
-        row = {"method": f"light: {name}", "loss": min(result.losses), "steps": under or result.steps}
-        yield row if under is None else {**row, "reached": result.seconds * under / result.steps}
-
-
-TABLES: dict[str, Callable[[_Photo], Iterator[dict[str, Any]]]] = {
-    "delta": _delta, "steps": _steps, "init": _init, "field": _field, "fov": _fov, "light": _light
+TABLES: dict[str, Callable[[_Photo], Iterator[Row]]] = {
+    "delta": _delta, "steps": _steps, "init": _init, "field": _field, "fov": _fov
 }  # fmt: skip
-
-
-def _maps(materials: Materials, pixels: torch.Tensor) -> torch.Tensor:
-    """[P, 5] of the pixels."""
-    import torch
-
-    parts = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
-    return torch.from_numpy(np.concatenate(parts, -1).reshape(-1, 5).astype(np.float32))[pixels]
-
-
-def _materials(maps: torch.Tensor, pixels: torch.Tensor, prior: Prediction) -> Materials:
-    """Maps [P, 5] in their pixels; elsewhere the prior's."""
-    import torch
-
-    shape = prior.depth.shape
-    every = _maps(prior.materials, torch.arange(shape[0] * shape[1]))
-    image = every.index_copy(0, pixels, maps).numpy().reshape(*shape, 5)
-    return Materials(np.ascontiguousarray(image[..., :3]), image[..., 3].copy(), image[..., 4].copy())

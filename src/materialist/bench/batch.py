@@ -1,114 +1,87 @@
-"""`bench batch`: what many photos cost together, beside one after the other, by number of workers."""
+"""`bench batch`: what many photos cost together, beside one after the other, by number of workers.
+
+The same photos, run as a user runs them: first `materialist invert` on each, in a process of its own with one thread;
+then `materialist batch` on all of them, with each number of workers (a thread each). Seconds are wall clock from start
+to end, processor seconds those of all processes together, which other work on the machine hardly changes. The overhead
+compares with the single inversions: negative where starting Python and compiling kernels once pays. The results must be
+the same by hash, or the benchmark fails.
+"""
 
 from __future__ import annotations
 
 import json
-import os
 import resource
-import subprocess
-import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
 
 from materialist.batches.photos import list_photos
-from materialist.batches.results import package_hash, together
+from materialist.batches.results import package_hash
 from materialist.batches.task import SINGLE_THREAD
-from materialist.bench.benchmark import Benchmark
-from materialist.bench.report import Column, Report, write
-from materialist.errors import InputError, MaterialistError
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, numbers
+from materialist.bench.process import materialist
+from materialist.bench.report import Column, Report
+from materialist.errors import MaterialistError
+from materialist.option_kinds import option
 
-SINGLE = "single inversions, one after the other"
 EXAMPLES = ("example:cat", "example:coffee", "example:rocket", "example:astronaut")
 """The photos without `data`."""
-
-NOTE = """The same photos, run as a user runs them: first `materialist invert` on each, in a process of its own with one
-thread; then `materialist batch` on all of them, with each number of workers (a thread each). Seconds are wall clock
-from start to end, processor seconds those of all processes together, which other work on the machine hardly changes.
-The overhead compares with the single inversions: negative where starting Python and compiling kernels once pays. The
-results must be the same by hash, or the benchmark fails."""
-
-COLUMNS = (
-    Column("seconds", "s", "lower", 1),
-    Column("cpu_seconds", "processor s", "lower", 1),
-    Column("seconds_per_photo", "s a photo", "lower", 2),
-    Column("overhead_percent", "overhead, % of s", "lower", 1),
-    Column("cpu_overhead_percent", "overhead, % of processor s", "lower", 1),
-    Column("peak_mb", "peak MB of a process", "lower", 0),
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatchBench(Benchmark):
-    """Invert `photos` photos at `size` pixels each way; write the report into `output`.
+    """Invert the photos of `data` (those of data/photos where there is one), else the built-in examples.
 
-    `data` is a folder of photos (those of data/photos where there is one), else the built-in examples are used.
-    Raises InputError for bad options, MaterialistError where the ways give different results.
+    Raises MaterialistError where the ways give different results.
     """
 
-    least: ClassVar = {"photos": 1, "size": 16}
+    columns = (
+        Column("seconds", "s", "lower", 1),
+        Column("cpu_seconds", "processor s", "lower", 1),
+        Column("seconds_per_photo", "s a photo", "lower", 2),
+        Column("overhead_percent", "overhead, % of s", "lower", 1),
+        Column("cpu_overhead_percent", "overhead, % of processor s", "lower", 1),
+    )
+    plotted = ("seconds", "cpu_seconds")
 
-    photos: int = 4
-    size: int = 128
-    workers: str | int = "1,2"
+    photos: int = option(4, "How many, spread over those there are.", **COUNT)
+    size: int = option(128, "Longer side.", **SIZE)
+    workers: str = option("1,2", "Numbers of workers, with commas.", kind="name")
 
-    def run(self, data: Path | None, output: Path) -> None:
-        counts = _counts(self.workers)
-        chosen = _chosen(data, self.photos, output)
-        rows: list[dict[str, Any]] = []
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        counts = numbers("workers", self.workers, 1, 1024)
+        options = ("--size", str(self.size), "--seed", str(self.seed), "--device", self.device, "--json")
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
-            listing = place / "photos.txt"
-            listing.write_text("\n".join(chosen) + "\n", "utf-8")
-            options = ["--size", str(self.size), "--seed", str(self.seed), "--device", self.device, "--json"]
+            photos = chosen(data, self.photos, place)
+            (place / "photos.txt").write_text("\n".join(photos) + "\n", "utf-8")
             begin = _usage()
-            hashes = {}
-            for k, photo in enumerate(chosen):
-                _command("invert", photo, "-o", str(place / f"single/{k}.scene"), *options)
-                hashes[photo] = package_hash(place / f"single/{k}.scene")
-            rows.append(_row(SINGLE, begin, len(chosen), None))
+            for k, photo in enumerate(photos):
+                materialist("invert", photo, "-o", str(place / f"{k}.scene"), *options, environment=SINGLE_THREAD)
+            single = _row("single inversions, one after the other", begin, len(photos))
+            yield single
+            hashes = {photo: package_hash(place / f"{k}.scene") for k, photo in enumerate(photos)}
             for count in counts:
                 begin, runs = _usage(), place / f"runs-{count}"
-                _command("batch", str(listing), "-o", str(runs), "--workers", str(count), *options)
-                rows.append(_row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(chosen), rows[0]))
-                summary = json.loads((runs / "summary.json").read_text("utf-8"))
-                rows[-1]["peak_mb"] = max(row["peak_rss_mb"] for row in summary["rows"])
-                if together((row["id"], row["scene_hash"]) for row in summary["rows"]) != together(hashes.items()):
+                listed = (str(place / "photos.txt"), "-o", str(runs), "--workers", str(count))
+                materialist("batch", *listed, *options, environment=SINGLE_THREAD)
+                row = _row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(photos))
+                done = json.loads((runs / "summary.json").read_text("utf-8"))["rows"]
+                if {one["id"]: one["scene_hash"] for one in done} != hashes:
                     raise MaterialistError(f"A batch with {count} workers gave other scenes than single inversions.")
-                write(
-                    Report("Many photos", NOTE, self.settings(data), COLUMNS, rows, ("seconds", "cpu_seconds")), output
-                )
+                over = {f"{name}overhead_percent": f"{name}seconds" for name in ("", "cpu_")}
+                yield row | {ours: 100 * (row[name] / single[name] - 1) for ours, name in over.items()}
 
 
-def _counts(workers: str | int) -> list[int]:
-    try:
-        counts = [int(part) for part in str(workers).split(",")]
-    except ValueError:
-        counts = [0]
-    if min(counts) < 1:
-        raise InputError(f"workers is {workers}; give whole numbers such as 1,2.")
-    return counts
-
-
-def _chosen(data: Path | None, photos: int, output: Path) -> list[str]:
-    """Photos as texts for the command line, spread over those there are."""
+def chosen(data: Path | None, photos: int, runs: Path) -> list[str]:
+    """Photos as texts for the command line, spread over those there are; results go into `runs`."""
     if data is None:
         return list(EXAMPLES[:photos])
     below = data / "photos"
-    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=output)]
+    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)]
     return found[:: max(1, len(found) // photos)][:photos]
-
-
-def _command(*arguments: str) -> None:
-    """Run `materialist`; raises MaterialistError with what it said when it fails."""
-    # A thread for each worker, and for the single inversions too: what is compared is the same work.
-    environment = {**os.environ, **SINGLE_THREAD}
-    command = [sys.executable, "-m", "materialist", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    if done.returncode:
-        raise MaterialistError(f"{' '.join(command[2:])} failed: {done.stdout[-500:]} {done.stderr[-500:]}")
 
 
 def _usage() -> tuple[float, float]:
@@ -117,11 +90,7 @@ def _usage() -> tuple[float, float]:
     return time.perf_counter(), children.ru_utime + children.ru_stime
 
 
-def _row(method: str, begin: tuple[float, float], photos: int, single: dict[str, Any] | None) -> dict[str, Any]:
+def _row(method: str, begin: tuple[float, float], photos: int) -> Row:
     seconds, cpu = (after - before for after, before in zip(_usage(), begin, strict=True))
     row = {"method": method, "sample": "all", "seconds": seconds, "cpu_seconds": cpu}
-    row["seconds_per_photo"] = seconds / photos
-    if single is None:
-        return row | {"peak_mb": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024}
-    row["overhead_percent"] = 100 * (seconds / single["seconds"] - 1)
-    return row | {"cpu_overhead_percent": 100 * (cpu / single["cpu_seconds"] - 1)}
+    return row | {"seconds_per_photo": seconds / photos}

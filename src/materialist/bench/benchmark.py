@@ -1,51 +1,93 @@
-"""What every benchmark has: options as the fields of a frozen dataclass, and a clock."""
+"""What every benchmark has: options as the fields of a frozen dataclass, rows, lists of names, times."""
 
 from __future__ import annotations
 
+import inspect
+import sys
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError
+from materialist.option_kinds import OperationOptions, option
+
+Row = dict[str, Any]
+"""'method', 'sample' and the keys of columns; a figure that does not apply is absent."""
+COUNT: dict[str, Any] = {"kind": "whole", "low": 1, "high": 10**6}
+COUNT_OR_0: dict[str, Any] = COUNT | {"low": 0}
+SIZE: dict[str, Any] = {"kind": "whole", "low": 16, "high": 8192, "unit": "pixels"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Benchmark(ABC):
-    """One benchmark; its fields are the options of `materialist bench NAME`."""
+class Benchmark(OperationOptions, ABC):
+    """One benchmark; its fields are the options of `materialist bench NAME`.
 
-    least: ClassVar[dict[str, int]] = {}
-    """Smallest value of options that are counts or sizes; 0 where nothing is said."""
+    The docstring of its module is the report's title (the first line) and the text above the table.
+    """
 
-    seed: int = 0
-    device: str = "auto"
+    operation = "The benchmark"
+    columns: ClassVar[tuple[Column, ...]]
+    plotted: ClassVar[tuple[str, ...]]
+    """Keys of the columns in the plot."""
+    write_every: ClassVar[float] = 20.0
+    """Seconds after which a growing report is written again."""
 
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            low = self.least.get(name, 0)
-            if isinstance(value, int) and not isinstance(value, bool) and value < low:
-                raise InputError(f"--{name} is {value}; give at least {low}.")
-        latency = getattr(self, "latency", 0)
-        if 0 < latency < 64:
-            raise InputError(f"--latency is {latency}; give 0, or 64 pixels or more.")
+    seed: int = option(0, "Same seed, same result.", kind="whole", low=0, high=2**31 - 1)
+    device: str = option("auto", "Where it runs.", kind="word", choices=("auto", "cpu", "cuda"))
 
     @abstractmethod
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        """Measure with the files of `data`; may add to the report's settings and sheet. Raises InputError."""
+
     def run(self, data: Path | None, output: Path) -> None:
-        """Measure with the files of `data`, and write the report into the folder `output` as rows come in."""
+        """Write the report into the folder `output`, as rows come in and when the run ends or is stopped."""
+        from rich.console import Console
+        from rich.progress import track
 
-    def settings(self, data: Path | None, **more: Any) -> dict[str, Any]:
-        """What the report says was asked for: the options, the folder's name, and what a benchmark found out."""
-        given = {name: None if value == "" else value for name, value in asdict(self).items()}
-        return {**given, "data": None if data is None else data.name, **more}
+        title, _, note = inspect.cleandoc(sys.modules[type(self).__module__].__doc__ or "").partition("\n\n")
+        settings = {name: None if value == "" else value for name, value in asdict(self).items()}
+        settings["data"] = None if data is None else data.name
+        report = Report(title, note, settings, self.columns, self.plotted)
+        written = -self.write_every
+        try:
+            for row in track(self.rows(data, report), "benchmark", total=None, console=Console(stderr=True)):
+                report.rows.append(row)
+                if time.monotonic() > written + self.write_every:
+                    write(report, output)
+                    written = time.monotonic()
+        finally:
+            if report.rows:
+                write(report, output)
 
 
-class Clock:
-    """Wall and processor seconds since it was made; other programs hardly change the latter."""
+def names(called: str, text: str, known: Collection[str] = ()) -> list[str]:
+    """The names of a list with commas, each once. Raises InputError for none, or for one that is not `known`."""
+    found = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if not found:
+        raise InputError(f"The {called} is empty; name at least one.")
+    for name in found if known else ():
+        if name not in known:
+            raise InputError(f"The {called} '{name}' is unknown; choose from {', '.join(known)}.")
+    return found
 
-    def __init__(self) -> None:
-        self._wall, self._cpu = time.perf_counter(), time.process_time()
 
-    def read(self) -> dict[str, float]:
-        """`seconds` and `cpu_seconds`."""
-        return {"seconds": time.perf_counter() - self._wall, "cpu_seconds": time.process_time() - self._cpu}
+def numbers(called: str, text: str, low: float, high: float, kind: type = int) -> list[Any]:
+    """The numbers of a list with commas. Raises InputError for anything but numbers from `low` to `high`."""
+    try:
+        found = [kind(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if not all(low <= number <= high for number in found) or not found:
+        raise InputError(f"The {called} is {text!r}; give numbers from {low} to {high} with commas.")
+    return found
+
+
+def timed(work: Callable[[], Any]) -> tuple[Any, dict[str, float]]:
+    """What `work` returns, and its wall and processor seconds; other programs hardly change the latter."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    value = work()
+    return value, {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}

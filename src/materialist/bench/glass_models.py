@@ -1,23 +1,63 @@
-"""The ways to make an object glass that `bench glass` compares, each from the same maps of one view."""
+"""What `bench glass` compares: backgrounds, thicknesses and models of glass, each from the maps of one view.
+
+Backgrounds are meshes that reflect the light: they are lit, and do not glow, so that the glass casts its shadow and its
+caustics on them, as in a fitted scene.
+"""
 
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from materialist.bench.glass_backdrop import Background, albedo_of, lit, suppress_missing
-from materialist.bench.glass_scenes import DEPTH, Front, GlassScene, _mesh, _paint
+from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted, window
+from materialist.errors import SetupError, WeightsError
 from materialist.geometry.extents import PlaneExtent
 from materialist.predict.refraction.thickness import Thickness
+from materialist.procedural.synthetic import mitsuba_mesh
 from materialist.types import Array
+
+
+@dataclass(frozen=True)
+class Case:
+    """One object under one light with one index of refraction; pictures [H, W, 3] are linear radiance."""
+
+    scene: GlassScene
+    envmap: Array
+    photo: Array
+    """The object grey."""
+    truth: Array
+    """The object glass."""
+    gain: float
+    """Exposure of all pictures of the case."""
+    ior: float
+    name: str
+    spp: int = 16
+    """Paths a pixel of the predictions."""
+
+
+@dataclass(frozen=True)
+class Background:
+    """What is taken to be behind the object."""
+
+    picture: Array
+    """[H, W, 3] linear radiance."""
+    depth: Array
+    """[H, W] planar, 0 for sky."""
+    normal: Array
+    """[H, W, 3] unit."""
+    albedo: Array
+    """[H, W, 3] linear, in [0, 1], with which a rendering under the scene's light shows `picture`."""
+    ends: tuple[PlaneExtent, ...] = ()
+    """Where its walls end beyond the picture, if light tells."""
 
 
 def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[PlaneExtent, ...] = ()) -> Background:
     """The room as it is, its picture [H, W, 3] rendered without the object."""
     depth, normal = scene.behind.depth, scene.behind.normal
-    return Background(room, depth, normal, albedo_of(scene, depth, normal, room, envmap, ends), ends)
+    return Background(room, depth, normal, _albedo(scene, depth, normal, room, envmap, ends), ends)
 
 
 def inpainted_background(
@@ -28,36 +68,98 @@ def inpainted_background(
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
     albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
+    from scipy.ndimage import binary_dilation
+
     from materialist.edits.remove.behind import SKY, behind
     from materialist.edits.remove.filling import filled, filling_plan
 
-    hole = _grown(scene.mask)
+    hole = binary_dilation(scene.mask, np.ones((3, 3), bool))  # with the rim of mixed pixels
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
     label, things = np.full(hole.shape, SKY), None
     if depth.any():
-        plane = planes_of(scene, depth, normal)
+        plane = _planes(scene, depth, normal)
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
-        found = predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
-        grey = _paint(scene._mi, scene.item.albedo)
-        things = {"object": _mesh(scene._mi, body(scene, found, depth), grey)}
-    albedo = albedo_of(scene, depth, normal, photo, envmap, ends, things)
+        found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
+        things = {"object": mitsuba_mesh(_body(scene, found, depth), painted(scene.item.albedo))}
+    albedo = _albedo(scene, depth, normal, photo, envmap, ends, things)
     plan = filling_plan(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
     exposed, albedo = (filled(plan, x, hole) for x in (photo * gain, albedo))
     return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 
 
-def _grown(mask: Array) -> Array:
-    """The mask and a rim of mixed pixels."""
-    from scipy.ndimage import binary_dilation
+def wall_ends(scene: GlassScene, photo: Array) -> tuple[PlaneExtent, ...]:
+    """Where walls end as `invert` finds it from the exposed photo [H, W, 3] linear in [0, 1] and the true maps."""
+    from materialist.fit.plane_extents import find_extents
+    from materialist.fit.settings import preset
+    from materialist.types import Materials, Prediction
 
-    return binary_dilation(mask, np.ones((3, 3), bool))
+    there, flat = scene.mask[..., None], np.ones(scene.mask.shape, np.float32)
+    truth = Prediction(
+        Materials(scene.albedo, flat, 0 * flat),
+        np.where(there, scene.front.normal, scene.behind.normal).astype(np.float32),
+        np.where(scene.mask, scene.front.depth, scene.behind.depth).astype(np.float32),
+        "truth",
+    )
+    if not (truth.depth > 0).any():
+        return ()
+    found = find_extents(photo, truth, scene.camera, preset("default"))
+    return found.ends if found else ()
 
 
-def two_interface(
-    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, papers_back: bool = False
-) -> Array:
+def _albedo(
+    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[PlaneExtent, ...],
+    things: dict[str, Any] | None = None,
+) -> Array:  # fmt: skip
+    """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`.
+
+    `things` are Mitsuba objects that stand before them, in the picture, too.
+    """
+    from materialist.render.denoise import denoise
+
+    albedo = np.full(picture.shape, 0.5, np.float32)
+    for _ in range(PROTOCOL.albedo_rounds if depth.any() else 0):
+        surfaces = Background(picture, depth, normal, albedo, ends)
+        seen = lit(scene, surfaces, envmap, things, length=PROTOCOL.diffuse_length, spp=PROTOCOL.albedo_spp)
+        with suppress(SetupError):
+            seen = denoise(seen, albedo=albedo, normal=normal)
+        albedo = np.clip(albedo * picture / np.maximum(seen, 1e-6), 0, PROTOCOL.brightest_albedo).astype(np.float32)
+    return albedo
+
+
+def lit(
+    scene: GlassScene, behind: Background, envmap: Array, things: dict[str, Any] | None = None, *, length: int,
+    spp: int, seed: int = 0, cropped: bool = False,
+) -> Array:  # fmt: skip
+    """[H, W, 3] linear: Mitsuba objects before a background, whose planes go on with their mean albedo, path-traced.
+
+    Paths have `length` segments at most; `cropped` as in `GlassScene.trace`.
+    """
+    import mitsuba as mi
+
+    from materialist.buffers import tensor
+    from materialist.geometry.build import build_geometry
+    from materialist.render.scene import part
+
+    shapes: dict[str, Any] = {}
+    if behind.depth.any():
+        geometry = build_geometry(behind.depth, behind.normal, scene.camera, extents=behind.ends)
+        for k in np.unique(geometry.mesh.face_plane):
+            mean = behind.albedo[geometry.plane_label == k].mean(0) if k >= 0 else None
+            paint = behind.albedo if mean is None else np.broadcast_to(mean, (2, 2, 3))
+            texture = {"type": "bitmap", "data": tensor(mi, paint), "raw": True, "wrap_mode": "clamp"}
+            surface = {"type": "diffuse", "reflectance": texture}
+            shapes[f"backdrop{int(k) + 1}"] = mitsuba_mesh(part(geometry.mesh, int(k)), surface)
+    return scene.trace({**shapes, **(things or {})}, envmap, length=length, spp=spp, seed=seed, cropped=cropped)
+
+
+def plain(case: Case, behind: Background) -> Array:
+    """[H, W, 3] linear: no refraction at all, the background as it is."""
+    return np.where(case.scene.mask[..., None], behind.picture, 0).astype(np.float32)
+
+
+def two_interface(case: Case, found: Thickness, behind: Background, *, papers_back: bool = False) -> Array:
     """[H, W, 3] linear, inside the object's mask: the two-interface model.
 
     The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
@@ -66,19 +168,36 @@ def two_interface(
     from materialist.edits.glass.two_interface import two_interface as model
     from materialist.options import Glass
 
-    front, beyond = scene.front, Behind(behind.picture, behind.depth, envmap)
+    scene, front = case.scene, case.scene.front
+    beyond = Behind(behind.picture, behind.depth, case.envmap)
     back = None if papers_back else back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
-    return model(scene.camera, front.normal, front.depth, scene.mask, found.solid, beyond, Glass(ior=ior), back)
+    return model(scene.camera, front.normal, front.depth, scene.mask, found.solid, beyond, Glass(ior=case.ior), back)
 
 
-def closed_proxy(
-    scene: GlassScene, found: Thickness, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
-) -> Array:
+def closed(case: Case, found: Thickness, behind: Background) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
-    return before(scene, body(scene, found, behind.depth), behind, envmap, ior, spp=spp, seed=seed)
+    return before(case, _body(case.scene, found, behind.depth), behind)
 
 
-def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
+def before(case: Case, body: Any, behind: Background) -> Array:
+    """[H, W, 3] linear, inside the object's mask: a closed body (vertices, faces, normals, uv) before the background.
+
+    Denoised as `materialist glass` does, where the denoiser is installed.
+    """
+    from materialist.render.denoise import denoise
+
+    scene = case.scene
+    things = {"object": mitsuba_mesh(body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
+    length = PROTOCOL.glass_length
+    picture = lit(scene, behind, case.envmap, things, length=length, spp=case.spp, cropped=True)
+    box = window(scene.mask)
+    with suppress(SetupError):
+        part, normal = np.ascontiguousarray(picture[box]), np.ascontiguousarray(scene.front.normal[box])
+        picture[box] = denoise(part, albedo=np.ones_like(part), normal=normal)
+    return np.where(scene.mask[..., None], picture, 0)
+
+
+def _body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
     from materialist.solids.closed import closed_proxy
 
@@ -88,40 +207,6 @@ def body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     return closed_proxy(front.depth, front.normal, mask, found.solid, scene.camera, behind=depth, back=found.back)
 
 
-def before(
-    scene: GlassScene, body: Any, behind: Background, envmap: Array, ior: float, *, spp: int, seed: int = 0
-) -> Array:
-    """[H, W, 3] linear, inside the object's mask: a closed body (vertices, faces, normals, uv) before the background.
-
-    Denoised as `materialist glass` does, where the denoiser is installed.
-    """
-    things = {"object": _mesh(scene._mi, body, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})}
-    picture = lit(
-        scene, behind.depth, behind.normal, behind.albedo, envmap, things,
-        ends=behind.ends, length=DEPTH["glass"], spp=spp, seed=seed, around=scene.mask,
-    )  # fmt: skip
-    return np.where(scene.mask[..., None], _clean(picture, scene), 0)
-
-
-def _clean(picture: Array, scene: GlassScene) -> Array:
-    """[H, W, 3] without noise in the rectangle around the object."""
-    from materialist.render.denoise import denoise
-
-    rows, columns = np.flatnonzero(scene.mask.any(1)), np.flatnonzero(scene.mask.any(0))
-    window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    part = np.ascontiguousarray(picture[window])
-    whole = picture.copy()
-    with suppress_missing():
-        normal = np.ascontiguousarray(scene.front.normal[window])
-        whole[window] = denoise(part, albedo=np.ones_like(part), normal=normal)
-    return whole
-
-
-def plain_background(scene: GlassScene, behind: Background) -> Array:
-    """[H, W, 3] linear: no refraction at all, the background as it is."""
-    return np.where(scene.mask[..., None], behind.picture, 0).astype(np.float32)
-
-
 def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str, Thickness]:
     """Thickness along the camera rays, and the normals of the back, by where they come from.
 
@@ -129,12 +214,11 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     are), 'symmetry'. Where the normals are None they are those of the thickness: 'true' leaves out what the true ones
     add. The upright direction comes from the floor of the background, where there is one.
     """
-    from materialist.errors import WeightsError
     from materialist.predict.refraction import thickness
     from materialist.solids.symmetry import symmetric_thickness
 
-    front: Front = scene.front
-    best = predicted(scene, photo, behind.depth, behind.normal)
+    front = scene.front
+    best = _predicted(scene, photo, behind.depth, behind.normal)
     found = {"true": Thickness(front.thickness, front.thickness), "predicted": best}
     with suppress(WeightsError):  # the others still tell something
         found["network"] = thickness(photo, scene.mask, front.normal, front.depth, scene.camera)
@@ -142,22 +226,20 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     return {**found, "symmetry": Thickness(mirrored, mirrored)}
 
 
-def predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
+def _predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
     from materialist.predict.refraction import best_thickness
     from materialist.solids.finder import upright
 
-    up = upright(normal, planes_of(scene, depth, normal))
-    front = scene.front
+    up, front = upright(normal, _planes(scene, depth, normal)), scene.front
     return best_thickness(photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth)
 
 
-def planes_of(scene: GlassScene, depth: Array, normal: Array) -> Array:
+def _planes(scene: GlassScene, depth: Array, normal: Array) -> Array:
     """[H, W] int8: the plane of each pixel of what is around the object, -1 for none."""
     from materialist.geometry.planes import find_planes
 
     plane = np.full(depth.shape, -1, np.int8)
-    if depth.any():
-        for k, found in enumerate(find_planes(depth, normal, scene.camera)):
-            plane[found.mask] = k
+    for k, found in enumerate(find_planes(depth, normal, scene.camera) if depth.any() else ()):
+        plane[found.mask] = k
     return plane

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.synthetic import mitsuba_mesh, sensor
 from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera
 
@@ -23,16 +25,35 @@ GROUPS = ("symmetric", "asymmetric")
 """Whether an object's back is its front mirrored, as the paper sorts its objects."""
 VESSELS = ("bowl", "coffeemug", "teapot_newell", "wineglass")
 """Meshes of the data folder that are walls around air; the protocol is about solid objects."""
-DEPTH = {"diffuse": 6, "glass": 40}
-"""Path lengths of the reference pictures."""
 ENVMAP_ROWS = {"room": 64, "envmap": 256}
 """Light in a room is brought to few rows: small suns make caustics that no affordable picture shows cleanly."""
-BRIGHTEST = 60.0
-"""Largest radiance of the light, as a multiple of its mean."""
-LIFT = 0.002
-"""Air between an object and the floor: where two surfaces are one, which of them a ray meets first is an accident."""
-EXPOSED = 0.8
-"""Luminance of the brightest fiftieth of the background."""
+
+
+@dataclass(frozen=True)
+class GlassProtocol:
+    """How the pictures of `bench glass` are made."""
+
+    diffuse_length: int = 6
+    """Most segments of a path where nothing is glass."""
+    glass_length: int = 40
+    """Most segments of a path through glass."""
+    brightest: float = 60.0
+    """Largest radiance of the light, as a multiple of its mean."""
+    lift: float = 0.002
+    """Air between an object and the floor: where two surfaces are one, either may be met first."""
+    exposed: float = 0.8
+    """Luminance of the brightest fiftieth of the background."""
+    albedo_spp: int = 256
+    """Paths a pixel from which the light that falls on the background is read, denoised."""
+    albedo_rounds: int = 3
+    """Times the background's albedo is corrected: light goes to and fro between surfaces."""
+    brightest_albedo: float = 0.95
+    """Largest albedo of the background."""
+    noise: float = 0.5
+    """Largest relative error of the thickness in the sensitivity test (paper, eq. ablation_d)."""
+
+
+PROTOCOL = GlassProtocol()
 
 
 @dataclass(frozen=True)
@@ -62,30 +83,27 @@ def things(data: Path | None, count: int, seed: int = 0) -> list[Thing]:
     """The first `count` symmetric and `count` asymmetric objects: procedural, or watertight meshes of DATA/meshes."""
     if data is None:
         return [thing for k in range(count) for thing in (_turned(k, seed), _free(k, seed))]
-    found = []
+    found: list[list[Thing]] = []
     for group in GROUPS:
         files = sorted((data / "meshes" / group).glob("*.ply"))
         files = [f for f in files if f.stem not in VESSELS]
         order = np.random.default_rng([seed, 6]).permutation(len(files))
         loaded = (Thing(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7)) for k in order)
-        closed = [thing for _, thing in zip(range(count), (t for t in loaded if is_closed(t.solid)), strict=False)]
+        closed = list(islice((thing for thing in loaded if is_closed(thing.solid)), count))
         if not closed:
             raise InputError(f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none.")
         found.append(closed)
-    return [thing for pair in zip(*found, strict=False) for thing in pair] + [
-        thing for rest in found for thing in rest[min(map(len, found)) :]
-    ]
+    return [thing for pair in zip_longest(*found) for thing in pair if thing]
 
 
 def is_closed(solid: Solid) -> bool:
     """Whether every edge of the mesh has two faces that run through it in opposite directions."""
-    _, place = np.unique(np.round(solid.vertices, 7), axis=0, return_inverse=True)
-    faces = place.reshape(-1)[solid.faces]
-    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there = np.unique(edges @ np.array([1, place.max() + 1]), return_counts=True)
-    back = np.unique(edges @ np.array([place.max() + 1, 1]), return_counts=True)
-    return bool(np.array_equal(there[0], back[0]) and np.array_equal(there[1], back[1]))
+    import trimesh
+
+    mesh = trimesh.Trimesh(np.round(solid.vertices, 7), solid.faces)  # merges vertices
+    corners = np.sort(mesh.faces, 1)
+    mesh.update_faces((np.diff(corners) > 0).all(1))
+    return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
 def _turned(index: int, seed: int) -> Thing:
@@ -137,16 +155,13 @@ class GlassScene:
     """
 
     def __init__(self, thing: Thing, size: int, seed: int = 0, background: str = "room"):
-        from materialist.render.variant import setup
-
-        self._mi = setup()
         rng = np.random.default_rng([seed, 9, *thing.name.encode()])
         self.thing, self.background = thing, background
         view = _view(thing.solid, rng)
         self.to_scene = view.to_scene
         self.camera = Camera(size, size, view.fov)
         turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
-        turned = replace(turned, vertices=turned.vertices + np.array([0, LIFT, 0]))
+        turned = replace(turned, vertices=turned.vertices + np.array([0, PROTOCOL.lift, 0]))
         item = scenes.Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0)
         self.item = scenes.in_camera(item, view)
         self.room = [scenes.in_camera(i, view) for i in _room(rng)] if background == "room" else []
@@ -159,11 +174,11 @@ class GlassScene:
     @cached_property
     def behind(self) -> Front:
         """The room alone."""
-        if not self.room:
-            size = (self.camera.height, self.camera.width)
-            normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*size, 3))
-            return Front(np.zeros(size, np.float32), normal, np.zeros(size, np.float32), -normal)
-        return seen(shapes.joined([i.solid for i in self.room]), self.camera)
+        if self.room:
+            return seen(shapes.joined([i.solid for i in self.room]), self.camera)
+        none = np.zeros((self.camera.height, self.camera.width), np.float32)
+        normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*none.shape, 3))
+        return Front(none, normal, none, -normal)
 
     @cached_property
     def mask(self) -> Array:
@@ -173,29 +188,64 @@ class GlassScene:
     @cached_property
     def albedo(self) -> Array:
         """[H, W, 3] linear: of what the camera sees first, the object grey."""
-        mi = self._mi
-        description: dict[str, Any] = {
-            f"room{k}": _mesh(mi, i.solid, _paint(mi, i.albedo)) for k, i in enumerate(self.room)
-        }
-        description["object"] = _mesh(mi, self.item.solid, _paint(mi, self.item.albedo))
-        seen = {"type": "aov", "aovs": "albedo:albedo"}
-        return path_traced(mi, {"type": "scene", **description}, self.camera, spp=64, seed=0, integrator=seen)
+        things = {**self._room(), "object": mitsuba_mesh(self.item.solid, painted(self.item.albedo))}
+        return self.trace(things, None, spp=64, integrator={"type": "aov", "aovs": "albedo:albedo"})
 
     def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it).
 
         Of 'glass' only the rectangle around the object is rendered, the rest is 0.
         """
-        mi = self._mi
-        description: dict[str, Any] = {"type": "scene", **_light(mi, envmap)}
-        description |= {f"room{k}": _mesh(mi, i.solid, _paint(mi, i.albedo)) for k, i in enumerate(self.room)}
-        if what == "diffuse":
-            description["object"] = _mesh(mi, self.item.solid, _paint(mi, self.item.albedo))
-        elif what == "glass":
-            description["object"] = _mesh(mi, self.item.solid, {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0})
-        if what != "glass":
-            return path_traced(mi, description, self.camera, depth=DEPTH["diffuse"], spp=spp, seed=seed)
-        return path_traced(mi, description, self.camera, depth=DEPTH["glass"], spp=spp, seed=seed, around=self.mask)
+        things = self._room()
+        glass = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
+        if what != "room":
+            things["object"] = mitsuba_mesh(self.item.solid, glass if what == "glass" else painted(self.item.albedo))
+        length = PROTOCOL.glass_length if what == "glass" else PROTOCOL.diffuse_length
+        return self.trace(things, envmap, length=length, spp=spp, seed=seed, cropped=what == "glass")
+
+    def _room(self) -> dict[str, Any]:
+        return {f"room{k}": mitsuba_mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
+
+    def trace(
+        self, things: dict[str, Any], envmap: Array | None, *, spp: int, length: int = 0, seed: int = 0,
+        cropped: bool = False, integrator: dict[str, Any] | None = None,
+    ) -> Array:  # fmt: skip
+        """[H, W, 3] float32 linear picture of Mitsuba objects under a light [h, 2h, 3]; 0 outside a `cropped` one,
+        which is the rectangle around the object. By paths of `length` segments at most, or another `integrator`."""
+        import mitsuba as mi
+
+        from materialist.render.envmap import half_turn, on_mitsuba_grid
+
+        camera = sensor(self.camera)
+        box = window(self.mask) if cropped else np.s_[:, :]
+        if cropped:
+            for side, axis, part in zip(("width", "height"), "xy", reversed(box), strict=True):
+                camera["film"] |= {f"crop_offset_{axis}": part.start, f"crop_{side}": part.stop - part.start}
+        light = {}
+        if envmap is not None:
+            grid = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np)[:, :-1])
+            light["light"] = {"type": "envmap", "bitmap": mi.Bitmap(grid), "to_world": half_turn(mi)}
+        scene = mi.load_dict({"type": "scene", **light, **things, "sensor": camera})
+        how = mi.load_dict(integrator or {"type": "path", "max_depth": length, "rr_depth": 64})
+        side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
+        picture = np.array(mi.render(scene, integrator=how, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
+        whole = np.zeros((self.camera.height, self.camera.width, 3), np.float32)
+        whole[box] = np.nan_to_num(picture)
+        return whole
+
+
+def window(mask: Array) -> tuple[slice, slice]:
+    """The rectangle around a mask [H, W] bool, as slices of rows and columns."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+
+
+def painted(albedo: Array) -> dict[str, Any]:
+    """Mitsuba's diffuse surface with a texture [h, w, 3]."""
+    import mitsuba as mi
+
+    bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
+    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
 
 
 def seen(solid: Solid, camera: Camera) -> Front:
@@ -225,46 +275,12 @@ def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int =
     full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.to_scene)
     rows = ENVMAP_ROWS[scene.background]
     small = full if rows == len(full) else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
-    return np.minimum(small, BRIGHTEST * luminance(small).mean()).astype(np.float32)
+    return np.minimum(small, PROTOCOL.brightest * luminance(small).mean()).astype(np.float32)
 
 
 def exposure(background: Array) -> float:
     """The factor that exposes a picture of the room as a camera would."""
-    return EXPOSED / max(float(np.percentile(luminance(background), 98)), 1e-6)
-
-
-def path_traced(
-    mi,
-    description: dict[str, Any],
-    camera: Camera,
-    *,
-    depth: int = 0,
-    spp: int,
-    seed: int,
-    around: Array | None = None,
-    integrator: dict[str, Any] | None = None,
-) -> Array:
-    """[H, W, 3] float32 linear picture of a Mitsuba scene without a sensor, or of the rectangle around a mask of it.
-
-    By paths of `depth` at most, or by another `integrator`.
-    """
-    from materialist.procedural.synthetic import _sensor
-
-    sensor, window = _sensor(camera), np.s_[:, :]
-    if around is not None:
-        rows, columns = np.flatnonzero(around.any(1)), np.flatnonzero(around.any(0))
-        window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        sensor["film"] |= {
-            "crop_offset_x": int(columns[0]), "crop_offset_y": int(rows[0]),
-            "crop_width": int(columns[-1] - columns[0] + 1), "crop_height": int(rows[-1] - rows[0] + 1),
-        }  # fmt: skip
-    scene = mi.load_dict({**description, "sensor": sensor})
-    how = mi.load_dict(integrator or {"type": "path", "max_depth": depth, "rr_depth": 64})
-    side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
-    picture = np.array(mi.render(scene, integrator=how, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
-    whole = np.zeros((camera.height, camera.width, 3), np.float32)
-    whole[window] = np.nan_to_num(picture)
-    return whole
+    return PROTOCOL.exposed / max(float(np.percentile(luminance(background), 98)), 1e-6)
 
 
 def _room(rng: np.random.Generator) -> list[scenes.Item]:
@@ -290,33 +306,3 @@ def _view(solid: Solid, rng: np.random.Generator) -> Viewpoint:
     return Viewpoint(
         np.array([0, height / 2, 0]) + distance * back, np.stack([right, np.cross(back, right), back], -1), float(fov)
     )
-
-
-def _light(mi, envmap: Array) -> dict[str, Any]:
-    from materialist.render.envmap import half_turn, on_mitsuba_grid
-
-    data = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np))
-    return {"light": {"type": "envmap", "bitmap": mi.Bitmap(data[:, :-1]), "to_world": half_turn(mi)}}
-
-
-def _paint(mi, albedo: Array) -> dict[str, Any]:
-    bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
-    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
-
-
-def _mesh(mi, solid: Any, bsdf: dict[str, Any], emitter: dict[str, Any] | None = None) -> Any:
-    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
-    from materialist.buffers import floats, integers
-
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    if emitter is not None:
-        props["emitter"] = mi.load_dict(emitter)
-    mesh = mi.Mesh(
-        "mesh", len(solid.vertices), len(solid.faces), props=props, has_vertex_normals=True, has_vertex_texcoords=True
-    )
-    params = mi.traverse(mesh)
-    params["vertex_positions"], params["vertex_normals"] = floats(mi, solid.vertices), floats(mi, solid.normals)
-    params["vertex_texcoords"], params["faces"] = floats(mi, solid.uv), integers(mi, solid.faces)
-    params.update()
-    return mesh

@@ -2,6 +2,19 @@
 
 The paper's protocol (section "Environment Map Optimization", tables "Quantitative evaluation of envmap optimization"
 and "Ablation study on envmap settings"): scenes x viewpoints x lightings; full size 10 x 10 x 10.
+
+Light fitted to synthetic photographs whose materials, geometry and light are known. `envmap` figures compare the fitted
+with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; MSE linear and unclipped). `render`
+figures compare the true scene under the fitted light with the photograph, `mesh` the depth mesh under it with the
+photograph, `relit` the depth mesh under another light with the true picture of it. `ceiling` is the depth mesh with the
+true maps and the true light: what no fit on this mesh can beat. `inversion` is the whole inversion by the default
+preset, light and materials, with the true maps as its prior; it and `default` end walls where light explains the
+photograph best (`--completion auto`), the ceiling does not. `w/o planes`: without continued planes (`--completion
+none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the
+light fit and its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds
+add up all processors and hardly depend on what else the computer does. The first sample's hold the compilation of
+kernels that the computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that size inside the
+fit instead of 512x256, which makes its steps cheaper.
 """
 
 from __future__ import annotations
@@ -10,51 +23,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from materialist import metrics
-from materialist.bench.benchmark import Benchmark, Clock
-from materialist.bench.report import CEILING, Column, Report, write
-from materialist.errors import InputError
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
+from materialist.bench.report import CEILING, Column, Report
+from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials
 
 NEUTRAL = 0.5
 """Albedo and roughness of the paper's runs without given materials (A = R = 0.5, M = 0.1)."""
-
-NOTE = """Light fitted to synthetic photographs whose materials, geometry and light are known.
-`envmap` figures compare the fitted with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; MSE
-linear and unclipped). `render` figures compare the true scene under the fitted light with the photograph, `mesh` the
-depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
-`ceiling` is the depth mesh with the true maps and the true light: what no fit on this mesh can beat. `inversion` is the
-whole inversion by the default preset, light and materials, with the true maps as its prior; it and `default` end
-walls where light explains the photograph best (`--completion auto`), the ceiling does not. `w/o
-planes`: without continued planes (`--completion none`). `w/o
-mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the light fit and
-its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds add up all
-processors and hardly depend on what else the computer does. The first sample's hold the compilation of kernels that the
-computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that size inside the fit instead of
-512x256, which makes its steps cheaper."""
-
-COLUMNS = (
-    Column("envmap_ssim", "envmap SSIM", "higher"),
-    Column("envmap_psnr", "envmap PSNR", "higher", 2),
-    Column("envmap_mse", "envmap MSE", "lower"),
-    Column("sh_error", "SH error", "lower"),
-    Column("sh_error_relative", "SH error, relative", "lower"),
-    Column("render_ssim", "render SSIM", "higher"),
-    Column("render_psnr", "render PSNR", "higher", 2),
-    Column("render_mse", "render MSE", "lower", 4),
-    Column("mesh_psnr", "mesh PSNR", "higher", 2),
-    Column("relit_psnr", "relit PSNR", "higher", 2),
-    Column("albedo_l1", "albedo L1", "lower"),
-    Column("steps", "steps", "", 0),
-    Column("seconds", "s", "lower", 1),
-    Column("cpu_seconds", "CPU s", "lower", 1),
-)
 
 
 @dataclass(frozen=True)
@@ -91,130 +73,110 @@ METHODS = {
 
 @dataclass(frozen=True, kw_only=True)
 class LightBench(Benchmark):
-    """Fit the light of scenes x views x lights samples of `size` pixels with each of the `methods`.
+    """Fit the light of scenes x views x lights samples with each of the methods."""
 
-    `methods` are names of METHODS, separated by commas. The paper's full size is 10 x 10 x 10; every scene and view
-    begins with another light, so that small runs meet several. `completion` is that of `invert` for the methods; for
-    the paper's, `auto` is `planes`. With `relight`, whole inversions with and without continued planes are relit. `spp`
-    are the samples a pixel of all pictures that are compared. The report is written after every row.
-    """
+    columns = (
+        Column("envmap_ssim", "envmap SSIM", "higher"),
+        Column("envmap_psnr", "envmap PSNR", "higher", 2),
+        Column("envmap_mse", "envmap MSE", "lower"),
+        Column("sh_error", "SH error", "lower"),
+        Column("sh_error_relative", "SH error, relative", "lower"),
+        Column("render_ssim", "render SSIM", "higher"),
+        Column("render_psnr", "render PSNR", "higher", 2),
+        Column("render_mse", "render MSE", "lower", 4),
+        Column("mesh_psnr", "mesh PSNR", "higher", 2),
+        Column("relit_psnr", "relit PSNR", "higher", 2),
+        Column("albedo_l1", "albedo L1", "lower"),
+        Column("steps", "steps", "", 0),
+        Column("seconds", "s", "lower", 1),
+        Column("cpu_seconds", "CPU s", "lower", 1),
+    )
+    plotted = ("sh_error_relative", "render_psnr", "seconds")
 
-    least: ClassVar = {"scenes": 1, "views": 1, "lights": 1, "size": 1, "spp": 1}
+    scenes: int = option(3, "Scenes; the paper has 10. Every scene and view begins with another light.", **COUNT)
+    views: int = option(1, "Viewpoints of each; the paper has 10.", **COUNT)
+    lights: int = option(2, "Lights of each view; the paper has 10.", **COUNT)
+    size: int = option(96, "Width and height of the photos.", **SIZE)
+    methods: str = option("default,paper", "Names of METHODS, with commas.", kind="name")
+    completion: str = option("auto", "That of `invert`; for the paper's methods, `auto` is `planes`.", kind="name")
+    relight: bool = option(True, "Relight whole inversions, with and without continued planes.", kind="switch")
+    spp: int = option(256, "Samples a pixel of all pictures that are compared.", **COUNT)
 
-    scenes: int = 3
-    views: int = 1
-    lights: int = 2
-    size: int = 96
-    methods: str = "default,paper"
-    completion: str = "auto"
-    relight: bool = True
-    spp: int = 256
-
-    def run(self, data: Path | None, output: Path) -> None:
-        chosen = _methods(self.methods)
-        from rich.console import Console
-        from rich.progress import track
-
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist.render.variant import setup
 
+        methods = names("methods", self.methods, METHODS)
         setup(self.device)
-        rows: list[dict[str, Any]] = []
-        plotted = ("sh_error_relative", "render_psnr", "seconds")
-        report = Report("Light", NOTE, self.settings(data), COLUMNS, rows, plotted)
-        indices = list(product(range(self.scenes), range(self.views), range(self.lights)))
-        for scene, view, light in track(indices, "bench light", console=Console(stderr=True)):
+        for scene, view, light in product(range(self.scenes), range(self.views), range(self.lights)):
             first = scene + view + light
             sample, other = (
                 make_sample(scene, view, k, size=self.size, data=data, seed=self.seed) for k in (first, first + 1)
             )
-            stage = _Stage(sample, other.envmap, self.spp, self.seed, self.device)
-            for row in chain(stage.relit() if self.relight else (), stage.fitted(chosen, self.completion)):
-                rows.append({**row, "sample": sample.name})
-                write(report, output)
+            stage = _Stage(self, sample, other.envmap)
+            for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
+                yield {**row, "sample": sample.name}
 
 
-def _methods(names: str) -> dict[str, Method]:
-    """The methods by their names; raises InputError for a name that is not there."""
-    chosen = {}
-    for name in (part.strip() for part in names.split(",")):
-        if name not in METHODS:
-            raise InputError(f"There is no method '{name}' in bench light; choose of: {', '.join(METHODS)}.")
-        chosen[name] = METHODS[name]
-    return chosen
-
-
-ADDED = {"auto": "", "none": " w/o planes"}
+COMPLETIONS = {"auto": "", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
 
 
 class _Stage:
     """One sample, its depth meshes, and the true pictures that all rows are compared with."""
 
-    def __init__(self, sample: SyntheticSample, other: Array, spp: int, seed: int, device: str):
+    def __init__(self, bench: LightBench, sample: SyntheticSample, other: Array):
         """`other` [h, 2h, 3] is the light of the relit pictures."""
-        self.sample, self.other = sample, other
-        self.spp, self.seed, self.device = spp, seed, device
-        self.photo = sample.render(sample.envmap, spp=spp, seed=seed + 2)
-        self.relit_photo = sample.render(other, spp=spp, seed=seed + 3)
-        self._meshes: dict[str, tuple[Any, Any]] = {}
+        self.bench, self.sample, self.other = bench, sample, other
+        self.photo = sample.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
+        self.relit_photo = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
 
-    def mesh(self, completion: str) -> tuple[Any, Any]:
-        """Geometry and RenderScene of the true depth, built once."""
+    def mesh(self, completion: str) -> Any:
+        """The RenderScene of the true depth; where nothing speaks against them, `auto` adds planes."""
         from materialist.geometry.build import build_geometry
         from materialist.render.scene import RenderScene
 
-        if completion not in self._meshes:
-            camera, truth = self.sample.photo.camera, self.sample.truth
-            geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=self.seed)
-            self._meshes[completion] = geometry, RenderScene(geometry, camera, device=self.device)
-        return self._meshes[completion]
+        camera, truth = self.sample.photo.camera, self.sample.truth
+        named = "planes" if completion == "auto" else completion
+        geometry = build_geometry(truth.depth, truth.normal, camera, completion=named, seed=self.bench.seed)
+        return RenderScene(geometry, camera, device=self.bench.device)
 
-    def relit(self) -> Iterator[dict[str, Any]]:
+    def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
         from materialist import pipeline
         from materialist.render.scene import RenderScene
 
-        truth = self.sample.truth
-        for completion, suffix in ADDED.items():
-            yield {"method": CEILING + suffix, **self._on_mesh(_all(completion), truth.materials, self.sample.envmap)}
-            clock = Clock()
-            found = pipeline.invert(
-                self.sample.photo, prior=truth, completion=completion, seed=self.seed, device=self.device
-            )
-            cost = clock.read()
-            surface = truth.depth > 0
+        truth, device = self.sample.truth, self.bench.device
+        for completion, suffix in COMPLETIONS.items():
+            figures = self._on(self.mesh(completion), truth.materials, self.sample.envmap)
+            yield {"method": CEILING + suffix, **figures}
+            options: dict[str, Any] = {"completion": completion, "seed": self.bench.seed, "device": device}
+            found, cost = timed(lambda o=options: pipeline.invert(self.sample.photo, prior=truth, **o))
+            mesh = RenderScene(found.geometry, found.camera, device=device)
+            off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
             yield {
                 "method": "inversion" + suffix,
                 **self._of_light(found.envmap),
-                **self._on(
-                    RenderScene(found.geometry, found.camera, device=self.device), found.materials, found.envmap
-                ),
-                "albedo_l1": float(np.abs(found.materials.albedo - truth.materials.albedo)[surface].mean()),
+                **self._on(mesh, found.materials, found.envmap),
+                "albedo_l1": float(off.mean()),
                 **cost,
             }
 
-    def fitted(self, methods: dict[str, Method], completion: str) -> Iterator[dict[str, Any]]:
+    def fitted(self, methods: list[str]) -> Iterator[Row]:
         """A row for every method of fitting the light."""
-        for name, method in methods.items():
-            taken, mesh = completion, None
-            if method.preset == "paper":
-                taken = _all(completion)
-                mesh = self.mesh(taken)[1]
-            clock = Clock()
-            envmap, steps, mesh = fit(self.sample, method, taken, mesh=mesh, seed=self.seed, device=self.device)
-            cost = clock.read()
-            on_mesh = self._on(mesh, self.sample.truth.materials, envmap)
-            yield {
-                "method": name,
-                **self._of_light(envmap),
-                "mesh_psnr": on_mesh["mesh_psnr"],
-                "steps": steps,
-                **cost,
-            }
+        bench = self.bench
+        for name in methods:
+            method, completion = METHODS[name], bench.completion
+            mesh = self.mesh(completion) if method.engine == "path" else None
+            if method.preset == "paper" and completion == "auto":
+                completion = "planes"
+            options: dict[str, Any] = {"mesh": mesh, "seed": bench.seed, "device": bench.device}
+            (envmap, steps, mesh), cost = timed(lambda m=method, c=completion, o=options: fit(self.sample, m, c, **o))
+            seen = self._on(mesh, self.sample.truth.materials, envmap)["mesh_psnr"]
+            yield {"method": name, **self._of_light(envmap), "mesh_psnr": seen, "steps": steps, **cost}
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
         """The map against the true one, and the true scene under it against the photo."""
-        picture = self.sample.render(envmap, spp=self.spp, seed=self.seed + 4)
+        picture = self.sample.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
         return {
             **metrics.envmap_metrics(envmap, self.sample.envmap),
             "render_ssim": metrics.ssim(picture, self.photo),
@@ -222,17 +184,13 @@ class _Stage:
             "render_mse": metrics.mse(picture, self.photo),
         }
 
-    def _on_mesh(self, completion: str, materials: Materials, envmap: Array) -> dict[str, float]:
-        """PSNR of the depth mesh with these materials, under this light and under the other."""
-        return self._on(self.mesh(completion)[1], materials, envmap)
-
     def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
-        """The same of any RenderScene."""
+        """PSNR of a RenderScene with these materials, under this light and under the other."""
         mesh.set_materials(materials)
         mesh.set_envmap(envmap)
-        picture = mesh.render(spp=self.spp, seed=self.seed + 1)
+        picture = mesh.render(spp=self.bench.spp, seed=self.bench.seed + 1)
         mesh.set_envmap(self.other)
-        relit = mesh.render(spp=self.spp, seed=self.seed + 1)
+        relit = mesh.render(spp=self.bench.spp, seed=self.bench.seed + 1)
         return {"mesh_psnr": metrics.psnr(picture, self.photo), "relit_psnr": metrics.psnr(relit, self.relit_photo)}
 
 
@@ -269,11 +227,6 @@ def fit(
     result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
     envmap = prepared_envmap(field(max(light.height, 16)), height)
     return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, mesh
-
-
-def _all(completion: str) -> str:
-    """What `auto` adds where nothing speaks against it."""
-    return "planes" if completion == "auto" else completion
 
 
 def _neutral(materials: Materials) -> Materials:

@@ -3,224 +3,121 @@
 Data: a set of `materialist train data`, InteriorVerse, or any folder of photos with true maps. Pictures are given to
 the predictor as photographs (clipped to [0, 1]; the procedural ones with tone, noise, blur and JPEG, unless
 `photographic` is off), with their true field of view.
+
+Pixels with a true surface count. Albedo: sRGB-encoded, clipped to [0, 1], after one factor a picture (least squares of
+linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]; `pooled` is the PSNR of the mean
+square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a PSNR is at most 100.
+Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without it; SI log RMSE is the
+standard deviation of log depth error; `order` the part of random pixel pairs in the right order (a constant gets 0.5).
+Normals: mean angle, degrees. LPIPS (AlexNet, of sRGB-encoded maps, with the truth where there is no surface) only where
+the lpips package and its weights are installed. sheet.png: the photo, and the maps of each predictor and the true ones
+under each other.
 """
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import Benchmark
-from materialist.bench.report import Column, Pace, Report, write
+from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, timed
+from materialist.bench.report import Column, Report
 from materialist.errors import InputError
+from materialist.option_kinds import option
 from materialist.predict.protocol import MAPS
 from materialist.types import Array, Camera, Materials, Photo, Prediction
-
-COLUMNS = (
-    Column("albedo_psnr", "albedo PSNR", "higher", 2),
-    Column("albedo_ssim", "albedo SSIM", "higher"),
-    Column("albedo_lpips", "albedo LPIPS", "lower"),
-    Column("albedo_psnr_raw", "albedo PSNR raw", "higher", 2),
-    Column("roughness_psnr", "roughness PSNR", "higher", 2),
-    Column("roughness_psnr_pooled", "roughness PSNR pooled", "higher", 2),
-    Column("roughness_ssim", "roughness SSIM", "higher"),
-    Column("roughness_lpips", "roughness LPIPS", "lower"),
-    Column("metallic_psnr", "metallic PSNR", "higher", 2),
-    Column("metallic_psnr_pooled", "metallic PSNR pooled", "higher", 2),
-    Column("metallic_ssim", "metallic SSIM", "higher"),
-    Column("metallic_lpips", "metallic LPIPS", "lower"),
-    Column("depth_mae", "depth MAE", "lower"),
-    Column("depth_rmse", "depth RMSE", "lower"),
-    Column("depth_mae_raw", "depth MAE raw", "lower"),
-    Column("depth_rmse_raw", "depth RMSE raw", "lower"),
-    Column("depth_si_log_rmse", "depth SI log RMSE", "lower"),
-    Column("depth_order", "depth order", "higher"),
-    Column("normal_angle", "normal angle", "lower", 1),
-    Column("mask_iou", "surface IoU", "higher"),
-    Column("seconds", "s", "lower", 2),
-)
-NOTE = (
-    "Pixels with a true surface count. Albedo: sRGB-encoded, clipped to [0, 1], after one factor a picture (least "
-    "squares of linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]; `pooled` is the PSNR "
-    "of the mean square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a "
-    "PSNR is at most 100. Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without "
-    "it; SI log RMSE is the standard deviation of log depth error; `order` the part of random pixel pairs in the right "
-    "order (a constant gets 0.5). Normals: mean angle, degrees. LPIPS (AlexNet, of sRGB-encoded maps, with the "
-    "truth where there is no surface) only where the lpips package and its weights are installed. Rows named "
-    "procedural are seeded held-out pictures of `train data`."
-)
-
-HELD_OUT = 24
-"""Procedural pictures that are made where `data` holds none."""
-FILES = ("maps:", "moge:")
-"""Predictors that know one picture's maps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MaterialsBench(Benchmark):
-    """Score predictors (comma-separated) on `data`, and on so many held-out procedural pictures made for it.
+    """Score predictors on `data`."""
 
-    `limit` scores at most so many samples of `data`, spread over the set (0: all); `split` is InteriorVerse's;
-    `pictures` of each kind are drawn into sheet.png. `procedural` is HELD_OUT unless `data` is a set of `train data`
-    itself; they have `size` pixels a side and use the files of `meshes` and `envmaps` that are kept aside, if given.
-    """
-
-    predictor: str = "auto"
-    limit: int = 0
-    split: str = "test"
-    photographic: bool = True
-    pictures: int = 8
-    procedural: int | None = None
-    meshes: str = ""
-    envmaps: str = ""
-    size: int = 256
-
-    def run(self, data: Path | None, output: Path) -> None:
-        from materialist.bench.predictors import opened, specs_of
-
-        own_set = data is not None and (data / "samples").is_dir()
-        count = (0 if own_set else HELD_OUT) if self.procedural is None else self.procedural
-        if data is None and count < 1:
-            raise InputError("There is nothing to score; give --data DIR (docs/training.md), or --procedural above 0.")
-        specs = specs_of(self.predictor)
-        sources = {spec: opened(spec, self.device) for spec in specs}
-        rows: list[dict[str, Any]] = []
-        strips: dict[tuple[str, int], list] = {}
-        settings = self.settings(data, procedural=count)
-
-        def tell() -> None:
-            report = Report(
-                "Predicted maps", NOTE, settings, COLUMNS, _with_pooled(rows), ("albedo_psnr", "normal_angle")
+    columns = (
+        Column("albedo_psnr", "albedo PSNR", "higher", 2),
+        Column("albedo_ssim", "albedo SSIM", "higher"),
+        Column("albedo_lpips", "albedo LPIPS", "lower"),
+        Column("albedo_psnr_raw", "albedo PSNR raw", "higher", 2),
+        *(
+            Column(f"{name}_{key}", f"{name} {title}", better, digits)
+            for name in ("roughness", "metallic")
+            for key, title, better, digits in (
+                ("psnr", "PSNR", "higher", 2),
+                ("psnr_pooled", "PSNR pooled", "higher", 2),
+                ("ssim", "SSIM", "higher", 3),
+                ("lpips", "LPIPS", "lower", 3),
             )
-            write(report, output)
+        ),
+        Column("depth_mae", "depth MAE", "lower"),
+        Column("depth_rmse", "depth RMSE", "lower"),
+        Column("depth_mae_raw", "depth MAE raw", "lower"),
+        Column("depth_rmse_raw", "depth RMSE raw", "lower"),
+        Column("depth_si_log_rmse", "depth SI log RMSE", "lower"),
+        Column("depth_order", "depth order", "higher"),
+        Column("normal_angle", "normal angle", "lower", 1),
+        Column("mask_iou", "surface IoU", "higher"),
+        Column("seconds", "s", "lower", 2),
+    )
+    plotted = ("albedo_psnr", "normal_angle")
 
-        pace = Pace()
+    predictor: str = option("auto", "Names, with commas.", kind="name")
+    limit: int = option(0, "At most so many samples, spread over the set; 0: all.", **COUNT_OR_0)
+    split: str = option("test", "InteriorVerse's.", kind="name")
+    photographic: bool = option(True, "Tone, noise, blur and JPEG for procedural pictures.", kind="switch")
+    pictures: int = option(8, "Samples in sheet.png.", **COUNT_OR_0)
 
-        def add(folder: Path, kind: str, most: int) -> None:
-            for spec in [s for s in specs if not (kind and s.startswith(FILES))]:
-                unreadable: list[str] = []
-                samples = labelled(
-                    folder, split=self.split, limit=most, photographic=self.photographic, unreadable=unreadable
-                )
-                for k, (name, photo, truth) in enumerate(samples):
-                    prediction, row = _scored(sources[spec], photo, truth, self.seed)
-                    rows.append({"method": spec + kind, "sample": name, **row})
-                    if k < self.pictures:
-                        strips.setdefault((kind, k), [photo.linear, truth]).insert(-1, prediction)
-                    absent = absent_maps(truth)
-                    settings.update({f"no true {which}": True for which in absent})
-                    if pace.due():
-                        tell()
-                if unreadable:
-                    settings["left out"] = "; ".join(unreadable)
-            if not rows:
-                raise InputError(settings.get("left out") or f"{folder} holds nothing to score.")
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        from materialist.io.display import strip
+        from materialist.predict import get_predictor
 
-        if data is not None:
-            add(data, "", self.limit)
-            settings |= lost(data, self.split)
-        if count:
-            from materialist.procedural.dataset import CONTENT
+        if data is None:
+            raise InputError(
+                "There is nothing to score; give --data DIR: materialist train data --split heldout -o DIR."
+            )
+        sources = {spec: get_predictor(spec, device=self.device) for spec in names("predictor", self.predictor)}
+        for k, (name, photo, truth) in enumerate(self.samples(data, report)):
+            absent = [name for name in MAPS if truth.sources and name not in truth.sources]
+            report.settings.update({f"no true {which}": True for which in absent})
+            predictions = []
+            for spec, source in sources.items():
+                found, cost = timed(lambda s=source, p=photo: s.predict(p, seed=self.seed))
+                predictions.append(found)
+                yield {"method": spec, "sample": name, **_scores(found, truth, absent), "seconds": cost["seconds"]}
+            if k < self.pictures:
+                report.sheet.append(strip(photo.linear, *predictions, truth))
+        _pool(report.rows)
 
-            settings["procedural content"] = CONTENT
-            with tempfile.TemporaryDirectory() as place:
-                add(
-                    held_out(Path(place) / "set", count, self.size, self.seed, self.meshes, self.envmaps, self.device),
-                    ", procedural",
-                    0,
-                )
-        tell()
-        _draw(list(strips.values()), output / "sheet.png")
+    def samples(self, data: Path, report: Report) -> Iterator[tuple[str, Photo, Prediction]]:
+        """(name, photo, truth) of the samples; see the module for what `data` may be. Raises InputError."""
+        folders = photo_folders(data)
+        if folders:
+            for folder in _spread(folders, self.limit):
+                yield folder.name, *_read_folder(folder)
+            return
+        from materialist.io.datasets import InteriorVerse, open_source
+        from materialist.io.samples import SampleFolder
+        from materialist.procedural.photographic import as_photo
 
-
-def held_out(folder: Path, count: int, size: int, seed: int, meshes: str, envmaps: str, device: str) -> Path:
-    """A new set of held-out procedural pictures; see `train.data.produce`."""
-    from materialist.procedural.dataset import options_for, produce
-
-    options = options_for(
-        size=size, seed=seed, split="heldout", device=device, meshes=Path(meshes) if meshes else None,
-        envmaps=Path(envmaps) if envmaps else None,
-    )  # fmt: skip
-    produce(folder, options, count=count)
-    return folder
-
-
-def lost(data: Path, split: str) -> dict[str, Any]:
-    """How many scenes of an InteriorVerse split are not there, and how many pictures have been scored without them."""
-    from materialist.io.datasets import InteriorVerse, is_interiorverse
-
-    if photo_folders(data) or not is_interiorverse(data):
-        return {}
-    source = InteriorVerse(data, split)
-    return {"pictures there": len(source), "scenes missing": len(source.missing), "pictures without maps": source.bare}
-
-
-def labelled(
-    data: Path, *, split: str = "test", limit: int = 0, photographic: bool = True, unreadable: list[str] | None = None
-) -> Iterator[tuple[str, Photo, Prediction]]:
-    """(name, photo, truth) of every sample; see the module for what `data` may be. Raises InputError.
-
-    Samples that cannot be read are left out, and told in `unreadable`, if given.
-    """
-    for name, read in _samples(data, split, limit, photographic):
-        try:
-            yield name, *read()
-        except InputError as error:
-            if unreadable is None:
-                raise
-            unreadable.append(str(error))
-
-
-def _samples(
-    data: Path, split: str, limit: int, photographic: bool
-) -> Iterator[tuple[str, Callable[[], tuple[Photo, Prediction]]]]:
-    """(name, what reads it) of every sample."""
-    folders = photo_folders(data)
-    if folders:
-        yield from ((folder.name, partial(_read_folder, folder)) for folder in _spread(folders, limit))
-        return
-    from materialist.io.datasets import open_source
-    from materialist.io.samples import SampleFolder
-    from materialist.procedural.photographic import as_photo
-
-    source = open_source(data, split=split)
-    procedural = isinstance(source, SampleFolder)
-
-    def read(index: int) -> tuple[Photo, Prediction]:
-        sample = source.read(index)
-        seen = as_photo(sample, np.random.default_rng((11, index))) if procedural and photographic else sample
-        linear = np.clip(seen.image, 0, 1).astype(np.float32)
-        height, width = linear.shape[:2]
-        fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
-        photo = Photo(linear=linear, camera=Camera(width, height, float(fov)), original=linear, fov_source="option")
-        return photo, sample.truth()
-
-    yield from ((f"{index:07d}", partial(read, index)) for index in _spread(list(range(len(source))), limit))
-
-
-def absent_maps(truth: Prediction) -> list[str]:
-    """Names of the maps that a truth lacks; what stands in their place is no truth."""
-    return [name for name in MAPS if truth.sources and name not in truth.sources]
+        source = open_source(data, split=self.split)
+        if isinstance(source, InteriorVerse):
+            report.settings["left out"] = " ".join(source.notes()) or None
+        for index in _spread(list(range(len(source))), self.limit):
+            sample = source.read(index)
+            spoilt = self.photographic and isinstance(source, SampleFolder)
+            seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
+            linear = np.clip(seen.image, 0, 1).astype(np.float32)
+            height, width = linear.shape[:2]
+            fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
+            camera = Camera(width, height, float(fov))
+            photo = Photo(linear=linear, camera=camera, original=linear, fov_source="option")
+            yield f"{index:07d}", photo, sample.truth()
 
 
 def photo_folders(data: Path) -> list[Path]:
-    """Folders with a photo and true maps: `data` itself or those in it. The maps lie beside the photo or in maps/."""
-    places = [data, *sorted(p for p in data.iterdir() if p.is_dir())] if data.is_dir() else []
-    return [p for p in places if _photo(p) is not None and _maps(p) is not None]
-
-
-def _photo(folder: Path) -> Path | None:
-    return next((p for s in ("exr", "png", "jpg") if (p := folder / f"photo.{s}").is_file()), None)
-
-
-def _maps(folder: Path) -> Path | None:
-    return next((p for p in (folder / "maps", folder) if any(p.glob("albedo.*"))), None)
+    """Folders with a file photo.* and true maps in maps/: `data` itself or those in it."""
+    places = [data, *sorted(p for p in data.iterdir() if p.is_dir())]
+    return [p for p in places if any(p.glob("photo.*")) and any(p.glob("maps/albedo.*"))]
 
 
 def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
@@ -228,9 +125,8 @@ def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     from materialist.io.photo import read_photo
     from materialist.predict.maps import MapsPredictor
 
-    path, maps = _photo(folder), _maps(folder)
-    assert path is not None and maps is not None
-    photo = read_photo(str(path), size=1024)
+    maps = folder / "maps"
+    photo = read_photo(str(min(folder.glob("photo.*"))), size=1024)
     truth = MapsPredictor(maps).predict(photo)
     there = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
     return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=there)
@@ -243,20 +139,15 @@ def _spread(things: list, limit: int) -> list:
     return [things[k] for k in np.unique(np.linspace(0, len(things) - 1, limit).astype(int))]
 
 
-def _scored(source: Any, photo: Photo, truth: Prediction, seed: int) -> tuple[Prediction, dict[str, float]]:
-    """The prediction and its figures."""
-    from materialist.bench.predictors import predicted
+def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
+    """The figures of a prediction; none of the maps that the truth lacks, in whose place something else stands."""
     from materialist.metrics.maps import ordinal_accuracy, score
 
-    prediction, seconds = predicted(source, photo, seed)
-    found = score(prediction, truth)
-    surface = truth.depth > 0
+    figures, surface = score(found, truth), truth.depth > 0
     if surface.any():
-        found["depth_order"] = ordinal_accuracy(prediction.depth, truth.depth)
-        found |= _perceptual(prediction.materials, truth.materials, surface)
-    absent = tuple(f"{name}_" for name in absent_maps(truth))
-    found = {key: value for key, value in found.items() if not key.startswith(absent)} if absent else found
-    return prediction, {**found, "seconds": seconds}
+        figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
+        figures |= _perceptual(found.materials, truth.materials, surface)
+    return {key: value for key, value in figures.items() if not key.startswith(tuple(f"{name}_" for name in absent))}
 
 
 def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, float]:
@@ -274,20 +165,12 @@ def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, 
     return out
 
 
-def _with_pooled(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows with the pooled PSNRs of their method, the same in each, so that the table of means shows them."""
+def _pool(rows: list[Row]) -> None:
+    """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
     from materialist.metrics.maps import summary
 
-    figures = ("roughness_psnr_pooled", "metallic_psnr_pooled")
-    pooled = {}
     for method in {row["method"] for row in rows}:
-        means = summary([{k: v for k, v in r.items() if k.endswith("_mse")} for r in rows if r["method"] == method])
-        pooled[method] = {k: means[k] for k in figures if k in means}
-    return [{**row, **pooled[row["method"]]} for row in rows]
-
-
-def _draw(lines: list[list], path: Path) -> None:
-    """Each picture with the maps of every predictor under each other, the truth last."""
-    from materialist.io.display import strip, write_sheet
-
-    write_sheet([strip(image, *predictions) for image, *predictions in lines], path)
+        own = [row for row in rows if row["method"] == method]
+        means = summary([{key: value for key, value in row.items() if key.endswith("_mse")} for row in own])
+        for row in own:
+            row.update({key: value for key, value in means.items() if key.endswith("_psnr_pooled")})

@@ -1,83 +1,72 @@
 """`bench predictor`: how long a prediction takes, by the paper's protocol (Table 2, "Time").
 
-Noise as input, batch 1, 50 warm-ups, then 500 runs; mean and median. `network` is the forward pass alone, which is what
-the paper times; `predict` is everything from the photo to the maps.
+Uniform noise as the photo, batch 1. `network` is the forward pass alone, what the paper times; `predict` is everything
+from the photo to the maps, resizing and refinement included.
 """
 
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import Benchmark
-from materialist.bench.report import Column, Report, write
+from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist.bench.report import Column, Report
+from materialist.option_kinds import option
 from materialist.types import Camera, Photo
-
-COLUMNS = (
-    Column("mean_ms", "mean ms", "lower", 1),
-    Column("median_ms", "median ms", "lower", 1),
-    Column("fastest_ms", "fastest ms", "lower", 1),
-    Column("parameters_m", "million parameters", digits=2),
-)
-NOTE = (
-    "Uniform noise as the photo, batch 1. `network` is the forward pass alone, what the paper times; `predict` is "
-    "everything from the photo to the maps, resizing and refinement included."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PredictorBench(Benchmark):
-    """Time predictors (comma-separated) on a square of `size` pixels; `threads` 0 leaves their number as it is."""
+    """Time predictors."""
 
-    least: ClassVar = {"runs": 1, "size": 32}
+    columns = (
+        Column("mean_ms", "mean ms", "lower", 1),
+        Column("median_ms", "median ms", "lower", 1),
+        Column("fastest_ms", "fastest ms", "lower", 1),
+        Column("parameters_m", "million parameters", digits=2),
+    )
+    plotted = ("median_ms",)
 
-    predictor: str = "auto"
-    size: int = 512
-    warmups: int = 50
-    runs: int = 500
-    threads: int = 0
+    predictor: str = option("auto", "Names, with commas.", kind="name")
+    size: int = option(512, "Width and height of the photo.", **SIZE)
+    warmups: int = option(50, "Calls that do not count.", **COUNT_OR_0)
+    runs: int = option(500, "Calls that do.", **COUNT)
+    threads: int = option(0, "Of torch; 0 leaves their number.", **COUNT_OR_0)
 
-    def run(self, data: Path | None, output: Path) -> None:
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         import torch
+
+        from materialist.predict import get_predictor
 
         if self.threads:
             torch.set_num_threads(self.threads)
-        from materialist.bench.predictors import opened, specs_of
-
+        report.settings.update(threads=torch.get_num_threads(), cores=os.cpu_count())
         noise = np.random.default_rng(self.seed).random((self.size, self.size, 3), dtype=np.float32)
         photo = Photo(linear=noise, camera=Camera(self.size, self.size), original=noise)
-        rows = []
-        for spec in specs_of(self.predictor):
-            source = opened(spec, self.device)
+        for spec in names("predictor", self.predictor):
+            source: Any = get_predictor(spec, device=self.device)
             network = getattr(source, "network", None)
-            weights = {} if network is None else {"parameters_m": sum(p.numel() for p in network.parameters()) / 1e6}
             work: dict[str, Callable[[], Any]] = {"predict": partial(source.predict, photo, seed=self.seed)}
+            weights = {}
             if network is not None:
+                weights["parameters_m"] = sum(p.numel() for p in network.parameters()) / 1e6
                 work = {"network": forward(network, self.size), **work}
             for name, call in work.items():
-                rows.append(
-                    {"method": f"{spec} {name}", "sample": 0, **weights, **timed(call, self.warmups, self.runs)}
-                )
-        settings = self.settings(data, threads=torch.get_num_threads(), cores=os.cpu_count())
-        write(Report("Time of a prediction", NOTE, settings, COLUMNS, rows, plotted=("median_ms",)), output)
+                spent = milliseconds(call, self.warmups, self.runs)
+                yield {"method": f"{spec} {name}", "sample": 0, **weights, **spent}
 
 
-def timed(call: Callable[[], Any], warmups: int, runs: int) -> dict[str, float]:
+def milliseconds(call: Callable[[], Any], warmups: int, runs: int) -> dict[str, float]:
     """Milliseconds of `call` after warm-ups: mean_ms, median_ms, fastest_ms."""
     for _ in range(warmups):
         call()
-    taken = np.empty(runs)
-    for k in range(runs):
-        start = time.perf_counter()
-        call()
-        taken[k] = 1e3 * (time.perf_counter() - start)
+    taken = 1e3 * np.array([timed(call)[1]["seconds"] for _ in range(runs)])
     return {"mean_ms": float(taken.mean()), "median_ms": float(np.median(taken)), "fastest_ms": float(taken.min())}
 
 

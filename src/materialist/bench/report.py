@@ -1,21 +1,22 @@
-"""Reports of benchmarks: all rows as JSON, the means as a Markdown table, and one plot."""
+"""Reports of benchmarks: all rows as JSON, the means as a Markdown table, a plot, and a sheet of pictures."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
 from materialist.io.atomic import make_folder
+from materialist.io.display import write_sheet
 from materialist.plain import plain
+from materialist.types import Array
 
 CEILING = "ceiling"
 """How the method names of rows begin that no method can beat: they do not compete for the best figure."""
@@ -42,28 +43,17 @@ class Report:
     """What was done and how to read the figures: the text above the table."""
     settings: dict[str, Any]
     columns: tuple[Column, ...]
-    rows: Sequence[dict[str, Any]]
-    """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
     plotted: tuple[str, ...] = ()
     """Keys of the columns in the plot."""
-    draw: Callable[[Report, Path], None] | None = None
-    """Draws the plot to a path instead: draw(report, path)."""
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
+    sheet: list[Array] = field(default_factory=list)
+    """Strips of pictures, uint8 [h, w, 3] sRGB, which sheet.png has under each other."""
 
 
-class Pace:
-    """Says when a report that grows is to be written again: at first, then every SECONDS."""
-
-    SECONDS = 20.0
-
-    def __init__(self) -> None:
-        self._next = 0.0
-
-    def due(self) -> bool:
-        """Whether it is time; the next time is counted from here."""
-        if time.monotonic() < self._next:
-            return False
-        self._next = time.monotonic() + self.SECONDS
-        return True
+def strip(*pictures: Array) -> Array:
+    """uint8 [H, n W, 3] sRGB: linear pictures [H, W, 3] side by side."""
+    return np.round(linear_to_srgb(np.concatenate(pictures, 1)) * 255).astype(np.uint8)
 
 
 def claim(folder: Path, *, force: bool = False) -> Path:
@@ -78,14 +68,13 @@ def claim(folder: Path, *, force: bool = False) -> Path:
 
 
 def write(report: Report, folder: Path) -> None:
-    """Write report.json, report.md and plot.png; a report of the same run that is there already is replaced."""
+    """Write report.json, report.md, plot.png and sheet.png; files of the same run that are there are replaced."""
     try:
         _replace(folder / "report.json", json.dumps(as_dict(report), indent=1, default=float).encode())
         _replace(folder / "report.md", markdown(report).encode())
-        if report.rows and report.draw is not None:
-            report.draw(report, folder / "plot.png")
-        elif report.rows and report.plotted:
+        if report.rows and report.plotted:
             _plot(report, folder / "plot.png")
+        write_sheet(report.sheet, folder / "sheet.png")
     except OSError as error:
         raise OutputError(f"The report cannot be written to {folder}: {error.strerror or error}.") from error
 

@@ -2,83 +2,72 @@
 
 Data: Intrinsic Images in the Wild (Bell et al. 2014), one NAME.png and NAME.json a picture. In the JSON,
 `intrinsic_points` have id, x, y (in [0, 1]) and opaque, and `intrinsic_comparisons` have point1, point2, darker ('1',
-'2' or 'E') and darker_score. WHDR is the weighted part of the judgements that the albedo contradicts: 0 is perfect, and
-an albedo that is the same everywhere only agrees with the 'E's.
+'2' or 'E') and darker_score. WHDR is the part of the human judgements, weighted by their confidence, that the
+albedo contradicts: 0 is perfect. Brightness is the mean of linear red, green and blue; means are over pictures.
+`constant` is the albedo that is the same everywhere and only agrees with the 'E's, `photo` the photo itself.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import Benchmark
-from materialist.bench.report import Column, Pace, Report, write
+from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist.bench.report import Column, Report
 from materialist.errors import InputError
+from materialist.option_kinds import option
 from materialist.types import Array
 
-DELTA = 0.1
-"""Relative difference from which two albedos count as different (Bell et al. 2014, and the paper)."""
-LEAST = 1e-10
-"""Smallest brightness that a ratio is taken of."""
 BASELINES = ("constant", "photo")
 """Albedos that need no predictor: the same everywhere, and the photo itself."""
-COLUMNS = (
-    Column("whdr", "WHDR", "lower", 4),
-    Column("judgements", "judgements", digits=0),
-    Column("seconds", "s", "lower", 2),
-)
-NOTE = (
-    "Part of the human judgements of Intrinsic Images in the Wild (weighted by their confidence) that the albedo "
-    "contradicts; delta = {delta:g}; brightness is the mean of linear red, green and blue; mean over pictures. "
-    "`constant` and `photo` are the albedo that is the same everywhere and the photo itself."
-)
 
 
 @dataclass(frozen=True, kw_only=True)
 class WhdrBench(Benchmark):
-    """Score predictors (comma-separated) on the pictures in `data`.
+    """Score predictors on the pictures in `data`."""
 
-    `every` takes every how-manieth picture in the order of names, from the first on (5 is the usual test split of
-    Narihira et al.), `limit` at most so many (0: all), `size` is the longer side that the predictor works at.
-    """
+    columns = (
+        Column("whdr", "WHDR", "lower", 4),
+        Column("judgements", "judgements", digits=0),
+        Column("seconds", "s", "lower", 2),
+    )
+    plotted = ("whdr",)
 
-    predictor: str = "auto"
-    size: int = 512
-    limit: int = 0
-    every: int = 1
-    delta: float = DELTA
+    predictor: str = option("auto", "Names, with commas.", kind="name")
+    size: int = option(512, "Longer side that the predictor works at.", **SIZE)
+    limit: int = option(0, "At most so many pictures; 0: all.", **COUNT_OR_0)
+    every: int = option(1, "Every how-manieth by name; 5 is the usual test split (Narihira et al.).", **COUNT)
+    delta: float = option(0.1, "Relative difference from which albedos differ.", low=0, high=10)
 
-    def run(self, data: Path | None, output: Path) -> None:
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        from materialist.io.photo import read_photo
+        from materialist.predict import get_predictor
+
         if data is None:
             raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
-        pairs = find(data)[:: max(1, self.every)]
+        pairs = find(data)[:: self.every]
         pairs = pairs[: self.limit] if self.limit else pairs
-        from materialist.bench.predictors import opened, specs_of
-
-        sources = {spec: opened(spec, self.device) for spec in specs_of(self.predictor)}
-        rows: list[dict[str, Any]] = []
-        lost: dict[str, str] = {}
-        pace = Pace()
-        settings = self.settings(data, pictures=len(pairs))
-        report = Report("WHDR", NOTE.format(delta=self.delta), settings, COLUMNS, rows, plotted=("whdr",))
-        for spec in (*BASELINES, *sources):
-            for picture, judged in pairs:
-                if picture.name in lost:
-                    continue
+        report.settings["pictures"] = len(pairs)
+        sources: dict[str, Any] = dict.fromkeys(BASELINES)
+        sources |= {spec: get_predictor(spec, device=self.device) for spec in names("predictor", self.predictor)}
+        for spec, source in sources.items():
+            for picture, file in pairs:
+                photo = read_photo(picture, size=self.size)
+                albedo, cost = np.ones_like(photo.linear) if spec == "constant" else photo.linear, {}
+                if source is not None:
+                    found, cost = timed(lambda s=source, p=photo: s.predict(p, seed=self.seed))
+                    albedo = found.materials.albedo
                 try:
-                    rows.append(_row(spec, sources.get(spec), picture, judged, self.size, self.delta, self.seed))
-                except InputError as error:
-                    lost[picture.name] = str(error)
-                    settings |= {"pictures": len(pairs) - len(lost), "unreadable": "; ".join(lost.values())}
-                if pace.due():
-                    write(report, output)
-        if not rows:
-            raise InputError(next(iter(lost.values())))
-        write(report, output)
+                    error, count = whdr(albedo, json.loads(file.read_text("utf-8")), self.delta)
+                except (OSError, ValueError, KeyError, TypeError) as wrong:
+                    raise InputError(f"{file} does not hold judgements in IIW's layout ({wrong!r}).") from wrong
+                row = {"method": spec, "sample": picture.stem, "whdr": error, "judgements": count}
+                yield row | {"seconds": cost.get("seconds", np.nan)}
 
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
@@ -93,7 +82,7 @@ def find(folder: Path) -> list[tuple[Path, Path]]:
     return found
 
 
-def whdr(albedo: Array, judgements: dict[str, Any], delta: float = DELTA) -> tuple[float, int]:
+def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple[float, int]:
     """WHDR of a linear albedo [H, W, 3], and how many judgements counted; NaN when none does.
 
     Judgements count when both points are opaque, the answer is '1', '2' or 'E', and its score is positive.
@@ -108,41 +97,9 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = DELTA) -> tup
         if answer not in ("1", "2", "E") or not weight or weight <= 0 or not all(p["opaque"] for p in pair):
             continue
         places = [(min(int(p["y"] * height), height - 1), min(int(p["x"] * width), width - 1)) for p in pair]
-        first, second = (max(LEAST, float(albedo[place].mean())) for place in places)
+        first, second = (max(1e-10, float(albedo[place].mean())) for place in places)
         said = "1" if second / first > 1 + delta else "2" if first / second > 1 + delta else "E"
         wrong += weight * (said != answer)
         total += weight
         count += 1
     return (wrong / total if total else float("nan")), count
-
-
-def _row(spec: str, source: Any, picture: Path, judged: Path, size: int, delta: float, seed: int) -> dict[str, Any]:
-    """One picture by one method."""
-    from materialist.bench.predictors import predicted
-    from materialist.io.photo import read_photo
-
-    photo = read_photo(picture, size=size)
-    if source is None:
-        albedo, seconds = (np.ones_like(photo.linear) if spec == "constant" else photo.linear), float("nan")
-    else:
-        prediction, seconds = predicted(source, photo, seed)
-        albedo = prediction.materials.albedo
-    error, count = whdr(albedo, _read(judged), delta)
-    return {"method": spec, "sample": picture.stem, "whdr": error, "judgements": count, "seconds": seconds}
-
-
-def _read(path: Path) -> dict[str, Any]:
-    """The judgements in a file; raises InputError when they are not in IIW's layout."""
-    try:
-        content = json.loads(path.read_text("utf-8"))
-        known = {point["id"] for point in content["intrinsic_points"]}
-        for comparison in content["intrinsic_comparisons"]:
-            for name in ("point1", "point2"):
-                if comparison[name] not in known:
-                    raise InputError(f"{path}: a comparison is of point {comparison[name]}, which is not in the file.")
-            _ = comparison["darker"], comparison["darker_score"]
-        for point in content["intrinsic_points"]:
-            _ = float(point["x"]), float(point["y"]), point["opaque"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path} does not hold judgements in IIW's layout ({error}).") from error
-    return content

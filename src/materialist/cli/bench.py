@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -45,37 +45,18 @@ def bench(
     report_success("bench", as_json, [f"Look at {output}"], name=name, report=str(output))
 
 
-def parse_extra(arguments: list[str]) -> dict[str, Any]:
-    """`--scenes 10 --quick size=256` as {"scenes": 10, "quick": True, "size": 256}. Raises InputError."""
-    options: dict[str, Any] = {}
+def parse_extra(arguments: list[str]) -> dict[str, str | bool]:
+    """`--scenes 10 --quick size=256` as {"scenes": "10", "quick": True, "size": "256"}. Raises InputError."""
+    options: dict[str, str | bool] = {}
     waiting: str | None = None
     for argument in arguments:
-        if argument.startswith("--"):
-            name, equals, value = argument[2:].partition("=")
-            options[_key(name)] = _value(value) if equals else True
-            waiting = None if equals else _key(name)
-        elif argument.partition("=")[0].isidentifier() and "=" in argument:
-            name, _, value = argument.partition("=")
-            options[name], waiting = _value(value), None
+        name, equals, value = argument.partition("=")
+        key = name.removeprefix("--").replace("-", "_")
+        if key.isidentifier() and (argument.startswith("--") or equals):
+            options[key] = value if equals else True
+            waiting = None if equals else key
         elif waiting is not None:
-            options[waiting], waiting = _value(argument), None
+            options[waiting], waiting = argument, None
         else:
             raise InputError(f"{argument!r} is not an option; write --name value or name=value.")
     return options
-
-
-def _key(name: str) -> str:
-    key = name.replace("-", "_")
-    if not key.isidentifier():
-        raise InputError(f"{name!r} is not the name of an option.")
-    return key
-
-
-def _value(text: str) -> int | float | bool | str:
-    """The number or truth value that the text spells, else the text."""
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return {"true": True, "false": False}.get(text.lower(), text)

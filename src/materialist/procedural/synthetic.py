@@ -101,7 +101,7 @@ class TrueScene:
         self.camera = Camera(width, height, view.fov)
         self.items = items
         shapes = {f"item{k:02d}": _mesh(item, k) for k, item in enumerate(items)}
-        self._scene = mi.load_dict({"type": "scene", "sensor": _sensor(self.camera), "light": _emitter(), **shapes})
+        self._scene = mi.load_dict({"type": "scene", "sensor": sensor(self.camera), "light": _emitter(), **shapes})
         self._params = mi.traverse(self._scene)
         self._params.keep(["light.data"])
         self._item_of_shape = _registry(list(shapes.values()))
@@ -214,27 +214,26 @@ def _mesh(item: scenes.Item, number: int) -> Any:
 
     maps = {"base_color": texture(item.albedo)}
     maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
+    return mitsuba_mesh(item.solid, {"type": "materialist_disney", **maps}, f"item{number:02d}")
+
+
+def mitsuba_mesh(solid: Any, bsdf: dict[str, Any], name: str = "mesh") -> Any:
+    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
+    import mitsuba as mi
+
     props = mi.Properties()
-    props["bsdf"] = mi.load_dict({"type": "materialist_disney", **maps})
-    solid = item.solid
+    props["bsdf"] = mi.load_dict(bsdf)
     mesh = mi.Mesh(
-        f"item{number:02d}",
-        len(solid.vertices),
-        len(solid.faces),
-        props=props,
-        has_vertex_normals=True,
-        has_vertex_texcoords=True,
+        name, len(solid.vertices), len(solid.faces), props=props, has_vertex_normals=True, has_vertex_texcoords=True
     )
     params = mi.traverse(mesh)
-    params["vertex_positions"] = floats(mi, solid.vertices)
-    params["vertex_normals"] = floats(mi, solid.normals)
-    params["vertex_texcoords"] = floats(mi, solid.uv)
-    params["faces"] = integers(mi, solid.faces)
+    params["vertex_positions"], params["vertex_normals"] = floats(mi, solid.vertices), floats(mi, solid.normals)
+    params["vertex_texcoords"], params["faces"] = floats(mi, solid.uv), integers(mi, solid.faces)
     params.update()
     return mesh
 
 
-def _sensor(camera: Camera) -> dict[str, Any]:
+def sensor(camera: Camera) -> dict[str, Any]:
     """Pinhole at the origin looking along -Z; every pixel is the mean over its own square."""
     import mitsuba as mi
 
