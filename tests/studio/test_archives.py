@@ -10,7 +10,7 @@ from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
-from materialist.studio import StudioSettings, archives, objects
+from materialist.studio import StudioSettings, archives, objects, uploads
 from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
@@ -24,7 +24,7 @@ def packed(session, tmp_path):
     write_png_bytes(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
-    session.material(texture=store(session.workspace, tmp_path / "wood.png", "texture", ".png"), roughness="0.3")
+    session.set("edit", texture=store(session.workspace, tmp_path / "wood.png", "texture", ".png"), roughness="0.3")
     session.light(envmap=store(session.workspace, tmp_path / "sky.exr", "light", ".exr"), gain="auto")
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
@@ -64,7 +64,7 @@ def test_a_list_of_another_photo_does_not_take_this_one_s_files(studio, session,
     other = other_photo(studio, session)
     for page, at in ((session, (25, 24)), (other, (50, 40))):
         click(page, *at)
-        page.material(hue="40")
+        page.set("edit", hue="40")
     masks = [page.edits.steps[0].options["mask"] for page in (session, other)]
     assert masks[0] != masks[1]
     before = other.edits
@@ -92,13 +92,13 @@ LIST = "- edit: {mask: m.png, hue: 3}"
         ({"edits.yaml": "- edit: {mask: /etc/hostname}"}, "plain file name"),
         ({"edits.yaml": LIST, "m.png": "no picture"}, "not an image"),
         ({"edits.yaml": LIST, "a/m.png": "x"}, "lacks the file"),
-        ({"edits.yaml": LIST, "m.png": "x" * 3_000_000}, "takes up to 2 MB a file"),
+        ({"edits.yaml": LIST, "m.png": "x" * 3_000_000}, "takes up to 2 MB"),
         ({"edits.yaml": "- drop: {mesh: [a.exe], at: [1, 2]}", "a.exe": "MZ"}, "not a mesh"),
         ({"edits.yaml": "- explode: {}"}, "must be one of"),
     ],
 )  # fmt: skip
 def test_zips_that_are_refused(tmp_path, monkeypatch, members, words):
-    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(upload_megabytes=2))
+    monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(upload_megabytes=2))
     desk = tmp_path / "desk"
     desk.mkdir()
     with pytest.raises(InputError, match=words) as error:

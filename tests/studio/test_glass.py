@@ -13,7 +13,7 @@ from studio_scenes import block, package, room
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import glass as studio_glass
-from materialist.studio.glass import GlassBodies, GlassClient, Pane, checked, is_traced
+from materialist.studio.glass import GlassClient, Pane, checked, is_traced
 from materialist.studio.preview import LivePreview
 from materialist.studio.widgets import tint_colour, tint_text
 from materialist.studio.workspace import write_mask
@@ -68,14 +68,6 @@ def test_the_last_value_wins_and_the_picture_is_kept(tracer, log):
     tracer.ask((), glass(1.3))  # the same wish again
     assert not tracer.state.waiting and len(log.read_text().splitlines()) == asked
     assert len({line.split()[0] for line in log.read_text().splitlines()}) == 1  # one process for all
-
-
-def test_another_object_does_not_wait_for_a_body_in_the_making(tracer, log):
-    tracer.ask((), glass(1.9))
-    until(lambda: "1.9" in log.read_text() and tracer.state.words.startswith("Building"))
-    tracer.ask((), glass(1.4, "mask-2.png"))
-    until(lambda: not tracer.state.waiting)
-    assert tracer.pane(glass(1.4, "mask-2.png")) is not None and tracer.pane(glass(1.9)) is None
 
 
 def test_failures_are_told_and_the_next_value_is_tried(tracer):
@@ -161,17 +153,16 @@ class _Report:
         self.stages.append(stage)
 
 
-def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path, monkeypatch):
+def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
     from materialist.edits.glass.preview import GlassPreview
 
-    monkeypatch.setattr(studio_glass, "_BODIES", GlassBodies())
     request = {
         "scene": str(package(tmp_path)), "folder": str(tmp_path), "others": [["relight", {"ambient": "0.5"}]],
         "glass": {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"},
     }  # fmt: skip
     first = _Report()
     pane = studio_glass.trace(first, request)
-    assert first.stages == ["load", "build", "trace"]
+    assert first.stages == ["build", "trace"]
     dim = replace(room(), envmap=room().envmap * 0.5)
     truth = GlassPreview(dim, block(), thickness="symmetry").picture(ior=1.2, tint=(1, 0.5, 0.5))
     top, bottom, left, right = pane.box
@@ -182,7 +173,7 @@ def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path, monkeyp
     assert pane.share.max() == 1 and (pane.share > 0.5).sum() > 0.8 * block().sum()
     late = _Report(outdated=True)
     assert studio_glass.trace(late, {**request, "glass": {**request["glass"], "ior": "1.4"}}) is None
-    assert late.stages == ["load"]  # the body is kept, and nothing is traced
+    assert late.stages == ["build"]  # the body is kept, and nothing is traced
     with pytest.raises(InputError, match="must be 4 numbers"):
         studio_glass.trace(_Report(), {**request, "glass": {"ior": "1.4", "box": "0,0,9"}})
 

@@ -26,7 +26,7 @@ def asked(studio: Studio, session, kind: str) -> Job:
 
 
 def test_renderings_end_with_their_page(studio, page):
-    jobs = {kind: asked(studio, page, kind) for kind in ("final", "take", "fall", "invert", "mesh")}
+    jobs = {kind: asked(studio, page, kind) for kind in ("final", "take", "invert", "mesh")}
     again = asked(studio, page, "final")  # the button pressed twice
     studio.leave("a page that is closed")
-    assert [jobs[kind].state for kind in jobs] == [STOPPED] * 3 + [QUEUED] * 2 and again.state == STOPPED
+    assert [jobs[kind].state for kind in jobs] == [STOPPED] * 2 + [QUEUED] * 2 and again.state == STOPPED

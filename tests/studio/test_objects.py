@@ -16,7 +16,7 @@ from materialist.studio.objects import library_file
 from materialist.studio.preview import LivePreview
 from materialist.studio.selection import read_pick
 from materialist.studio.stage import stage
-from materialist.studio.widgets import glass_values, object_values
+from materialist.studio.widgets import control_values
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):
@@ -46,30 +46,6 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     floor.close()
 
 
-def test_what_fell_in_vain_tumbles_in_another_way(session, monkeypatch):
-    objects.set_option(session, "mesh", library_file(session, "Ball"))
-    objects.place(session, 50, 40)
-    real, seeds = session.live.edited, []
-
-    def falls(steps):
-        if steps and steps[0].kind == "drop":
-            seeds.append(steps[0].options["seed"])
-            if len(seeds) < 3:
-                raise InputError("choose another seed")
-            return session.scene
-        return real(steps)
-
-    monkeypatch.setattr(session.live, "edited", falls)
-    for _ in range(2):
-        with pytest.raises(InputError, match="seed"):
-            objects.let_fall(session, 1.0)
-    assert objects.failures(session, session.edits.steps[0]) == 2
-    for _ in range(2):
-        objects.let_fall(session, 1.0)
-    assert seeds[:3] == ["0", "1", "2"] and session.edits.steps[0].options["seed"] == "3"
-    assert objects.failures(session, session.edits.steps[0]) == 0  # one that has landed counts anew
-
-
 def test_choosing_an_object_brings_its_values(session):
     objects.set_option(session, "mesh", library_file(session, "Ring"))
     for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):
@@ -78,22 +54,21 @@ def test_choosing_an_object_brings_its_values(session):
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     for name, value in (("scale", "2"), ("turn", None), ("material", "mirror")):
         objects.set_option(session, name, value)
-    assert object_values(session) == {}  # nothing in hand: the controls are for the next
+    assert "thing" not in control_values(session)  # nothing in hand: the controls are for the next
     objects.place(session, 15, 40)
     session.act("choose", 0)
     ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
-    assert object_values(session) == ring
     shown = named().everything(session)
     assert {name: shown[name] for name in ring} == ring
     session.deselect()
     objects.place(session, 30, 40)  # the next is as the controls show it
     assert session.edits.steps[2].options == {**session.edits.steps[0].options, "at": ["30", "40"]}
     session.act("choose", 1)
-    values = object_values(session)
+    values = control_values(session)
     assert (values["thing"], values["scale"], values["turn"], values["made_of"]) == ("Cube", 2, 0, "mirror")
-    fallen = objects.fallen(session.edits.steps[1], 2.5)
+    fallen = objects.fallen(session.edits.steps[1], 2.5, 0)
     session.edits = EditList((replace(fallen, options={**fallen.options, "mesh": "mesh-1.glb"}),), 0)
-    values = object_values(session)
+    values = control_values(session)
     assert (values["thing"], values["scale"], values["height"]) == (None, 2, 2.5)
 
 
@@ -126,11 +101,11 @@ class _Tracer:
 
     def __init__(self):
         self.asked, self.kept = [], None
-        self.state = GlassState(0, False, "")
+        self.state = GlassState()
 
     def ask(self, others, step):
         self.asked.append((others, step.options["ior"]))
-        self.state = GlassState(len(self.asked), True, "Tracing")
+        self.state = GlassState(True, "Tracing")
 
     def pane(self, step):
         return None
@@ -146,20 +121,20 @@ def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
     tracer = _Tracer()
     monkeypatch.setattr(session, "glass", tracer)
     click(session)
-    session.material(hue="90")
+    session.set("edit", hue="90")
     with pytest.raises(InputError, match="index of refraction"):
-        session.region_step("glass", ior="9")
-    session.region_step("glass", ior="1.3", transmission="1")
+        session.set("glass", ior="9")
+    session.set("glass", ior="1.3", transmission="1")
     shown = stage(session)
-    assert session.in_hand == "glass" and shown["waiting"] and shown["asked"] == 1 and "sketch" in shown["badge"]
+    assert session.in_hand == "glass" and shown["waiting"] and "tracing" in shown["badge"]
     assert [(len(others), ior) for others, ior in tracer.asked] == [(1, "1.3")]
-    session.material(kind="glass", ior="1.4")
+    session.set("glass", ior="1.4")
     stage(session)
-    assert tracer.asked[-1][1] == "1.4" and glass_values(session)["glass_ior"] == 1.4
+    assert tracer.asked[-1][1] == "1.4" and control_values(session)["glass_ior"] == 1.4
     session.act("choose", 0)
-    session.material(hue="100")
+    session.set("edit", hue="100")
     stage(session)
-    assert len(tracer.asked) == 2 and glass_values(session) == {}  # another edit is in hand
+    assert len(tracer.asked) == 2 and "glass_ior" not in control_values(session)  # another edit is in hand
     session.act("remove", 1)
     assert [step.kind for step in tracer.kept] == ["edit"]
 

@@ -16,7 +16,7 @@ def test_a_photo_that_fails_leaves_the_open_one_known(studio, session, end):
     project = studio.work.new("Too dark", "me")
     job = Job("invert", "me", project.folder, tasks.invert, state=end)
     updates = list(_following(named(studio), session, project, job))
-    assert updates[0]["last"] == studio.bookmark(project) and updates[-1]["last"] == studio.bookmark(session.project)
+    assert updates[0]["last"] == project.name and updates[-1]["last"] == session.project.name
     assert not project.folder.exists()
     nothing = studio.session("an empty page", "me")
     project = studio.work.new("Too dark", "me")
@@ -26,7 +26,7 @@ def test_a_photo_that_fails_leaves_the_open_one_known(studio, session, end):
 
 def test_a_click_before_the_preview_is_ready_shows_at_once(studio, session, monkeypatch):
     click(session)
-    session.material(hue="90")
+    session.set("edit", hue="90")
     steps = _opened(named(studio), session, session.project)
     next(steps)
     first = next(steps)

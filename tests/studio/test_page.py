@@ -231,7 +231,7 @@ def test_the_whole_story(page, running, tmp_path):
     opened(page, address)
     page.get_by_role("tab", name="Open").click()
     page.set_input_files("#file input[type=file]", str(tmp_path / "coffee.png"))
-    page.wait_for_selector("#facts >> text=35.0°")
+    page.wait_for_selector("#facts >> text=is ready")
     page.get_by_label("Working size").click()
     page.get_by_role("option", name="256").click()
     page.click("#start")

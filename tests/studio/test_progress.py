@@ -2,19 +2,9 @@
 
 import pytest
 
-from materialist.jobs.queue import RUNNING, Job, JobQueue
+from materialist.jobs.queue import Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import progress, tasks
-
-
-def test_the_bar_never_runs_back(tmp_path):
-    job = Job("invert", "me", tmp_path, tasks.invert, state=RUNNING)
-    shares = []
-    stages = [("read", 0), ("predict", 0), ("light", 60), ("light", 120), ("light", 1), ("trace", 9)]
-    for stage, done in (*stages, ("materials", 5), ("light", 3), ("rerender", 0)):
-        job.stage, job.done, job.total = stage, done, 120
-        shares.append(progress.share(job))
-    assert shares == sorted(shares) and 0 < shares[2] < shares[3] < shares[6] < shares[-1] < 1
 
 
 @pytest.mark.parametrize(

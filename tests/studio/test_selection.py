@@ -25,14 +25,6 @@ def test_click_add_and_remove():
     assert one.click(scene, 50, 40, "remove") is one
 
 
-def test_taking_away_leaves_the_rest_of_a_larger_region():
-    scene = room()
-    wide = np.ones(scene.depth.shape, bool)
-    left = Selection((wide,)).click(scene, 25, 24, "remove").mask
-    assert left is not None and overlap(~left, block()) > 0.9
-    assert Selection().click(scene, 25, 24, "new").click(scene, 25, 24, "remove").mask is None
-
-
 def test_box_and_brush():
     scene = room()
     boxed = Selection().box(scene, [12, 12, 40, 36], "new")

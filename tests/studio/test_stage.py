@@ -9,8 +9,6 @@ from studio_scenes import block, package, room
 
 from materialist.edits.light.relight import checked_envmap
 from materialist.edits.recipe import read_recipe
-from materialist.errors import InputError
-from materialist.io.examples import example_path
 from materialist.studio import lights, stage, tasks
 from materialist.studio.selection import Selection
 
@@ -58,21 +56,12 @@ class Told:
         self.pictures.append((name, file))
 
 
-def test_the_photo_task(tmp_path):
-    facts = tasks.photo(Told(), str(example_path("coffee")), str(tmp_path / "small.jpg"))
-    assert (facts["width"], facts["height"], facts["fov"], facts["fov_source"]) == (600, 400, 35.0, "default")
-    assert cv2.imread(str(tmp_path / "small.jpg")).shape == (341, 512, 3)
-    (tmp_path / "broken.png").write_bytes(example_path("coffee").read_bytes()[:5000])
-    with pytest.raises(InputError, match="damaged"):
-        tasks.photo(Told(), str(tmp_path / "broken.png"), str(tmp_path / "small.jpg"))
-
-
 def test_what_was_found_is_shown(tmp_path):
     told = Told()
     for name, value in (("prior", room().prior), ("light", room().envmap), ("materials", room().materials)):
         tasks._show(told, tmp_path, name, value)
     names = [name for name, _ in told.pictures]
-    assert names[:2] == ["first depth", "first normals"] and "light" in names and names[-1] == "metallic"
+    assert names[:2] == ["depth", "normals"] and "light" in names and names[-1] == "metallic"
     assert all((tmp_path / file).is_file() for _, file in told.pictures)
 
 

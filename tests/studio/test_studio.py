@@ -20,16 +20,6 @@ def shared(tmp_path):
     studio.jobs.close()
 
 
-def test_a_page_shows_what_it_showed_before_or_what_the_studio_was_started_on(shared):
-    mine, given = shared.work.new("Mine", "a" * 16), shared.work.new("Given", ALONE)
-    assert shared.is_bookmark(shared.bookmark(mine)) and not shared.is_bookmark("other/" + mine.name)
-    assert not shared.is_bookmark("")
-    assert shared.first("") == "" and shared.first(None) == "" and shared.first(shared.bookmark(mine)) == mine.name
-    shared.start = given
-    assert shared.first("") == given.name and shared.first(shared.bookmark(mine)) == mine.name
-    assert shared.first(f"another/{mine.name}") == given.name  # of a studio that has ended
-
-
 def test_people_are_kept_apart(shared):
     anna, bert = "a" * 16, "b" * 16
     project = shared.work.new("Anna's", anna)

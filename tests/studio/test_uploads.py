@@ -74,23 +74,6 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
 
 
-def test_a_scene_with_bodies_comes_back(tmp_path):
-    from made_meshes import box_file, floor_scene
-
-    from materialist.edits.insert.insert import insert
-    from materialist.io.package import save_scene
-
-    scene = insert(floor_scene(), box_file(tmp_path / "box.ply"), (24, 26))
-    save_scene(scene, tmp_path / "a.scene")
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
-        for file in sorted((tmp_path / "a.scene").rglob("*")):
-            pack.write(file, file.relative_to(tmp_path))
-    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "b.scene", "a.zip")
-    again = load_scene(tmp_path / "b.scene")
-    np.testing.assert_allclose(again.bodies[0].vertices, scene.bodies[0].vertices, atol=1e-6)
-    assert (tmp_path / "b.scene" / "bodies").is_dir()
-
-
 def test_zips_that_are_none(tmp_path, monkeypatch):
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(InputError, match="not a readable zip"):

@@ -145,7 +145,7 @@ def _dropped(page: Any, photo: Path, size: int) -> float:
     page.get_by_role("option", name=f"{size} pixels").click()
     start = time.perf_counter()
     page.set_input_files("#file input[type=file]", str(photo))
-    page.wait_for_selector("#facts img")
+    page.wait_for_selector("#facts >> text=is ready")
     page.click("#start")
     return start
 

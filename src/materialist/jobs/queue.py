@@ -38,8 +38,6 @@ class Job:
     stage: str = ""
     done: int = 0
     total: int = 0
-    shown: float = 0.0
-    """The longest that its bar was, in [0, 1]: it never runs back."""
     message: str = ""
     """One sentence where it failed."""
     found: list[dict[str, Any]] = field(default_factory=list)
@@ -79,7 +77,7 @@ class JobQueue:
             now = time.monotonic()
             self._jobs = [j for j in self._jobs if not j.over or now - (j.ended or now) < KEPT_SECONDS]
             self._jobs.append(job)
-        self._threads.submit(self.run, job)
+        self._threads.submit(self._run, job)
         return job
 
     def ahead(self, job: Job) -> int:
@@ -109,17 +107,16 @@ class JobQueue:
             self.stop(job)
         self._threads.shutdown(wait=False, cancel_futures=True)
 
-    def run(self, job: Job) -> Job:
-        """Run a job now, beside the queue; returns when it is over."""
+    def _run(self, job: Job) -> None:
         with self._lock:
             if job.over:
-                return job
+                return
             job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
             try:
                 job.worker = worker = Worker(niceness=NICENESS)
             except OSError as error:
                 job.end(FAILED, f"The work cannot be started: {error}.")
-                return job
+                return
         worker.begin(job.task, job.arguments)
         try:
             for message in worker.messages():
@@ -133,8 +130,9 @@ class JobQueue:
         with self._lock:
             if message.kind == DONE:
                 job.result = message.facts
-            job.end(DONE if message.kind == DONE else FAILED, "" if message.kind == DONE else sentence(message.facts))
-        return job
+                job.end(DONE)
+            else:
+                job.end(FAILED, sentence(message.facts))
 
 
 def _note(job: Job, message: Message) -> None:

@@ -29,8 +29,6 @@ class StudioSettings:
     final_spp: int = 256  # paths a pixel of the final picture
     video_frames: int = 24  # of the turning light
     video_spp: int = 32  # paths a pixel of its frames
-    part: float = 0.4  # a found object is taken out of a selection if it covers less than this share of it,
-    inside: float = 0.9  # and if more than this share of the object lies in the selection
     message_seconds: float = 12  # a message stays on the page
     poll_seconds: float = 0.3  # between two looks at a job
     lamp_share: float = 0.75  # a new lamp hangs at this share of the way from the camera to the clicked surface

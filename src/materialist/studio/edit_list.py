@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 from materialist.edits.recipe import Step
@@ -88,15 +87,7 @@ def summary(step: Step) -> str:
 def _short(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"({len(value)})" if value and isinstance(value[0], list | tuple) else ",".join(_short(v) for v in value)
-    if isinstance(value, str) and "." in value and not _number(value):
-        stem = Path(value).stem
-        return "own" if _OWN.fullmatch(stem) else stem
-    return str(value)
-
-
-def _number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    file = re.fullmatch(r"(.*[A-Za-z_].*)\.\w+", str(value))
+    if file is None:
+        return str(value)
+    return "own" if _OWN.fullmatch(file[1]) else file[1]

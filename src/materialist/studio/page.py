@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -38,7 +39,9 @@ def build(studio: Studio) -> Any:
     parts = context.parts
     with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
         parts["token"] = gr.BrowserState("", storage_key="materialist-person", secret="page")
-        parts["last"] = gr.BrowserState("", storage_key="materialist-last", secret="page")
+        # A new studio has another key, so what it was started on is shown first.
+        key = f"materialist-last-{secrets.token_hex(4)}"
+        parts["last"] = gr.BrowserState("", storage_key=key, secret="page")
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):

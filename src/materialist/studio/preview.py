@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections import OrderedDict
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
@@ -38,8 +38,8 @@ class LivePreview:
 
     def __init__(self, scene: Scene):
         self.scene = scene
-        self._edited: OrderedDict[str, Scene] = OrderedDict()
-        self._panes: OrderedDict[str, tuple[Array, glass.Tint]] = OrderedDict()
+        self._edited: dict[str, Scene] = {}
+        self._panes: dict[str, tuple[Array, glass.Tint]] = {}
         self._preview: Future[Any] = _THREAD.submit(_build, scene)
 
     @property
@@ -58,19 +58,24 @@ class LivePreview:
         for step in steps:
             if glass.is_traced(step):
                 self._glass(step)
-        steps = tuple(step for step in steps if not glass.is_traced(step))
-        known, start = self.scene, 0
-        for count in range(len(steps), 0, -1):
-            hit = self._edited.get(_key(steps[:count]))
-            if hit is not None:
-                known, start = hit, count
-                break
-        for count in range(start + 1, len(steps) + 1):
-            known = _after(self.scene, known, steps[count - 1])
-            self._edited[_key(steps[:count])] = known
-        while len(self._edited) > SETTINGS.scenes_kept:
-            self._edited.popitem(last=False)
-        return known
+        return self._after(tuple(step for step in steps if not glass.is_traced(step)))
+
+    def _after(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
+
+        def make() -> Scene:
+            before, step = self._after(steps[:-1]), steps[-1]
+            try:
+                return apply(self.scene, [step], onto=before)
+            except InputError as error:
+                reason = str(error).removeprefix(f"Step 1 ({step.kind}): ").replace(f"{step.folder}/", "")
+                raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+
+        return _kept(self._edited, steps, make) if steps else self.scene
+
+    def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
+        """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
+        return _kept(self._panes, (step,), lambda: glass.checked(self.scene, step))
 
     def picture(self, steps: tuple[Step, ...], client: glass.GlassClient | None = None) -> Array:
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
@@ -107,33 +112,22 @@ class LivePreview:
         self._edited.clear()
         self._panes.clear()
 
-    def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
-        """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
-        key = _key((step,))
-        if key not in self._panes:
-            self._panes[key] = glass.checked(self.scene, step)
-            while len(self._panes) > SETTINGS.scenes_kept:
-                self._panes.popitem(last=False)
-        return self._panes[key]
 
-
-def _after(scene: Scene, edited: Scene, step: Step) -> Scene:
-    """The scene `edited` of `scene` after one more step; an error names it as the list does."""
-    try:
-        return apply(scene, [step], onto=edited)
-    except InputError as error:
-        reason = str(error).removeprefix(f"Step 1 ({step.kind}): ").replace(f"{step.folder}/", "")
-        raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+def _kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any]) -> Any:
+    """What a store holds for some steps, made where it is missing; the store keeps the last ones."""
+    key = json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
+    found = store.get(key)
+    if found is None:
+        found = store[key] = make()
+        for old in list(store)[: -SETTINGS.scenes_kept]:
+            store.pop(old, None)
+    return found
 
 
 def _build(scene: Scene) -> Any:
     from materialist.edits.preview import Preview
 
     return Preview(scene)
-
-
-def _key(steps: tuple[Step, ...]) -> str:
-    return json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
 
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:

@@ -14,17 +14,10 @@ from materialist.studio.uploads import without_paths
 
 _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
-    "walls": "Finding where walls end", "geometry": "Building the surface", "trace": "Tracing light paths",
-    "light": "Finding the light", "materials": "Finding the materials",
-    "rerender": "Rendering the result", "save": "Saving", "load": "Loading", "render": "Path tracing",
-    "frames": "Path tracing the frames", "export": "Writing the file",
+    "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
+    "materials": "Finding the materials", "rerender": "Rendering the result", "save": "Saving", "load": "Loading",
+    "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
 }  # fmt: skip
-_SHARE = {
-    "start": (0.0, 0.08), "read": (0.08, 0.1), "predict": (0.1, 0.14), "walls": (0.14, 0.24),
-    "geometry": (0.24, 0.27), "light": (0.27, 0.42), "trace": (0.42, 0.53),
-    "materials": (0.53, 0.72), "rerender": (0.72, 0.97), "save": (0.97, 1.0),
-}  # fmt: skip
-"""Stage of an inversion -> where its part of the bar begins and ends, by the seconds that it usually takes."""
 
 
 def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
@@ -42,16 +35,14 @@ def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
 def shown(jobs: JobQueue, job: Job) -> str:
     """One state as HTML."""
     if job.state == QUEUED:
-        ahead = jobs.ahead(job)
-        who = "1 other piece of work is" if ahead == 1 else f"{ahead} other pieces of work are"
-        return box(f"Waiting: {who} before yours." if ahead else "Waiting for its turn.", 0.0)
+        return box(f"Waiting: {jobs.ahead(job)} before yours.", 0.0)
     if job.state == STOPPED:
         return box("Stopped; nothing was changed.")
     if job.state == FAILED:
         return box(failure(job), bad=True)
     if job.over:
         return box(f"Done in {job.seconds:.0f} s.")
-    return box(f"{words(job.stage)} … {job.seconds:.0f} s", share(job))
+    return box(f"{words(job.stage)} … {job.seconds:.0f} s", min(1.0, job.done / job.total) if job.total else 0.0)
 
 
 def failure(job: Job) -> str:
@@ -59,31 +50,17 @@ def failure(job: Job) -> str:
     text = job.message
     for step in job.arguments.get("steps", ()):
         text = text.replace(f"{step.folder}/", "")
-    for key in ("photo", "scene", "output", "mesh"):
+    for key in ("photo", "scene", "output"):
         if key in job.arguments:
             file = Path(job.arguments[key])
-            text = without_paths(
-                text, file, str(job.arguments.get("title", file.name)) if key == "photo" else file.name
-            )
+            title = job.arguments.get("title", file.name) if key == "photo" else file.name
+            text = without_paths(text, file, str(title))
     return text
 
 
 def words(stage: str) -> str:
     """A stage in words; names such as `light 2` or `materials: albedo` go by their first word."""
-    key = stage.replace(":", " ").split()[0] if stage.split() else ""
-    return _WORDS.get(stage) or next(
-        (text for name, text in _WORDS.items() if key.startswith(name)), stage.capitalize()
-    )
-
-
-def share(job: Job) -> float:
-    """How much of a job is done, in [0, 1]; it never runs back."""
-    inside = min(1.0, job.done / job.total) if job.total else 0.0
-    if job.kind == "invert":
-        low, high = next((part for name, part in _SHARE.items() if job.stage.startswith(name)), (0.0, 0.0))
-        inside = low + (high - low) * inside
-    job.shown = max(job.shown, inside)
-    return job.shown
+    return _WORDS.get(stage) or _WORDS.get(stage.replace(":", " ").partition(" ")[0], stage.capitalize())
 
 
 def box(text: str, part: float | None = None, bad: bool = False) -> str:

@@ -52,22 +52,13 @@ class Selection:
         return {"fill": data_url(fill, ".png", "image/png"), "outline": data_url(outline, ".png", "image/png")}
 
     def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
-        """With the object at a pixel: alone, added, or taken away, as a plain click does where it is selected already.
-
-        Taking away leaves the rest of a larger region: a click on the spoon in a selected cup takes away the spoon.
-        """
-        row, column = int(y), int(x)
-        mask = self.mask
-        inside = mask is not None and 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1] and mask[row, column]
-        if mode == REMOVE and inside and mask is not None:
-            found = select(scene, click=(x, y), method=method)
-            # One thing found again from another place of it is never quite the same.
-            if (found & mask).sum() > SETTINGS.inside * found.sum() and found.sum() < SETTINGS.part * mask.sum():
-                return self._without(found)
+        """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
+        height, width = scene.depth.shape
+        row, column = min(int(y), height - 1), min(int(x), width - 1)
+        inside = any(part[row, column] for part in self.parts)
         if (inside and mode != ADD) or mode == REMOVE:
-            return Selection(tuple(p for p in self.parts if not p[row, column])) if inside else self
-        found = select(scene, click=(x, y), method=method)
-        return self._with(found, mode)
+            return Selection(tuple(part for part in self.parts if not part[row, column])) if inside else self
+        return self._with(select(scene, click=(x, y), method=method), mode)
 
     def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
         """With the object in a box."""
@@ -123,13 +114,14 @@ def read_pick(data: Any) -> dict[str, Any]:
         numbers = [float(v) for v in data.get("at", ())]
         points = [[float(x), float(y)] for x, y in data.get("points", ())]
         radius = float(data.get("radius", 1))
+        if not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all() or min(numbers, default=0) < 0:
+            raise ValueError("not a place")
+        if {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}[tool] != len(numbers):
+            raise ValueError("not the numbers of the tool")
+        if mode not in (REPLACE, ADD, REMOVE):
+            raise ValueError("not a mode")
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError("The click could not be read; reload the page.") from error
-    wanted = {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}
-    if tool not in wanted or len(numbers) != wanted[tool] or mode not in (REPLACE, ADD, REMOVE):
-        raise InputError("The click could not be read; reload the page.")
-    if not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all():
-        raise InputError("The click could not be read; reload the page.")
     return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import threading
 from dataclasses import dataclass
@@ -21,14 +22,10 @@ from materialist.studio.workspace import Project, read_steps, write_mask
 from materialist.types import Scene
 
 EDITS = "edits.yaml"
-ENDING = ("final", "take", "fall")
+ENDING = ("final", "take")
 """Kinds of jobs that end with the page that asked for them."""
-DRAGGED = (
-    "hue", "saturation", "value", "albedo", "roughness", "metallic", "texture_scale", "ior", "transmission", "tint",
-)  # fmt: skip
-"""Options of materials and glass that sliders and colour pickers move: a whole drag is one change."""
-LIGHT_DRAGGED = ("rotate", "ambient", "sun", "sun_power")
-"""The same of light; `sun` is where it stands."""
+_SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
+"""Values that sliders and colour pickers set: numbers and colours."""
 
 
 @dataclass(frozen=True)
@@ -59,14 +56,14 @@ class Session:
         self.selection = Selection()
         self.next_object: dict[str, str] = {}
         """Options of the next object that is placed."""
-        self.failed_fall: tuple[Step | None, int] = (None, 0)
-        """The object whose last fall failed, and how often it did."""
+        self.falls = 0
+        """How many falls were begun here: each tumbles in its own way."""
         self.lamp = (2700.0, 1.0, 0.75)
         """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.edits = EditList()
         self._past: list[tuple[str, EditList, Selection]] = []
         self.running: dict[str, Job] = {}
-        """The last job of each kind (invert, final, take, fall) that this page asked for."""
+        """The last job of each kind (invert, final, take) that this page asked for."""
         self._ending: list[Job] = []
         self.mark = secrets.token_hex(4)
         """Tells this page's path-traced pictures from those of other pages."""
@@ -154,13 +151,11 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            step, edits = self._current("edit") or self._current("glass"), self.edits
-            if after.mask is None or mode not in (ADD, REMOVE) or step is None or edits.current is None:
+            if after.mask is None or mode not in (ADD, REMOVE) or self.in_hand not in ("edit", "glass"):
                 self.remember("select")
-                self.edits = edits.chosen(None)
+                self.edits = self.edits.chosen(None)
             else:  # the edit in hand grows or shrinks with its region, whatever that was given as
-                region = {**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)}
-                self.change("select", edits.put(edits.current, with_options(step, **region)))
+                self.put(self.edits, **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)})
             self.selection = after
 
     def deselect(self) -> None:
@@ -171,62 +166,45 @@ class Session:
 
     # The list of edits
 
-    def material(self, *, kind: str = "edit", **options: str | None) -> None:
-        """Set or clear (None) options of the edit (or glass) in hand at once; a new one begins where there is none."""
+    def set(self, kind: str, **options: Any) -> None:
+        """Set or clear (None) options of the step in hand; a new one over the selection where it is of another kind.
+
+        Raises InputError, and changes nothing, for values that are not valid.
+        """
         with self.lock:
-            scene = self.scene
-            mask = self.selection.mask
-            step = self._current(kind)
-            if step is None:
+            scene, mask, edits = self.scene, self.selection.mask, self.edits
+            if self.in_hand != kind:
                 if mask is None:
                     raise InputError("Click the object that you want to change first.")
                 if not (mask & (scene.depth > 0)).any():
                     raise InputError("The selection covers only sky; select a surface.")
-                self.remember("begin")
-                self.edits = self.edits.add(Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace))
-                step = self.edits.steps[-1]
-            elif with_options(step, **options) == step:
-                return
-            else:
-                others = [value for name, value in options.items() if name not in DRAGGED]
-                moving = len(others) < len(options) and not any(others)
-                self.remember(f"{', '.join(options)} of {self.edits.current}", moving=moving)
-            self._put(step, **options)
-
-    def region_step(self, kind: str, **options: str | None) -> None:
-        """Lay a step such as `glass` or `remove` over the selection, or change the one in hand; checked at once."""
-        with self.lock:
-            step, mask = self._current(kind), self.selection.mask
-            if step is None and mask is None:
-                _ = self.scene
-                raise InputError("Click the object that you want to change first.")
-            edits = self.edits
-            if step is None:
-                step = Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace)  # type: ignore[arg-type]
-                edits = edits.add(step)
-            elif with_options(step, **options) == step:
-                return
-            assert edits.current is not None
-            self.change(kind, edits.put(edits.current, with_options(step, **options)))
+                edits = edits.add(Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace))
+            self.put(edits, **options)
 
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light (`EditList.light`); it is made when the first is set."""
         with self.lock:
-            _ = self.scene
-            place = self.edits.light
-            known = self.edits.steps[place].options if place is not None else {}
-            changed = [name for name in options if options[name] != known.get(name)]
-            if not changed:
-                return
-            switched = "sun" in changed and None in (known.get("sun"), options["sun"])
-            after = self.edits.add(Step("relight", {}, self.workspace)) if place is None else self.edits.chosen(place)
-            what = f"{', '.join(changed)} of light {after.current}"
-            self.remember(what, moving=set(changed) <= {*LIGHT_DRAGGED} and not switched)
-            self.edits = after
-            self._put(after.steps[after.current or 0], **options)
-            if not {*self.edits.steps[self.edits.current or 0].options} - {"skip"}:
-                self.edits = self.edits.without(self.edits.current or 0)
-                self.save()
+            _, place = self.scene, self.edits.light
+            self.put(
+                self.edits.add(Step("relight", {}, self.workspace)) if place is None else self.edits.chosen(place),
+                **options,
+            )
+
+    def put(self, edits: EditList, **options: Any) -> None:
+        """Take over a list of edits, with options of the step in hand set or cleared (None). Raises InputError.
+
+        A slider (or colour) that moves on is one change in the undo history. A light without options goes.
+        """
+        index, step = edits.current, edits.in_hand
+        assert index is not None and step is not None
+        new = with_options(step, **options)
+        after = (
+            edits.without(index) if new.kind == "relight" and not {*new.options} - {"skip"} else edits.put(index, new)
+        )
+        if after.steps != self.edits.steps:
+            changed = [name for name in options if new.options.get(name) != step.options.get(name)]
+            moving = all(_slides(one.options.get(name)) for one in (step, new) for name in changed)
+            self.change(f"{', '.join(options)} of {index}", after, moving=moving)
 
     def act(self, what: str, index: int) -> None:
         """One of the buttons of the list: toggle, up, down, remove, choose."""
@@ -284,20 +262,11 @@ class Session:
 
     def _take_up_object(self) -> None:
         """The next object is like the one in hand, as the controls show it."""
-        step = self._current("insert") or self._current("drop")
-        if step is not None and isinstance(step.options.get("mesh"), str):
+        step = self.edits.in_hand
+        if step is not None and step.kind in ("insert", "drop") and isinstance(step.options.get("mesh"), str):
             self.next_object = {k: step.options[k] for k in ("mesh", "scale", "turn", "material") if k in step.options}
 
-    def _current(self, kind: str) -> Step | None:
-        step = self.edits.in_hand
-        return step if step and step.kind == kind else None
-
-    def _put(self, step: Step, **options: Any) -> None:
-        assert self.edits.current is not None
-        self.edits = self.edits.put(self.edits.current, with_options(step, **options))
-        self.save()
-
-    def remember(self, what: str, *, moving: bool = False) -> None:
+    def remember(self, what: str, moving: bool = False) -> None:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""
         if what != "select":
             self._check_unchanged()
@@ -335,6 +304,13 @@ class Session:
         else:
             file.unlink(missing_ok=True)
         self._kept = _content(file)
+
+
+def _slides(value: Any) -> bool:
+    """Whether an option's value is one that sliders and colour pickers set."""
+    if isinstance(value, list):
+        return all(isinstance(one, str) and _slides(one) for one in value)
+    return _SLIDES.fullmatch(str(value)) is not None
 
 
 def _content(file: Path) -> bytes | None:

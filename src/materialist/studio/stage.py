@@ -25,54 +25,43 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
 
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
     page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
-    reason on it: what is wrong can be taken out of the list. Glass in hand is asked for; `asked` counts these wishes,
-    and `waiting` says whether the last is not fulfilled yet. The page ignores a picture with an older `serial` than
-    the one it shows.
+    reason on it. Glass in hand is asked for, and `waiting` says whether its picture is still to come. The page ignores
+    a picture with an older `serial` than the one it shows.
     """
     serial = time()
     with session.lock:
         live, edits, final = session.live, session.edits, session.final
         masks, client = session.selection.pictures, session.glass
+    shown = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
+    shown |= {"serial": serial, **masks}
     if live is None:
-        none = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
-        return {**none, "serial": serial, **masks}
+        return shown
     camera, steps = live.scene.camera, edits.active if with_edits else ()
-    size = {"width": camera.width, "height": camera.height}
-    shown = {**size, "lamps": _lamps(edits), "serial": serial, "bad": False, **masks}
-    off = "; the edit in hand is switched off" if _in_hand_off(edits) else ""
+    shown |= {"width": camera.width, "height": camera.height, "lamps": _lamps(edits)}
+    in_hand = edits.in_hand
+    off = "; the edit in hand is switched off" if in_hand is not None and in_hand.skipped else ""
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel{off}"
-        return {**shown, "picture": file_url(final.path.with_suffix(".jpg")), "badge": badge, "waiting": False}
-    state = _asked(client, edits) if with_edits and client is not None else None
-    waiting = state is not None and state.waiting
+        return {**shown, "picture": file_url(final.path.with_suffix(".jpg")), "badge": badge}
+    if in_hand is not None and client is not None and in_hand in steps and glass.is_traced(in_hand):
+        client.ask(_others(steps, in_hand), in_hand)
+    waiting = client is not None and with_edits and client.state.waiting
     if steps and not live.ready:
-        return {**shown, "badge": "Getting the live preview ready …", "waiting": False}
+        del shown["picture"]
+        return {**shown, "badge": "Getting the live preview ready …"}
     try:
         linear = live.picture(steps, client)
     except MaterialistError as error:
         photo, badge = jpeg_url(live.scene.photo.linear), f"The photo without its edits: {error}"
-        return {**shown, "picture": photo, "badge": badge, "waiting": False, "bad": True}
-    shown |= {"asked": state.asked if state else 0, "waiting": waiting}
-    return {**shown, "picture": jpeg_url(linear), "badge": _badge(steps, client, waiting) + off}
+        return {**shown, "picture": photo, "badge": badge, "bad": True}
+    badge = _badge(steps, client, waiting) + off
+    return {**shown, "picture": jpeg_url(linear), "badge": badge, "waiting": waiting}
 
 
 def picture(session: Session) -> Array:
     """[H, W, 3] float32 linear: what the stage shows where nothing is path traced."""
     assert session.live is not None
     return session.live.picture(session.edits.active, session.glass)
-
-
-def _asked(client: glass.GlassClient, edits: EditList) -> glass.GlassState:
-    """Ask for the glass in hand, if there is any."""
-    step = edits.in_hand
-    if step is not None and glass.is_traced(step) and not step.skipped:
-        client.ask(_others(edits.active, step), step)
-    return client.state
-
-
-def _in_hand_off(edits: EditList) -> bool:
-    """Whether the step in hand is switched off."""
-    return edits.in_hand is not None and edits.in_hand.skipped
 
 
 def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
@@ -89,20 +78,19 @@ def _lamps(edits: EditList) -> list[list[float]]:
         return []
 
 
-def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None = None, waiting: bool = False) -> str:
+def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: bool) -> str:
     """The label of a picture that is not path traced: its kind, and its omissions."""
-    if not steps:
-        return "Photo"
     panes = [step for step in steps if glass.is_traced(step)]
     sketched = "; objects are sketched" if any(s.kind not in LIVE and s not in panes for s in steps) else ""
+    if not steps:
+        return "Photo"
     if waiting:
-        known = all(client and client.pane(step) for step in panes)
-        return ("Glass: tracing …" if known else "Glass: sketch, tracing …") + sketched
-    if panes and client and all(client.fresh(_others(steps, step), step) for step in panes):
-        return f"Glass traced; shadow and caustics in the final picture{sketched}"
+        return "Glass: tracing …" + sketched
     if panes and client and all(client.pane(step) for step in panes):
+        if all(client.fresh(_others(steps, step), step) for step in panes):
+            return f"Glass traced; shadow and caustics in the final picture{sketched}"
         return f"Live preview; click the glass in the list to trace it anew{sketched}"
-    if any(step.kind not in LIVE for step in steps):
+    if panes or sketched:
         return "Sketch: path tracing shows the rest"
     if any("lamps" in step.options for step in steps):
         return "Live preview: lamps show in path tracing"
@@ -141,9 +129,7 @@ def report(scene: Scene) -> str:
     """How good the scene is, in Markdown and plain words."""
     metrics = scene.report.metrics
     value = metrics.get("rerender_psnr_path", float("nan"))
-    verdict = (
-        "very close to the photo" if value > 33 else "close to the photo" if value > 28 else "only roughly the photo"
-    )
+    verdict = "close to the photo" if value > 28 else "only roughly the photo"
     lines = [f"The re-rendering is **{verdict}** ({value:.1f} dB)."] if np.isfinite(value) else []
     camera = scene.camera
     source = {"exif": "from the photo's EXIF data", "default": "assumed", "option": "as chosen"}.get(

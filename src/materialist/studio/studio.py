@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
-import os
 import re
 import secrets
 import shutil
@@ -22,6 +20,7 @@ from materialist.studio.workspace import Project, WorkFolder
 
 ALONE = "me"
 """The person, where the studio serves this machine only."""
+LOST = "The page has lost its session; reload it."
 
 
 @dataclass
@@ -38,8 +37,6 @@ class Studio:
     """Of inversions."""
     device: str = "auto"
     """Of jobs, as `invert` takes it."""
-    run: str = field(default_factory=lambda: secrets.token_hex(4))
-    """Tells this studio from the ones before it in what a browser keeps."""
     _sessions: dict[str, Session] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -48,18 +45,18 @@ class Studio:
         if self.alone:
             return ALONE
         if not isinstance(token, str) or not re.fullmatch(r"[a-z0-9]{16,32}", token):
-            raise InputError("The page has lost its session; reload it.")
+            raise InputError(LOST)
         return token
 
     def session(self, page: str | None, person: str | None = None) -> Session:
         """The session of a page, by Gradio's session hash; `person` starts one. Raises InputError where it is gone."""
         if not page:
-            raise InputError("The page has lost its session; reload it.")
+            raise InputError(LOST)
         with self._lock:
             known = self._sessions.get(page)
             if known is None or (person is not None and known.person != person):
                 if person is None and not self.alone:
-                    raise InputError("The page has lost its session; reload it.")
+                    raise InputError(LOST)
                 known = self._sessions[page] = Session(person or ALONE)
             return known
 
@@ -76,41 +73,21 @@ class Studio:
                 return project
         raise InputError("This photo is no longer in the work folder; open it again.")
 
-    def bookmark(self, project: Project) -> str:
-        """The text by which a browser remembers the photo it shows."""
-        return f"{self.run}/{project.name}"
-
-    def is_bookmark(self, kept: Any) -> bool:
-        """Whether a browser kept this text from this studio, and not from one before it."""
-        return str(kept or "").rpartition("/")[0] == self.run
-
-    def first(self, kept: Any) -> str:
-        """The name of the project that a page which arrives should show; an empty text for none.
-
-        The photo it showed before, if that was in this studio; else what this studio was started on.
-        """
-        run, _, name = str(kept or "").rpartition("/")
-        return self.start.name if isinstance(self.start, Project) and run != self.run else name
-
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
         import psutil
 
         project = self.project(name, session.person)
         session.close()
-        free()
+        gc.collect()
         if psutil.virtual_memory().available < SETTINGS.free_for_scene:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
-        self.work.touch(project)
-
-    def job(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
-        """A job for a page: a function of `tasks`, which writes into `folder`."""
-        return Job(task.__name__, session.person, folder, partial(tasks.on_device, self.device, task), arguments)
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
-        """Put a job for a page in the queue."""
-        job = self.jobs.submit(self.job(session, task, folder, **arguments))
+        """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`."""
+        work = partial(tasks.on_device, self.device, task)
+        job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
         session.note_job(job)
         return job
 
@@ -122,10 +99,10 @@ class Studio:
             session.end(self.jobs)
             session.close()
             del session
-            free()
+            gc.collect()
 
     def final_file(self, session: Session) -> Path:
-        """Where a page's path-traced pictures lie, without the ending; they go when the studio ends."""
+        """Where a page's path-traced pictures lie, without the suffix; they go when the studio ends."""
         return self.work.cache / f"final-{session.mark}"
 
     def public_copy(self, file: Path) -> str:
@@ -133,20 +110,6 @@ class Studio:
         folder = self.work.cache / secrets.token_hex(16)
         try:
             folder.mkdir()
-            copy = folder / file.name
-            try:
-                os.link(file, copy)
-            except OSError:
-                shutil.copyfile(file, copy)
+            return str(shutil.copyfile(file, folder / file.name))
         except OSError as error:
             raise OutputError(f"The file {file.name} cannot be handed over: {error.strerror or error}.") from error
-        return str(copy)
-
-
-def free() -> None:
-    """Give unused memory back to the system at once, where the C library can."""
-    gc.collect()
-    try:
-        ctypes.CDLL("libc.so.6").malloc_trim(0)
-    except (OSError, AttributeError):
-        return

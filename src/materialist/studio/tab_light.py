@@ -90,11 +90,7 @@ def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: fl
 
 
 def _uploaded(session: Session, file: Path) -> None:
-    from materialist.edits.light.relight import read_envmap
-
     suffix = uploads.checked_picture(file, file.name)
-    with uploads.called(file, file.name):
-        read_envmap(file)
     session.light(envmap=store(session.workspace, file, "light", suffix), gain="auto")
 
 

@@ -45,24 +45,20 @@ def wire(context: PageContext) -> None:
         context.on(parts[name].input, partial(_moved, name), parts[name])
     context.on(parts["colour"].input, _coloured, parts["colour"])
     colours = dict.fromkeys(("albedo", "texture", "hue", "saturation", "value"))
-    context.on(parts["own"].click, lambda session: session.material(**colours), everything=True)
+    context.on(parts["own"].click, lambda session: session.set("edit", **colours), everything=True)
     found = dict.fromkeys(("roughness", "metallic"))
-    context.on(parts["as_fitted"].click, lambda session: session.material(**found), everything=True)
+    context.on(parts["as_fitted"].click, lambda session: session.set("edit", **found), everything=True)
     context.on_upload("texture", _textured, everything=True)
 
 
 def _moved(name: str, session: Session, value: float) -> None:
-    session.material(**{name: number_text(value)})
+    session.set("edit", **{name: number_text(value)})
 
 
 def _coloured(session: Session, value: str) -> None:
-    session.material(texture=None, albedo=hex_colour(value))
+    session.set("edit", texture=None, albedo=hex_colour(value))
 
 
 def _textured(session: Session, file: Path) -> None:
-    from materialist.edits.material.texture import read_texture
-
     suffix = uploads.checked_picture(file, file.name)
-    with uploads.called(file, file.name):
-        read_texture(file)
-    session.material(albedo=None, texture=store(session.workspace, file, "texture", suffix))
+    session.set("edit", albedo=None, texture=store(session.workspace, file, "texture", suffix))

@@ -9,14 +9,12 @@ from typing import Any
 
 import gradio as gr
 
-from materialist.errors import InputError
-from materialist.jobs.worker import FAILED
 from materialist.options import Drop, Glass, Insertion
-from materialist.studio import objects, tasks, uploads
+from materialist.studio import objects, uploads
 from materialist.studio.progress import box
 from materialist.studio.session import Session
 from materialist.studio.widgets import LONG, PageContext, handler, hex_colour, number_text, slider, tint_text
-from materialist.studio.workspace import new_name, store
+from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 _GLASS: dict[str, Callable[[Any], str | None]] = {
@@ -52,11 +50,7 @@ def layout(context: PageContext) -> None:
             parts["height"] = slider(Drop, "height", "How high above, in its own sizes", 0.1, maximum=5)
             parts["rest"] = gr.Button("Let it fall, and lie there", elem_id="rest", size="sm")
             gr.Markdown("Once more, and it tumbles in another way.")
-            parts["fall"] = gr.Button("Make a video of the fall", size="sm")
-            with gr.Row():
-                parts["fall_progress"] = gr.HTML("", js_on_load=None)
-                parts["fall_stop"] = gr.Button("Stop", variant="stop", size="sm", visible=False, min_width=70)
-            parts["fall_video"] = gr.Video(label="The fall", interactive=False, visible=False, buttons=["download"])
+            parts["fall_progress"] = gr.HTML("", js_on_load=None)
 
 
 def _layout_glass(parts: dict[str, Any]) -> None:
@@ -123,17 +117,17 @@ def _made_of(session: Session, kind: str, colour: str) -> None:
 
 
 def _remove(session: Session, shadow: bool) -> None:
-    session.region_step("remove", shadow=None if shadow else "0")
+    session.set("remove", shadow=None if shadow else "0")
 
 
 def _make_glass(session: Session, *values: Any) -> None:
-    session.region_step("glass", **{name: text(v) for (name, text), v in zip(_GLASS.items(), values)})
+    session.set("glass", **{name: text(v) for (name, text), v in zip(_GLASS.items(), values)})
 
 
 def _change_glass(name: str, session: Session, value: Any) -> bool:
     if session.in_hand != "glass":
         return False
-    session.material(kind="glass", **{name: _GLASS[name](value)})
+    session.set("glass", **{name: _GLASS[name](value)})
     return True
 
 
@@ -161,31 +155,8 @@ def _wire_following(context: PageContext) -> None:
 
 
 def _wire_fall(context: PageContext) -> None:
-    """An object that falls: to lie there, or as a video."""
-    parts, studio = context.parts, context.studio
-
-    @handler
-    def fall(height: float, request: gr.Request) -> Any:
-        session = context.session(request)
-        _ = session.scene
-        place = objects.last(session)
-        if place is None or session.project is None:
-            raise InputError("Place an object first; it falls where it stands.")
-        step, file = session.edits.steps[place], new_name(session.workspace, "fall", ".mp4")
-        options = {k: step.options[k] for k in ("scale", "material", "height", "seed") if k in step.options}
-        options = {"height": f"{float(height):.3g}", **options}
-        if step.kind == "insert":  # what has fallen falls in the video as it did
-            options["seed"] = str(objects.failures(session, step))
-        job = studio.submit(
-            session, tasks.fall, session.workspace, scene=str(session.project.scene),
-            mesh=str(session.workspace / step.options["mesh"]), at=[float(v) for v in step.options["at"]],
-            output=str(file), options=options,
-        )  # fmt: skip
-        yield from context.following(job, "fall_progress", "fall_stop")
-        if job.state == FAILED and step.kind == "insert":
-            objects.note_failure(session, step)
-        if job.state == "done":
-            yield {parts["fall_video"]: gr.update(value=studio.public_copy(file), visible=True)}
+    """An object that falls, and lies there."""
+    parts = context.parts
 
     @handler
     def rest(height: float, request: gr.Request) -> Any:
@@ -198,6 +169,3 @@ def _wire_fall(context: PageContext) -> None:
         yield {**context.everything(session), parts["fall_progress"]: box(" ".join(notes)) if notes else ""}
 
     parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **LONG)
-    made = [parts["fall_progress"], parts["fall_stop"], parts["fall_video"]]
-    parts["fall"].click(fall, parts["height"], made, **LONG)
-    context.stops("fall_stop", "fall")

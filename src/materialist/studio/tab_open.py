@@ -5,7 +5,6 @@ from __future__ import annotations
 import secrets
 import shutil
 from collections.abc import Iterator
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,11 @@ from materialist.jobs.queue import Job
 from materialist.studio import archives, tasks, uploads
 from materialist.studio.progress import box, follow
 from materialist.studio.session import Session
-from materialist.studio.stage import file_url, stage
+from materialist.studio.stage import stage
 from materialist.studio.widgets import LONG, PREDICTORS, PageContext, handler
-from materialist.studio.workspace import Project, write_card
+from materialist.studio.workspace import Project
 
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
-_SOURCES = {"exif": "from its EXIF data", "default": "assumed; it has no EXIF data that says"}
 _READY = "Ready: click an object, then move a slider."
 
 
@@ -64,11 +62,14 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     parts, studio = context.parts, context.studio
 
     @handler
-    def uploaded(file: str | None, request: gr.Request) -> Any:
-        session = context.session(request)
-        if file is None or Path(file).suffix.lower() == ".zip":
-            return "" if file is None else box(f"{Path(file).name} will be opened as a scene.")
-        return _facts(context, session, Path(file), Path(file).name)
+    def uploaded(file: str | None) -> str:
+        if file is None:
+            return ""
+        name = Path(file).name
+        if name.lower().endswith(".zip"):
+            return box(f"{name} will be opened as a scene.")
+        uploads.checked_picture(Path(file), name)
+        return box(f"{name} is ready.")
 
     @handler
     def choose_example(name: str | None) -> Any:
@@ -101,12 +102,12 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         session = studio.session(request.session_hash, studio.person(token))
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
-        first = studio.first(last)
-        there = bool(first) and any(value == first for _, value in known)
-        if isinstance(studio.start, Path) and not (there and studio.is_bookmark(last)):
+        if any(value == last for _, value in known):
+            yield from _resumed(context, session, last)
+        elif isinstance(studio.start, Project):
+            yield from _resumed(context, session, studio.start.name)
+        elif studio.start is not None:
             yield {parts["file"]: studio.public_copy(studio.start)}
-        elif there:
-            yield from _resumed(context, session, first)
 
     opening = [
         *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
@@ -120,24 +121,6 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **LONG)
     context.stops("cancel", "invert")
     page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **LONG)
-
-
-def _facts(context: PageContext, session: Session, path: Path, name: str) -> str:
-    """Size and field of view of a photo as HTML; read in its own process, because decoders may crash."""
-    uploads.checked_picture(path, name)
-    thumbnail = context.studio.work.cache / f"{secrets.token_hex(8)}.jpg"
-    try:
-        arguments = {"photo": str(path), "thumbnail": str(thumbnail)}
-        job = context.studio.jobs.run(context.studio.job(session, tasks.photo, thumbnail.parent, **arguments))
-        if job.state != "done":
-            raise InputError(uploads.without_paths(job.message, path, name))
-        facts = job.result
-        source = _SOURCES.get(facts["fov_source"], facts["fov_source"])
-        lines = [f"{facts['width']} × {facts['height']} pixels", f"Field of view {facts['fov']:.1f}° ({source})"]
-        words = "<br>".join(escape(line) for line in (*lines, *facts["warnings"]))
-        return f'<div class="facts"><img src="{file_url(thumbnail)}" alt="The photo"><p>{words}</p></div>'
-    finally:
-        thumbnail.unlink(missing_ok=True)
 
 
 def _begun(
@@ -155,8 +138,6 @@ def _begun(
     project = studio.work.new(title, session.person)
     photo = project.folder / f"original{suffix}"
     shutil.copyfile(source, photo)
-    project = Project(project.folder, project.title, project.owner, project.scene, photo)
-    write_card(project)
     job = studio.submit(
         session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
         predictor=predictor, size=int(size), fov=fov.strip() or "auto", seed=studio.seed,
@@ -183,7 +164,7 @@ def _following(context: PageContext, session: Session, project: Project, job: Jo
     parts, studio = context.parts, context.studio
     session.note_job(job)
     yield {
-        parts["last"]: studio.bookmark(project),
+        parts["last"]: project.name,
         parts["cancel"]: gr.update(visible=True),
         parts["start"]: gr.update(interactive=False),
     }
@@ -192,14 +173,14 @@ def _following(context: PageContext, session: Session, project: Project, job: Jo
         update: dict[Any, Any] = {parts["fit"]: html}
         if len(job.found) > shown:
             shown = len(job.found)
-            latest = {f["name"].removeprefix("first "): f for f in job.found}
+            latest = {f["name"]: f for f in job.found}
             pictures = [(studio.public_copy(project.folder / f["file"]), f["name"]) for f in latest.values()]
             update[parts["found"]] = gr.update(value=pictures, visible=True)
         yield update
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    still_open = studio.bookmark(session.project) if session.project else ""
+    still_open = session.project.name if session.project else ""
     yield {
         parts["cancel"]: gr.update(visible=False), parts["start"]: gr.update(interactive=True),
         **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: still_open} if failed else {}),
@@ -230,7 +211,7 @@ def _opened(context: PageContext, session: Session, project: Project) -> Iterato
     known = _projects(context, session)
     yield {
         **context.controls(session), parts["stage"]: stage(session, with_edits=False), **context.listed(session),
-        parts["last"]: context.studio.bookmark(project),
+        parts["last"]: project.name,
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
         parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
         parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),

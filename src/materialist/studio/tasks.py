@@ -30,19 +30,6 @@ def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> di
     return task(report, **arguments)
 
 
-def photo(report: Reporter, photo: str, thumbnail: str) -> dict[str, Any]:
-    """Read a photo: its size and field of view, and a small picture of it in the file `thumbnail`."""
-    from materialist.io.photo import read_photo
-
-    picture = read_photo(photo, size=512)
-    write_jpeg(Path(thumbnail), picture.linear)
-    height, width = picture.original.shape[:2]
-    return {
-        "width": width, "height": height, "fov": picture.camera.fov, "fov_source": picture.fov_source,
-        "hdr": picture.hdr, "warnings": list(picture.warnings),
-    }  # fmt: skip
-
-
 def invert(
     report: Reporter, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
     fov: float | str = "auto", seed: int = 0,
@@ -68,26 +55,19 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     from materialist.io import display
 
     if isinstance(value, Prediction):
-        shown = {"first depth": display.depths(value.depth), "first normals": display.normals(value.normal)}
-        shown |= _materials("first ", value.materials)
-    elif isinstance(value, Materials):
-        shown = _materials("", value)
+        shown = {"depth": display.depths(value.depth), "normals": display.normals(value.normal)}
+        value = value.materials
     else:
-        shown = {name: display.light(value) if name == "light" else srgb_levels(value)}
+        shown = {}
+    if isinstance(value, Materials):
+        shown |= {"albedo": srgb_levels(value.albedo), "roughness": display.grey(value.roughness)}
+        shown["metallic"] = display.grey(value.metallic)
+    else:
+        shown[name] = display.light(value) if name == "light" else srgb_levels(value)
     for title, pixels in shown.items():
         file = folder / f"found-{title.replace(' ', '-')}.jpg"
         write_pixels(file, pixels)
         report.found(name=title, file=file.name)
-
-
-def _materials(before: str, maps: Materials) -> dict[str, Array]:
-    from materialist.io import display
-
-    return {
-        f"{before}albedo": srgb_levels(maps.albedo),
-        f"{before}roughness": display.grey(maps.roughness),
-        f"{before}metallic": display.grey(maps.metallic),
-    }
 
 
 def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
@@ -126,26 +106,6 @@ def take(
     maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
     loaded, edited = _edited(report, scene, steps)
     maker.get(what, _exported)(report, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
-    return {"file": output}
-
-
-def fall(
-    report: Reporter, scene: str, mesh: str, at: list[float], output: str, options: dict[str, Any], frames: int = 36,
-    spp: int = 32,
-) -> dict[str, Any]:  # fmt: skip
-    """`materialist drop` with these options: a mesh falls onto the photo, as a video."""
-    from materialist.edits.composite.composite import pictures
-    from materialist.edits.drop.drop import drop
-    from materialist.io.package import load_scene
-    from materialist.io.video import ensure_video_writable, write_frames
-
-    ensure_video_writable(output, force=True)
-    report("load", 0, 1)
-    loaded = load_scene(scene)
-    kinds = {"scale": float, "height": float, "seed": int}
-    options = {name: kinds.get(name, str)(value) for name, value in options.items()}
-    film = drop(loaded, [mesh], [(at[0], at[1])], frames=frames, fps=24, **options)
-    write_frames(output, pictures(loaded, film, spp=spp, progress=report), fps=24, force=True)
     return {"file": output}
 
 

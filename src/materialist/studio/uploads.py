@@ -20,7 +20,7 @@ PHOTOS = frozenset(
 def checked_picture(path: Path, name: str) -> str:
     """The suffix to store an uploaded picture under. Raises InputError for what is no picture, or too large.
 
-    `name` is what the user called it: shown in the message, and looked at for its ending alone.
+    `name` is the user's name of the file: shown in the message; only its suffix is used.
     """
     suffix = Path(name).suffix.lower()
     shown = shown_name(name)

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
-from shlex import join, quote
+from shlex import quote
 from typing import Any
 
 import gradio as gr
@@ -19,8 +19,8 @@ import numpy as np
 
 from materialist.errors import MaterialistError
 from materialist.jobs.queue import Job
-from materialist.option_kinds import OperationOptions, declarations, parse_colour
-from materialist.options import Glass, Insertion, InvertOptions, MaterialEdit, Relight
+from materialist.option_kinds import ON, OperationOptions, declarations, parse_colour
+from materialist.options import Glass, Insertion, MaterialEdit, Relight
 from materialist.studio import SETTINGS, objects
 from materialist.studio.edit_list import summary
 from materialist.studio.progress import follow
@@ -34,10 +34,18 @@ LIVE: dict[str, Any] = {
 """Events that skip the queue; while one request is under way only the newest value waits."""
 LONG: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
 """Events that take long, and send updates meanwhile."""
-MATERIAL = ("hue", "saturation", "value", "roughness", "metallic", "colour", "texture_scale")
-LIGHT = ("rotate", "ambient", "sun_on", "azimuth", "elevation", "sun_power")
-GLASS = ("glass_ior", "glass_transmission", "glass_roughness", "glass_tint", "glass_hollow")
-THING = ("thing", "scale", "turn", "made_of", "thing_colour", "height")
+NUMBERS: dict[str, tuple[type[OperationOptions], str]] = {
+    **{name: (MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic", "texture_scale")},
+    **{name: (Relight, name) for name in ("rotate", "ambient", "sun_power")},
+    **{f"glass_{name}": (Glass, name) for name in ("ior", "transmission", "roughness")},
+    **{name: (Insertion, name) for name in ("scale", "turn")},
+}
+"""Slider -> the operation and the option that it sets."""
+CONTROLS = (
+    *NUMBERS, "colour", "sun_on", "azimuth", "elevation", "glass_tint", "glass_hollow", "thing", "made_of",
+    "thing_colour", "height",
+)  # fmt: skip
+"""Components that show the step in hand."""
 SUN = (45.0, 40.0)
 """Where a new sun stands: degrees right of ahead, and above the horizon."""
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
@@ -110,11 +118,7 @@ class PageContext:
         """Sliders as the step in hand, or the selected object, has them; as they are where a step is not valid."""
         if session.live is None:
             return {}
-        values: dict[str, Any] = {}
-        for read in (material_values, light_values, glass_values, object_values):
-            with suppress(TypeError, ValueError):
-                values |= read(session)
-        return {self[name]: value for name, value in values.items()}
+        return {self[name]: value for name, value in control_values(session).items()}
 
     @property
     def picture_parts(self) -> list[Any]:
@@ -124,7 +128,7 @@ class PageContext:
     @property
     def all_parts(self) -> list[Any]:
         """Components of `everything`."""
-        return [*self.picture_parts, *(self[name] for name in (*MATERIAL, *LIGHT, *GLASS, *THING))]
+        return [*self.picture_parts, *(self[name] for name in CONTROLS)]
 
     def on(
         self, event: Any, change: Callable[..., Any], inputs: Any = None, *, everything: bool = False,
@@ -187,66 +191,47 @@ def steps(session: Session) -> list[dict[str, Any]]:
     ]
 
 
-def material_values(session: Session) -> dict[str, Any]:
-    """Values of the sliders: the step's own, else those of the fit under the selection."""
-    step, mask = session.edits.in_hand, session.selection.mask
-    options = step.options if step is not None and step.kind == "edit" else {}
-    values: dict[str, Any] = {name: default(MaterialEdit, name) for name in ("hue", "saturation", "value")}
-    values |= {"roughness": 0.5, "metallic": 0.0}
-    if mask is not None:
-        for name in ("roughness", "metallic"):
-            values[name] = round(float(getattr(session.scene.materials, name)[mask].mean()), 2)
-    for name in values:
-        text = str(options.get(name, ""))
-        if text and (name not in ("roughness", "metallic") or text[0] not in "+-"):
-            values[name] = float(text)
-    colour = options.get("albedo")
-    values["colour"] = colour if isinstance(colour, str) and colour.startswith("#") else "#808080"
-    values["texture_scale"] = float(options.get("texture_scale", 1.0))
-    return values
+def control_values(session: Session) -> dict[str, Any]:
+    """Values of the controls as the step in hand, or the light, has them.
 
-
-def light_values(session: Session) -> dict[str, Any]:
-    """Values of the light's controls."""
-    place = session.edits.light
-    options = session.edits.steps[place].options if place is not None else {}
-    names = ("rotate", "ambient", "sun_power")
-    values: dict[str, Any] = {name: float(options.get(name, default(Relight, name))) for name in names}
-    sun = options.get("sun")
+    Without an edit in hand its controls show what was fitted under the selection; those of glass and of objects then
+    stay as they are, for the next.
+    """
+    step, light = session.edits.in_hand, session.edits.light
+    kind, options = (step.kind, step.options) if step is not None else ("", {})
+    given = {MaterialEdit: options if kind == "edit" else {}}
+    given[Relight] = session.edits.steps[light].options if light is not None else {}
+    given |= {Glass: options} if kind == "glass" else {Insertion: options} if kind in objects.KINDS else {}
+    values: dict[str, Any] = {}
+    for name, (operation, option) in NUMBERS.items():
+        if operation in given:
+            with suppress(TypeError, ValueError):
+                values[name] = float(given[operation].get(option, default(operation, option)))
+    for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
+        if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
+            mask, fitted = session.selection.mask, getattr(session.scene.materials, name)
+            values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
+    colour = str(given[MaterialEdit].get("albedo", ""))
+    values["colour"] = colour if colour.startswith("#") else "#808080"
+    sun = given[Relight].get("sun")
     values["sun_on"] = sun is not None
-    where = sun if isinstance(sun, list | tuple) else SUN
-    values["azimuth"], values["elevation"] = (float(v) for v in where)
+    with suppress(TypeError, ValueError):
+        values["azimuth"], values["elevation"] = (float(v) for v in sun or SUN)
+    with suppress(TypeError, ValueError):
+        if Glass in given:
+            hollow = str(options.get("hollow", "")).lower()
+            values["glass_hollow"] = hollow if hollow == "open" else "true" if hollow in ON else ""
+            values["glass_tint"] = tint_colour(options.get("tint", "1,1,1"))
+        if Insertion in given:
+            known = (name for name in objects.LIBRARY if objects.file_of(name) == options.get("mesh"))
+            made_of = options.get("material", "as-is")
+            coloured = made_of not in [value for _, value in objects.MATERIALS]
+            values |= {"thing": next(known, None), "made_of": "colour" if coloured else made_of}
+            if coloured:
+                values["thing_colour"] = tint_colour(made_of)
+            if "height" in options:
+                values["height"] = float(options["height"])
     return values
-
-
-def glass_values(session: Session) -> dict[str, Any]:
-    """Values of the controls of glass, where there is glass in hand; else they stay."""
-    step = session.edits.in_hand
-    if step is None or step.kind != "glass":
-        return {}
-    names = ("ior", "transmission", "roughness")
-    values: dict[str, Any] = {f"glass_{name}": float(step.options.get(name, default(Glass, name))) for name in names}
-    values["glass_tint"] = tint_colour(step.options.get("tint", "1,1,1"))
-    hollow = str(step.options.get("hollow", "")).lower()
-    values["glass_hollow"] = hollow if hollow == "open" else "true" if hollow in ("true", "yes", "on", "1") else ""
-    return values
-
-
-def object_values(session: Session) -> dict[str, Any]:
-    """Values of the controls of objects, where there is one in hand; else they stay."""
-    step = objects.in_hand(session)
-    if step is None:
-        return {}
-    options = step.options
-    known = (name for name in objects.LIBRARY if objects.file_of(name) == options.get("mesh"))
-    values: dict[str, Any] = {"thing": next(known, None)}
-    values |= {name: float(options.get(name, default(Insertion, name))) for name in ("scale", "turn")}
-    if "height" in options:
-        values["height"] = float(options["height"])
-    made_of = options.get("material", "as-is")
-    if made_of in [value for _, value in objects.MATERIALS]:
-        return {**values, "made_of": made_of}
-    return {**values, "made_of": "colour", "thing_colour": tint_colour(made_of)}
 
 
 def hex_colour(value: str) -> str:
@@ -282,18 +267,11 @@ def number_text(value: float) -> str:
 
 
 def commands(session: Session) -> str:
-    """The commands that give the same result; nothing where no photo is open.
-
-    The photo is taken apart again only where its scene is not there any more.
-    """
+    """The commands that give the same result; nothing where no photo is open."""
     project = session.project
     if project is None:
         return ""
     lines, scene = [f"cd {quote(str(project.folder))}"], quote(str(project.scene))
-    if project.photo is not None:
-        scene = project.scene.name
-        words = ["materialist", "invert", project.photo.name, "-o", scene, *_invert_options(session.scene.provenance)]
-        lines.append(f"test -e {scene} || {join(words)}")
     if session.edits.active:
         lines.append(f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene")
         scene = "edited.scene"
@@ -301,17 +279,3 @@ def commands(session: Session) -> str:
         lines.append(f"materialist render {scene} -o out.png")
     lines.append(f"materialist export {scene} --to glb -o out.glb")
     return "\n".join(lines)
-
-
-def _invert_options(made: dict[str, Any]) -> list[str]:
-    """The options of an inversion that differ from the defaults, as the command takes them."""
-    found: list[str] = []
-    predictor = str(made.get("predictor", "")).split(" ")[0]  # behind it are the weights
-    if predictor in {name for _, name in PREDICTORS}:
-        found += ["--predictor", predictor]
-    if made.get("fov_source") == "option":
-        found += ["--fov", f"{made['fov']:.12g}"]
-    for name in ("engine", "preset", "size", "tau", "strategy", "seed"):
-        if name in made and made[name] != default(InvertOptions, name):
-            found += [f"--{name}", str(made[name])]
-    return found

@@ -11,14 +11,12 @@ import os
 import re
 import shutil
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 
 from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError, OutputError
@@ -46,8 +44,6 @@ class Project:
     owner: str
     scene: Path
     """The scene package; inside the folder unless the studio was started on a scene elsewhere."""
-    photo: Path | None = None
-    """The uploaded file, under a name of ours."""
 
     @property
     def name(self) -> str:
@@ -73,23 +69,19 @@ class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         _make(self.root)
-        # A cache a process: it goes when the process ends, and another studio on the same folder keeps its own.
-        self.cache = self.root / ".cache" / str(os.getpid())
-        _make(self.cache)
-        for leftover in self.cache.parent.iterdir():
-            if leftover.name.isdigit() and not psutil.pid_exists(int(leftover.name)):
-                shutil.rmtree(leftover, ignore_errors=True)
+        self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
+        """Uploads and results that are handed over; they go when the studio ends."""
         try:
-            with tempfile.TemporaryFile(dir=self.cache):
+            with tempfile.TemporaryFile(dir=self.root):
                 pass
         except OSError as error:
             raise OutputError(f"The work folder {root} cannot be written: {error.strerror or error}.") from error
 
     def projects(self, person: str | None = None) -> list[Project]:
-        """All projects, or those of one person; the last used first."""
+        """All projects, or those of one person; the newest first."""
         found = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
         mine = [p for p in found if p is not None and person in (None, p.owner)]
-        return sorted(mine, key=lambda p: (p.folder / CARD).stat().st_mtime, reverse=True)
+        return sorted(mine, key=lambda p: p.name, reverse=True)
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere."""
@@ -105,27 +97,13 @@ class WorkFolder:
             except OSError as error:
                 raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from error
         project = Project(folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE)
-        write_card(project)
+        place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
+        content = {"title": project.title, "owner": project.owner, "scene": place}
+        try:
+            (folder / CARD).write_text(json.dumps(content, indent=1), "utf-8")
+        except OSError as error:
+            raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
         return project
-
-    def touch(self, project: Project) -> None:
-        """Put the project first in the list."""
-        os.utime(project.folder / CARD, (time.time(), time.time()))
-
-
-def write_card(project: Project) -> None:
-    """Write project.json, whole."""
-    content = {
-        "title": project.title, "owner": project.owner,
-        "scene": os.path.relpath(project.scene, project.folder) if _inside(project) else str(project.scene),
-        "photo": project.photo.name if project.photo else None,
-    }  # fmt: skip
-    temporary = project.folder / f".{CARD}.part"
-    try:
-        temporary.write_text(json.dumps(content, indent=1), "utf-8")
-        temporary.replace(project.folder / CARD)
-    except OSError as error:
-        raise OutputError(f"{project.folder} cannot be written: {error.strerror or error}.") from error
 
 
 def default_root() -> Path:
@@ -139,14 +117,9 @@ def _read(folder: Path) -> Project | None:
     """The project in a folder, or None where its card is missing or damaged."""
     try:
         card = json.loads((folder / CARD).read_text("utf-8"))
-        photo = folder / Path(card["photo"]).name if card.get("photo") else None
-        return Project(folder, str(card["title"]), str(card["owner"]), (folder / card["scene"]).resolve(), photo)
+        return Project(folder, str(card["title"]), str(card["owner"]), (folder / card["scene"]).resolve())
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-def _inside(project: Project) -> bool:
-    return project.folder in project.scene.parents
 
 
 def _shown(title: str) -> str:
@@ -170,12 +143,12 @@ def new_name(workspace: Path, stem: str, suffix: str) -> Path:
 
 
 def store(workspace: Path, file: Path, stem: str, suffix: str) -> str:
-    """Copy an uploaded file (checked before) to the workspace; returns its name there, which tells its content."""
+    """Copy an uploaded file (checked before) to the workspace; returns its name there, which holds its hash."""
     return _written(workspace / _name(stem, file.read_bytes(), suffix), lambda place: shutil.copyfile(file, place))
 
 
 def write_mask(workspace: Path, mask: Array) -> str:
-    """Write a mask [H, W] bool; returns its name, which tells its content: no other photo has one of that name."""
+    """Write a mask [H, W] bool; returns its name, which holds its hash: no other photo has one of that name."""
     from materialist.io.image import write_png_bytes
 
     file = workspace / _name("mask", f"{mask.shape}".encode() + np.packbits(mask).tobytes(), ".png")

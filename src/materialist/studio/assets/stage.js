@@ -6,7 +6,7 @@ const outline = element.querySelector(".outline");
 const badge = element.querySelector(".badge");
 const marks = element.querySelector(".marks");
 const cross = element.querySelector(".cross");
-let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0, asked = 0;
+let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0;
 
 function show() {
   const v = props.value || {};
@@ -30,7 +30,7 @@ function show() {
     view.dataset.selected = v.fill ? "yes" : "";
   }
   if (v.waiting !== undefined) view.dataset.waiting = v.waiting ? "yes" : "";
-  if (v.asked && v.asked !== asked) { asked = v.asked; trigger("follow", { asked }); }
+  if (v.waiting) trigger("follow", {});
   if (v.lamps !== undefined) {
     const r = Math.max(width, height) / 60;
     marks.querySelectorAll(".lamp").forEach((n) => n.remove());
