@@ -4,7 +4,6 @@ import csv
 import functools
 import json
 import re
-import shlex
 
 import pytest
 from made_batch import photos
@@ -51,31 +50,6 @@ def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):
     assert "default-src 'none'" in page and "<script" not in page and "http" not in page.replace("http-equiv", "")
     links = set(re.findall(r'href="([^"]+)"', page))
     assert {"summary.csv", "a.scene/overview.png"} < links and all((runs / link).exists() for link in links)
-
-
-def _stopped(*_, **__):
-    raise KeyboardInterrupt
-
-
-@pytest.mark.parametrize(
-    ("options", "kept"),
-    [
-        ((), ()),
-        (("--apply", "my edits.yaml", "--size", "96", "--device", "cpu"), ()),
-        (("--fov", "auto", "--force"), ("--fov", "auto")),  # as given, though it is the default
-        (("--seed", "3", "--resume", "--force"), ("--seed", "3", "--force")),
-    ],
-)
-def test_ctrl_c_says_how_to_go_on_with_the_same_options(run, monkeypatch, options, kept):
-    monkeypatch.setattr(batch_run, "batch", _stopped)
-    code, out, err = run("batch", "my photos", "-o", "runs", *options)
-    assert code == 130 and not out and "nothing was written" not in err
-    words = shlex.split(err.split("Go on with: ")[1])
-    assert words == ["materialist", "batch", "my photos", "-o", "runs", *(kept or options), "--resume"]
-    code, out, err = run("batch", "my photos", "-o", "runs", *options, "--json")
-    assert code == 130 and len(out.splitlines()) == 1
-    said = json.loads(out)
-    assert not said["ok"] and said["exit_code"] == 130 and "--json --resume" in said["message"].replace(" --force", "")
 
 
 def test_many_photos_take_several_pages(tmp_path):

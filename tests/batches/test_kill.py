@@ -103,16 +103,3 @@ def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, wh
     assert json.loads(out.splitlines()[-1])["error"] == "Interrupted"
     assert not psutil.wait_procs(workers, timeout=5)[1]
     assert json.loads((runs / "summary.json").read_text())["open"] == len(NAMES) - len(done(runs))
-
-
-def test_a_terminated_group_dies_silently(tmp_path, monkeypatch):
-    monkeypatch.setenv("MADE_SLOW", "30")
-    source, runs = photos(tmp_path / "in", "slow1", "slow2"), tmp_path / "runs"
-    process = command("batch", source, "-o", runs, "--workers", 2, "--device", "cpu")
-    workers = wait_for(lambda: len(workers_of(process)) == 2 and workers_of(process))
-    time.sleep(0.5)
-    os.killpg(process.pid, signal.SIGTERM)
-    _, err = process.communicate(timeout=30)
-    assert process.returncode == -signal.SIGTERM and "bug" not in err and "Traceback" not in err
-    assert not psutil.wait_procs(workers, timeout=20)[1]
-    assert not done(runs)

@@ -1,7 +1,5 @@
 """The ledger: whole lines, one batch at a time, no one else's folder."""
 
-import json
-
 import pytest
 
 from materialist.batches.ledger import LEDGER, open_ledger, read_events
@@ -64,9 +62,3 @@ def test_two_batches_do_not_share_a_folder(tmp_path):
         open_ledger(tmp_path, OPTIONS, resume=True)
     first.close()
     open_ledger(tmp_path, OPTIONS, resume=True).close()
-
-
-def test_a_ledger_of_another_version_is_not_read(tmp_path):
-    (tmp_path / LEDGER).write_text(json.dumps({"event": "start", "format": 99}) + "\n")
-    with pytest.raises(InputError, match="another version"):
-        open_ledger(tmp_path, OPTIONS, resume=True)

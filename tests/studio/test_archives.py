@@ -126,15 +126,3 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     (step,) = unpack(desk, zipped(tmp_path, members))
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
     assert not (tmp_path / "e").exists() and EditList((step,)).active
-
-
-def test_a_zip_whose_packing_is_damaged(tmp_path):
-    desk = tmp_path / "desk"
-    desk.mkdir()
-    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_LZMA) as made:
-        made.writestr("edits.yaml", LIST * 50)
-    content = bytearray((tmp_path / "a.zip").read_bytes())
-    content[60:75] = b"\xff" * 15
-    (tmp_path / "a.zip").write_bytes(content)
-    with pytest.raises(InputError, match="not a readable zip"):
-        unpack(desk, tmp_path / "a.zip")

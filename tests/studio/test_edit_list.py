@@ -1,6 +1,6 @@
 """The list of edits."""
 
-from materialist.edits.recipe import Step, read_recipe, write_recipe
+from materialist.edits.recipe import Step
 from materialist.studio.edit_list import EditList
 
 A, B, C = (
@@ -27,20 +27,3 @@ def test_ticking_and_moving_leave_the_one_in_hand():
     assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
     assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
     assert EditList((A, B, C)).moved(0, 1).current is None and EditList((A, B, C)).toggled(1).current is None
-
-
-def test_the_list_is_edits_yaml(tmp_path):
-    edits = (
-        EditList()
-        .add(A)
-        .add(B)
-        .toggled(0)
-        .add(Step("edit", {"mask": "m.png", "roughness": "+0.3", "albedo": "#c02010"}))
-    )
-    lamps = Step("relight", {"lamps": [["5", "6", "1.5", "2700", "1"]], "sun": ["45", "-3.5"]})
-    edits = edits.add(lamps)
-    write_recipe(tmp_path / "edits.yaml", list(edits.steps))
-    back = read_recipe(tmp_path / "edits.yaml")
-    assert [s.kind for s in back] == [s.kind for s in edits.steps]
-    assert [s.options for s in back] == [s.options for s in edits.steps]
-    assert back[0].skipped and not back[1].skipped

@@ -1,20 +1,16 @@
 """What falls, what is glass and what is painted, on a small scene with a real preview."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from made_meshes import floor_scene
 from studio_scenes import click, named
 
 from materialist.edits.recipe import apply, read_recipe
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError
 from materialist.studio import objects
-from materialist.studio.edit_list import EditList
 from materialist.studio.glass import GlassState
 from materialist.studio.objects import library_file
 from materialist.studio.preview import LivePreview
-from materialist.studio.selection import read_pick
 from materialist.studio.stage import stage
 from materialist.studio.widgets import control_values
 
@@ -51,49 +47,15 @@ def test_choosing_an_object_brings_its_values(session):
     for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):
         objects.set_option(session, name, value)
     objects.place(session, 50, 40)
-    objects.set_option(session, "mesh", library_file(session, "Cube"))
-    for name, value in (("scale", "2"), ("turn", None), ("material", "mirror")):
-        objects.set_option(session, name, value)
-    assert "thing" not in control_values(session)  # nothing in hand: the controls are for the next
-    objects.place(session, 15, 40)
-    session.act("choose", 0)
     ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
+    session.deselect()
+    assert "thing" not in control_values(session)  # nothing in hand: the controls are for the next
+    session.act("choose", 0)
     shown = named().everything(session)
     assert {name: shown[name] for name in ring} == ring
     session.deselect()
     objects.place(session, 30, 40)  # the next is as the controls show it
-    assert session.edits.steps[2].options == {**session.edits.steps[0].options, "at": ["30", "40"]}
-    session.act("choose", 1)
-    values = control_values(session)
-    assert (values["thing"], values["scale"], values["turn"], values["made_of"]) == ("Cube", 2, 0, "mirror")
-    fallen = objects.fallen(session.edits.steps[1], 2.5, 0)
-    session.edits = EditList((replace(fallen, options={**fallen.options, "mesh": "mesh-1.glb"}),), 0)
-    values = control_values(session)
-    assert (values["thing"], values["scale"], values["height"]) == (None, 2, 2.5)
-
-
-def test_what_falls_beside_everything_changes_nothing(session, monkeypatch):
-    objects.set_option(session, "mesh", library_file(session, "Ball"))
-    objects.place(session, 50, 40)
-    before = session.edits
-    for error in (InputError("it falls beside everything"), SetupError("pip install it")):
-
-        def refuse(steps, error=error):
-            raise error
-
-        monkeypatch.setattr(session.live, "edited", refuse)
-        with pytest.raises(type(error)):
-            objects.let_fall(session, 1.0)
-        assert session.edits == before
-    scene = session.scene
-
-    def meanwhile(steps):
-        session.edits = EditList()
-        return scene
-
-    monkeypatch.setattr(session.live, "edited", meanwhile)
-    with pytest.raises(InputError, match="changed while"):
-        objects.let_fall(session, 1.0)
+    assert session.edits.steps[1].options == {**session.edits.steps[0].options, "at": ["30", "40"]}
 
 
 class _Tracer:
@@ -137,23 +99,3 @@ def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
     assert len(tracer.asked) == 2 and "glass_ior" not in control_values(session)  # another edit is in hand
     session.act("remove", 1)
     assert [step.kind for step in tracer.kept] == ["edit"]
-
-
-def stroke(session, points, mode="add", radius=3.0):
-    session.pick(read_pick({"tool": "brush", "mode": mode, "points": points, "radius": radius}))
-
-
-def test_the_brush_adds_and_rubs_out(session):
-    stroke(session, [[10, 20], [30, 20]])
-    mask = session.selection.mask
-    rows, columns = np.nonzero(mask)
-    assert (rows.min(), rows.max()) == (17, 23) and columns.min() in (7, 8) and columns.max() in (32, 33)
-    stroke(session, [[50, 20]], radius=4.0)  # a dab
-    assert session.selection.mask[20, 50] and session.selection.mask[20, 20]
-    stroke(session, [[20, 10], [20, 30]], "remove", 2.0)
-    after = session.selection.mask
-    assert not after[18:23, 19:22].any() and after[20, 12] and after[20, 28]
-    session.undo()
-    assert session.selection.mask[20, 20]
-    with pytest.raises(InputError, match="paint again"):
-        stroke(session, [])

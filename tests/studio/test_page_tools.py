@@ -74,28 +74,6 @@ def test_a_finger_paints(browser, running):
     context.close()
 
 
-THROUGH = """() => { const s = document.querySelector('#stage').getBoundingClientRect();
-    return [...document.querySelectorAll('label, span, button, input')].filter((n) => {
-        const r = n.getBoundingClientRect(), x = r.left + r.width / 2, y = r.top + r.height / 2;
-        if (n.closest('#stage') || !r.width || y < s.top || y > s.bottom || x < s.left || x > s.right) return false;
-        const top = document.elementFromPoint(x, y); return top && n.contains(top); }).map((n) => n.textContent); }"""
-
-
-def test_nothing_shows_through_the_picture_on_a_phone(browser, running):
-    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
-    page = context.new_page()
-    opened(page, running[0])
-    page.locator(".overflow-menu > button").first.click()
-    page.locator(".overflow-dropdown button").filter(has_text="Objects").click()
-    page.get_by_role("button", name="Turn the selection to glass").click()
-    page.wait_for_selector("#glass_ior input")
-    for part in ("#glass_roughness", "#glass_hollow", "#glass"):
-        page.evaluate("(name) => document.querySelector(name).scrollIntoView({block: 'center'})", part)
-        page.wait_for_timeout(200)
-        assert page.evaluate(THROUGH) == [], part
-    context.close()
-
-
 def test_selecting_by_clicks(page, running):
     opened(page, running[0])
     click_photo(page, 0.39, 0.5)
@@ -171,32 +149,15 @@ def test_an_object_falls_on_the_page(page, running):
     assert not page.errors
 
 
-def test_what_a_mesh_was_refused_for_is_said_and_it_is_not_kept(page, running, tmp_path):
-    """A refused file leaves the field; one that is taken replaces the library's name, and the other way round."""
-    opened(page, running[0])
-    page.get_by_role("tab", name="Objects").click()
-    (tmp_path / "empty.obj").write_text("v 0 0 0\n")
-    page.set_input_files("#own_mesh input[type=file]", str(tmp_path / "empty.obj"))
-    page.wait_for_selector("text=/no faces|no triangles|empty/")
-    page.wait_for_selector("#own_mesh input[type=file]", state="attached")
-    page.wait_for_function("!document.querySelector('#own_mesh').textContent.includes('empty')")
-    (tmp_path / "leaf.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    page.set_input_files("#own_mesh input[type=file]", str(tmp_path / "leaf.obj"))
-    page.wait_for_function("document.body.dataset.tool === 'place'")
-    page.wait_for_function("document.querySelector('#own_mesh').textContent.includes('leaf')")
-    page.get_by_label("Object", exact=True).click()
-    page.get_by_role("option", name="Cube").click()
-    page.wait_for_function("!document.querySelector('#own_mesh').textContent.includes('leaf')")
-    page.errors.clear()
-
-
 def test_a_refused_file_leaves_its_field(page, running, tmp_path):
     opened(page, running[0])
     (tmp_path / "broken.png").write_bytes(b"not an image")
     (tmp_path / "empty.yaml").write_text("nothing")
+    (tmp_path / "none.obj").write_text("v 0 0 0\n")
     for tab, part, name, words in (
         ("Open", "file", "broken.png", "not an image"), ("Light", "own_map", "broken.png", "not an image"),
         ("Take away", "recipe", "empty.yaml", "holds no list"),
+        ("Objects", "own_mesh", "none.obj", "no faces|no triangles|empty"),
     ):  # fmt: skip
         page.get_by_role("tab", name=tab).click()
         page.set_input_files(f"#{part} input[type=file]", str(tmp_path / name))
@@ -207,20 +168,3 @@ def test_a_refused_file_leaves_its_field(page, running, tmp_path):
         )
         page.wait_for_selector(f"#{part} input[type=file]", state="attached")
     page.errors.clear()
-
-
-def test_the_commands_follow_the_list(page, running):
-    opened(page, running[0])
-    page.get_by_role("tab", name="Take away").click()
-    page.wait_for_selector("#commands textarea")
-    said = "document.querySelector('#commands textarea').value.includes('materialist apply')"
-    assert not page.evaluate(said)
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
-    page.get_by_role("tab", name="Material").click()
-    slide(page, "hue", 120)
-    page.get_by_role("tab", name="Take away").click()
-    page.wait_for_function(said)
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function(f"!{said}")
-    assert not page.errors

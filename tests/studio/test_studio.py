@@ -7,7 +7,9 @@ import pytest
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError
-from materialist.jobs.queue import JobQueue
+from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.jobs.worker import DONE, FAILED
+from materialist.studio import progress
 from materialist.studio.server import check_host, check_port, first_target, new_studio
 from materialist.studio.studio import ALONE, Studio
 from materialist.studio.workspace import WorkFolder
@@ -100,3 +102,21 @@ def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
     first, second = studio.public_copy(file), studio.public_copy(file)
     assert first != second and first.startswith(str(studio.work.cache)) and len(first.split("/")[-2]) == 32
     studio.jobs.close()
+
+
+def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
+    session = shared.session("page", shared.person("a" * 16))
+    jobs = {kind: Job(kind, session.person, tmp_path, print) for kind in ("final", "take", "invert", "mesh")}
+    for job in jobs.values():
+        session.note_job(job)
+    shared.leave("page")
+    assert [job.state for job in jobs.values()] == [STOPPED] * 2 + [QUEUED] * 2
+
+
+def test_the_end_of_a_job_is_said_and_cannot_carry_html(tmp_path):
+    queue, job = JobQueue(1), Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
+    assert "Done in" in list(progress.follow(queue, job))[-1]
+    job.state, job.message = FAILED, "<script>alert(1)</script>"
+    assert "<script>" not in progress.shown(queue, job) and 'role="alert"' in progress.shown(queue, job)
+    assert progress.words("light 2") == "Finding the light" and progress.words("odd") == "Odd"
+    queue.close()

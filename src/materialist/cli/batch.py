@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,7 +14,7 @@ from materialist.cli.outcome import INTERRUPTED, report_success
 from materialist.errors import MaterialistError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
+    from rich.progress import Progress
 
     from materialist.batches.outcome import Outcome, Status
 
@@ -32,7 +31,6 @@ class Interrupted(MaterialistError):
 
 
 def batch(
-    context: typer.Context,
     source: Annotated[
         str,
         typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
@@ -68,25 +66,10 @@ def batch(
                 predictor=predictor, size=size, fov=fov, seed=seed, device=device.value, spp=spp, progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
-        raise Interrupted(f"Interrupted; what is done stays. Go on with: {_again(context)}") from None
+        raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None
     _report(outcome, output, as_json)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
-
-
-def _again(context: typer.Context) -> str:
-    """The command line that goes on: as it was given, with --resume."""
-    given = context.params
-    words = ["materialist", "batch", str(given["source"])]
-    for option in context.command.params:
-        name = str(option.name)
-        source = context.get_parameter_source(name)
-        told = source is not None and source.name == "COMMANDLINE"
-        if name == "force":  # what was begun anew is there to go on with; under --resume it allows other options
-            told = told and given["resume"]
-        if told and name not in ("source", "resume"):
-            words += [option.opts[0]] if given[name] is True else [option.opts[0], str(given[name])]
-    return shlex.join([*words, "--resume"])
 
 
 def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
@@ -104,61 +87,51 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
 
 
 class BatchProgress:
-    """Context manager and callback: a bar over all photos with rate, time left and failures, and what is at work.
+    """Context manager and callback: a bar over all photos with rate, time left and failures.
 
     Where stderr is no terminal there is a line for each photo instead, and with `quiet` nothing.
     """
 
     def __init__(self, quiet: bool = False) -> None:
-        self._quiet, self._lines = quiet, not quiet and not sys.stderr.isatty()
-        self._bars: Progress | None = None
-        self._all: TaskID | None = None
-        self._each: dict[str, TaskID] = {}
-
-    def __enter__(self) -> BatchProgress:
-        if not self._quiet and not self._lines:
+        self._quiet = quiet
+        self._bar: Progress | None = None
+        if not quiet and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn
 
-            self._bars = Progress(
-                TextColumn("{task.description:<24}", markup=False), BarColumn(bar_width=16),
-                TextColumn("{task.fields[note]}", markup=False), console=Console(stderr=True),
-            )  # fmt: skip
-            self._bars.start()
-            self._all = self._bars.add_task("photos", total=None, note="looking at what is there")
+            self._bar = Progress(
+                BarColumn(bar_width=16), TextColumn("{task.description}", markup=False), console=Console(stderr=True)
+            )
+
+    def __enter__(self) -> BatchProgress:
+        if self._bar is not None:
+            self._bar.start()
+            self._all = self._bar.add_task("looking at what is there", total=None)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._bars is not None:
-            self._bars.stop()
+        if self._bar is not None:
+            self._bar.stop()
 
     def __call__(self, status: Status) -> None:
-        """How the batch stands now."""
-        if self._lines and status.news:
-            over = status.done + status.failed
-            typer.echo(f"[{over}/{status.total}] {status.news}", err=True)
-        if self._bars is None or self._all is None:
-            return
-        if status.news and status.urgent:
-            self._bars.console.print(status.news, markup=False, highlight=False)
+        """Show the state of the batch now."""
         over = status.done + status.failed
-        self._bars.update(self._all, completed=over, total=status.total, note=f"{over}/{status.total}  {_note(status)}")
-        for name in [name for name in self._each if name not in status.running]:
-            self._bars.remove_task(self._each.pop(name))
-        for name, stage in status.running.items():
-            if name not in self._each:
-                self._each[name] = self._bars.add_task(f"  {name}"[:24], total=None, note=stage)
-            self._bars.update(self._each[name], note=stage)
+        if self._bar is not None:
+            if status.news and status.urgent:
+                self._bar.console.print(status.news, markup=False, highlight=False)
+            words = f"{over}/{status.total}  {_note(status)}"
+            self._bar.update(self._all, completed=over, total=status.total, description=words)
+        elif status.news and not self._quiet:
+            typer.echo(f"[{over}/{status.total}] {status.news}", err=True)
 
 
 def _note(status: Status) -> str:
-    parts: list[Any] = [f"{status.failed} failed"] if status.failed else []
-    if status.rate:
-        parts.append(f"{status.rate * 60:.1f} a minute")
-    if status.left is not None:
-        parts.append(f"{_span(status.left)} left")
+    parts = [f"{status.failed} failed"] if status.failed else []
+    if status.rate and status.left is not None:
+        parts += [f"{status.rate * 60:.1f} a minute", f"{_span(status.left)} left"]
+    parts += [f"{name}: {stage}" for name, stage in list(status.running.items())[:3]]
     return ", ".join(parts)
 
 

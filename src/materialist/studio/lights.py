@@ -45,53 +45,39 @@ def _room(el: Array, wall: Colour, floor: Colour) -> Array:
     return share * np.array(wall) + (1 - share) * np.array(floor)
 
 
-def _softboxes(az: Array, el: Array) -> Array:
-    key = _panel(az, el, (-70, 40), (60, 50), (9, 8.73, 8.28))
-    fill = _panel(az, el, (95, 15), (30, 80), (1.8, 1.9, 2))
-    return _room(el, (0.10, 0.10, 0.11), (0.06, 0.06, 0.06)) + key + fill
-
-
-def _window(az: Array, el: Array) -> Array:
-    places = [(80 + dx, 18 + dy) for dx in (-11, 11) for dy in (-14, 14)]
-    panes = sum(_panel(az, el, place, (19, 24), (6.8, 7.6, 8.8)) for place in places)
-    return _room(el, (0.16, 0.15, 0.14), (0.12, 0.10, 0.08)) + panes
-
-
 def _sky(el: Array, share: Array, low: Colour, high: Colour, ground: Colour) -> Array:
     """[h, w, 3]: from `low` at the horizon to `high`, by a share [h, w] of the way, over a ground."""
     sky = (1 - share[..., None]) * np.array(low) + share[..., None] * np.array(high)
     return np.where(el[..., None] > 0, sky, np.array(ground))
 
 
-def _overcast(az: Array, el: Array) -> Array:
-    # CIE standard overcast sky: the zenith is three times as bright as the horizon.
-    share = np.sin(np.radians(np.maximum(el, 0)))
-    return _sky(el, share, (0.95 / 3, 1 / 3, 0.36), (0.95, 1.0, 1.08), (0.22, 0.22, 0.20))
-
-
-def _noon(az: Array, el: Array) -> Array:
-    share = np.sin(np.radians(np.maximum(el, 0)))
-    sky = _sky(el, share, (0.75, 0.85, 1.0), (0.22, 0.42, 0.95), (0.30, 0.27, 0.22))
-    return sky + _spot(az, el, (-50, 55), 2.5, (160, 152, 136))
-
-
-def _sunset(az: Array, el: Array) -> Array:
-    sky = _sky(el, np.clip(el / 60, 0, 1), (0.85, 0.42, 0.22), (0.12, 0.16, 0.38), (0.10, 0.07, 0.06))
-    glow = np.where(el[..., None] > 0, _spot(az, el, (75, 4), 30, (3, 1.35, 0.45)), 0)
-    return sky + glow + _spot(az, el, (75, 7), 2.5, (120, 66, 26.4))
-
-
-def _candle(az: Array, el: Array) -> Array:
-    return _room(el, (0.05, 0.035, 0.025), (0.03, 0.02, 0.015)) + _spot(az, el, (-60, 10), 7, (30, 16.5, 6.6))
-
-
-def _neon(az: Array, el: Array) -> Array:
-    pink = _panel(az, el, (-90, 15), (10, 80), (7, 0.84, 3.5))
-    blue = _panel(az, el, (90, 15), (10, 80), (0.7, 4.9, 7))
-    return _room(el, (0.03, 0.03, 0.06), (0.02, 0.02, 0.03)) + pink + blue
+def _up(el: Array) -> Array:
+    return np.sin(np.radians(np.maximum(el, 0)))
 
 
 _LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
-    "Softboxes": _softboxes, "Window": _window, "Overcast": _overcast, "Noon": _noon, "Sunset": _sunset,
-    "Candle": _candle, "Neon": _neon, "Even": lambda az, el: np.ones((*el.shape, 3)),
-}  # fmt: skip
+    "Softboxes": lambda az, el: (
+        _room(el, (0.10, 0.10, 0.11), (0.06, 0.06, 0.06))
+        + _panel(az, el, (-70, 40), (60, 50), (9, 8.73, 8.28))
+        + _panel(az, el, (95, 15), (30, 80), (1.8, 1.9, 2))
+    ),
+    "Window": lambda az, el: (
+        _room(el, (0.16, 0.15, 0.14), (0.12, 0.10, 0.08))
+        + sum(_panel(az, el, (x, y), (19, 24), (6.8, 7.6, 8.8)) for x in (69, 91) for y in (4, 32))
+    ),
+    # CIE standard overcast sky: the zenith is three times as bright as the horizon.
+    "Overcast": lambda az, el: _sky(el, _up(el), (0.95 / 3, 1 / 3, 0.36), (0.95, 1.0, 1.08), (0.22, 0.22, 0.20)),
+    "Noon": lambda az, el: (
+        _sky(el, _up(el), (0.75, 0.85, 1.0), (0.22, 0.42, 0.95), (0.30, 0.27, 0.22))
+        + _spot(az, el, (-50, 55), 2.5, (160, 152, 136))
+    ),
+    "Sunset": lambda az, el: (
+        _sky(el, np.clip(el / 60, 0, 1), (0.85, 0.42, 0.22), (0.12, 0.16, 0.38), (0.10, 0.07, 0.06))
+        + np.where(el[..., None] > 0, _spot(az, el, (75, 4), 30, (3, 1.35, 0.45)), 0)
+        + _spot(az, el, (75, 7), 2.5, (120, 66, 26.4))
+    ),
+    "Candle": lambda az, el: (
+        _room(el, (0.05, 0.035, 0.025), (0.03, 0.02, 0.015)) + _spot(az, el, (-60, 10), 7, (30, 16.5, 6.6))
+    ),
+    "Even": lambda az, el: np.ones((*el.shape, 3)),
+}

@@ -141,31 +141,13 @@ def draw_bodies(picture: Array, scene: Scene) -> Array:
     return picture.astype(np.float32)
 
 
-def sketch_glass(picture: Array, region: Array, tint: tuple[float, float, float]) -> Array:
-    """[H, W, 3] with the object under a region [H, W] bool as a see-through shape, until its glass is traced.
-
-    Its surroundings carried on into it, smooth, with a rim and a little of the object's own form.
-    """
+def sketch_glass(picture: Array, region: Array, tint: glass.Tint) -> Array:
+    """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
     import cv2
 
-    if not region.any():
-        return picture
-    height, width = region.shape
-    spread = max(2.0, 0.25 * float(np.sqrt(region.sum())))  # pixels
-    step = max(1, int(spread / 4))  # blurred at a size at which it is blurred by a few pixels
-    size = (-(-width // step), -(-height // step))
-    small = lambda v: cv2.resize(np.ascontiguousarray(v), size, interpolation=cv2.INTER_AREA)  # noqa: E731
-    blur = lambda v: cv2.GaussianBlur(v, (0, 0), spread / step, borderType=cv2.BORDER_REPLICATE)  # noqa: E731
-    outside = (~region).astype(np.float32)
-    share = np.maximum(blur(small(outside)), 1e-3)[..., None]
-    around = cv2.resize(blur(small(picture * outside[..., None])) / share, (width, height))[region]  # [N, 3]
-    depth = cv2.distanceTransform(region.astype(np.uint8), cv2.DIST_L2, 3)  # [H, W] pixels to the border
-    rim = np.exp(-depth[region] / max(1.5, 0.12 * float(depth.max())))[:, None]
-    form = luminance(picture[region])[:, None]
-    inside = (0.8 * around + 0.2 * form) * np.asarray(tint, np.float32) * (1 - 0.4 * rim) + 0.12 * rim * around.max()
-    out = picture.copy()
-    out[region] = inside
-    return out
+    spread = 1 + int(0.6 * np.sqrt(region.sum()))  # pixels
+    blurred = cv2.blur(picture, (spread, spread))
+    return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
 
 
 def lay_over(picture: Array, box: tuple[int, int, int, int], piece: Array, share: Array) -> Array:
