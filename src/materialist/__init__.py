@@ -35,7 +35,7 @@ _HOME = {
     "glass": "edits.glass.glass",
     "remove": "edits.remove.remove",
     "drop": "edits.drop.drop",
-    "settle": "edits.drop.drop_rest",
+    "settle": "edits.drop.drop",
     "composite": "edits.composite.composite",
     "batch": "batches.run",
     **dict.fromkeys(["Drop", "Glass", "Insertion", "InvertOptions", "MaterialEdit", "Relight", "Removal"], "options"),
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from materialist.batches.run import batch as batch
     from materialist.edits.composite.composite import composite as composite
     from materialist.edits.drop.drop import drop as drop
-    from materialist.edits.drop.drop_rest import settle as settle
+    from materialist.edits.drop.drop import settle as settle
     from materialist.edits.glass.glass import glass as glass
     from materialist.edits.insert.insert import insert as insert
     from materialist.edits.light.relight import lamp as lamp

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from made_meshes import box_file, floor_scene
 
-from materialist.edits.drop import drop_rest
-from materialist.edits.drop.drop import drop
-from materialist.edits.drop.drop_rest import settle
+from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.physics import Pose
 from materialist.edits.insert.insert import extent
 from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
 from materialist.errors import InputError
-from materialist.options import Drop
 
 pytest.importorskip("mujoco")
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
 AT = (48.0, 50.0)
+FALL = "materialist.edits.drop.drop.fall"
 
 
 @pytest.fixture(scope="module")
@@ -51,22 +49,6 @@ def test_a_file_with_a_drop_says_the_same_before_and_after(tmp_path, box, rested
         assert [entry["kind"] for entry in edited.provenance["edits"]] == ["drop", "light"]
 
 
-def test_every_option_arrives(tmp_path, box, monkeypatch):
-    asked = []
-    monkeypatch.setattr("materialist.edits.recipe.settle", lambda scene, *given: asked.append(given))
-    text = (
-        "- drop: {mesh: [box.ply, b/ball.ply], at: [[10, 20], '30,40'], height: 2, spin: -1, scale: 0.5, metres: 0.1,"
-        " material: [0.1, 0.2, 0.3], gravity: [0, -1, 0], seed: 7, up: z}\n"
-    )
-    (tmp_path / "edits.yaml").write_text(text)
-    apply(floor_scene(), read_recipe(tmp_path / "edits.yaml"))
-    meshes, places, options = asked[0]
-    assert meshes == [tmp_path / "box.ply", tmp_path / "b" / "ball.ply"] and places == [(10, 20), (30, 40)]
-    assert options == Drop(
-        height=2, spin=-1, scale=0.5, metres=0.1, material="0.1,0.2,0.3", gravity=(0, -1, 0), seed=7, up="z"
-    )
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -85,26 +67,26 @@ def test_what_is_wrong_is_named(box, options, words):
 def test_what_falls_out_of_the_scene_is_left_out(box, monkeypatch):
     scene = floor_scene(96, 72)
     below, still = Pose(np.array([0, 0, -1e6]), np.eye(3)), Pose(np.zeros(3), np.eye(3))
-    monkeypatch.setattr(drop_rest, "fall", lambda *_, **__: [[below, still]] * 14)
+    monkeypatch.setattr(FALL, lambda *_, **__: [[below, still]] * 14)
     edited = settle(scene, [box, box], AT)
     assert len(edited.bodies) == 1 and any("left out" in note for note in edited.report.warnings)
-    monkeypatch.setattr(drop_rest, "fall", lambda *_, **__: [[below]] * 14)
+    monkeypatch.setattr(FALL, lambda *_, **__: [[below]] * 14)
     with pytest.raises(InputError, match="falls beside everything"):
         settle(scene, [box], AT)
 
 
 def test_what_lies_out_of_view_is_told(box, monkeypatch):
     away = Pose(np.array([0, 0, 2.0]), np.eye(3))
-    monkeypatch.setattr(drop_rest, "fall", lambda *_, **__: [[away]] * 14)
+    monkeypatch.setattr(FALL, lambda *_, **__: [[away]] * 14)
     edited = settle(floor_scene(96, 72), [box], AT)
     assert edited.report.warnings == ("What fell came to rest where the camera does not look.",)
 
 
 def test_what_rolls_on_is_told(box, monkeypatch):
     rolling = [[Pose(np.array([0.01 * k, 0, 0]), np.eye(3))] for k in range(40)]
-    monkeypatch.setattr(drop_rest, "fall", lambda *_, **__: rolling)
+    monkeypatch.setattr(FALL, lambda *_, **__: rolling)
     edited = settle(floor_scene(96, 72), [box], AT)
     assert any("at rest" in note for note in edited.report.warnings)
-    monkeypatch.setattr(drop_rest, "fall", lambda *_, **__: iter([*rolling, *[rolling[-1]] * 12, rolling[0]]))
+    monkeypatch.setattr(FALL, lambda *_, **__: iter([*rolling, *[rolling[-1]] * 12, rolling[0]]))
     edited = settle(floor_scene(96, 72), [box], AT)
     assert not any("at rest" in note for note in edited.report.warnings)  # it was, at the last look but one

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edits.drop.drop_rest import settle
+from materialist.edits.drop.drop import settle
 from materialist.edits.glass.glass import glass
 from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight

@@ -6,7 +6,6 @@ import logging
 
 import numpy as np
 
-from materialist.edits.core.topology import edge_faults, places, volume
 from materialist.errors import SetupError
 from materialist.types import Array
 
@@ -29,8 +28,7 @@ def hull(points: Array) -> Array:
         return points[ConvexHull(points).vertices]
     except QhullError:
         size = max(float(np.ptp(points, axis=0).max()), 1e-9)
-        shifts = np.eye(3) * 0.01 * size
-        thick = np.concatenate([points, *(points + shift for shift in shifts)])
+        thick = np.concatenate([points, *(points + shift for shift in 0.01 * size * np.eye(3))])
         return thick[ConvexHull(thick).vertices]
 
 
@@ -40,11 +38,11 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
     Raises SetupError where coacd is not installed and the mesh is not nearly convex.
     """
     from scipy.spatial import ConvexHull
+    from trimesh import Trimesh
 
     vertices = np.asarray(vertices, np.float64)
-    outer = hull(vertices)
-    open_edges, _ = edge_faults(vertices, faces)
-    if not open_edges and ConvexHull(outer).volume <= SAME * abs(volume(vertices, faces)):
+    outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
+    if mesh.is_watertight and ConvexHull(outer).volume <= SAME * abs(mesh.volume):
         return [outer]
     try:
         import coacd
@@ -54,33 +52,11 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
         ) from error
     logging.getLogger("coacd").setLevel(logging.ERROR)
     coacd.set_log_level("error")
-    v, f = thinned(vertices, faces) if len(faces) > FINE else _welded(vertices, faces)
+    if len(faces) > FINE:
+        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / COARSE
+        mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
     parts = coacd.run_coacd(
-        coacd.Mesh(v, f), threshold=CONCAVE, max_convex_hull=PIECES, preprocess_resolution=30, resolution=400,
-        mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
+        coacd.Mesh(mesh.vertices, mesh.faces), threshold=CONCAVE, max_convex_hull=PIECES, preprocess_resolution=30,
+        resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
     )  # fmt: skip
     return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]
-
-
-def thinned(vertices: Array, faces: Array) -> tuple[Array, Array]:
-    """Vertices [V', 3] and faces [F', 3] int32 of a mesh [V, 3], [F, 3], coarser.
-
-    The vertices of each cell of a grid of `COARSE` are put together at their mean.
-    """
-    extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
-    cell = np.floor((vertices - vertices.min(0)) / extent * COARSE).astype(np.int64)
-    return _merged(vertices, faces, np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1))
-
-
-def _welded(vertices: Array, faces: Array) -> tuple[Array, Array]:
-    return _merged(vertices, faces, places(vertices))
-
-
-def _merged(vertices: Array, faces: Array, group: Array) -> tuple[Array, Array]:
-    """Vertices of one group [V] at their mean, without the triangles that vanish or repeat."""
-    count = np.bincount(group)
-    mean = np.stack([np.bincount(group, vertices[:, k]) for k in range(3)], -1) / count[:, None]
-    new = group[faces]
-    new = new[(new[:, 0] != new[:, 1]) & (new[:, 1] != new[:, 2]) & (new[:, 2] != new[:, 0])]
-    _, first = np.unique(np.sort(new, axis=1), axis=0, return_index=True)
-    return mean, new[np.sort(first)].astype(np.int32)

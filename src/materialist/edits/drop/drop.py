@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.convex import convex_pieces, hull
-from materialist.edits.drop.drop_ground import Surroundings, blocks_of, middle
+from materialist.edits.drop.ground import Surroundings, blocks_of, middle
 from materialist.edits.drop.physics import Pose, Thing, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
@@ -23,6 +25,12 @@ from materialist.types import Array, Body, Scene
 
 UPRIGHT = 0.5
 """Cosine to the camera's up from which a plane can be a floor or a table top."""
+LONGEST = 20.0
+"""Seconds after which a thing that still rolls is left where it is."""
+LOOKS = 24
+"""Looks at the things a second."""
+STILL = 12
+"""Looks in a row without motion after which things are at rest."""
 
 
 def drop(
@@ -60,6 +68,37 @@ def drop(
             last, poses = falling.at(frame), frame
         film.append(last)
     return film
+
+
+def settle(
+    scene: Scene, meshes: Sequence[str | Path | MeshModel], at: tuple[float, float] | Sequence[tuple[float, float]],
+    options: Drop | None = None, **values: Any,
+) -> Scene:  # fmt: skip
+    """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
+
+    Everything is as in `drop`, of which this is the last frame, however long that takes: things are at rest
+    when nothing has moved for half a second. What falls beside everything the photo shows is left out, and what
+    still rolls after 20 seconds stays where it is then; warnings tell of both, and of things that lie out of view.
+
+    Raises:
+        InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
+        SetupError: mujoco or coacd is missing.
+    """
+    falling = prepared(scene, meshes, at, Drop.given(options, **values))
+    poses, gone, rests = _rested(falling)
+    names = falling.what["meshes"]
+    if len(gone) == len(names):
+        raise InputError(
+            f"{', '.join(names)} falls beside everything that the photo shows; choose a place further from the edge of "
+            "the surface, a smaller height, or another seed."
+        )
+    notes = [f"{names[k]} falls beside everything that the photo shows, and was left out." for k in sorted(gone)]
+    if not rests:
+        notes.append(f"After {LONGEST:g} seconds not everything that fell is at rest; it stays where it is then.")
+    edited = falling.at(poses, tuple(notes), gone)
+    if not any(_in_view(scene, body) for body in edited.bodies[len(scene.bodies) :]):
+        return falling.at(poses, (*notes, "What fell came to rest where the camera does not look."), gone)
+    return edited
 
 
 @dataclass(frozen=True)
@@ -114,7 +153,7 @@ def prepared(
     around = Surroundings.of(scene, to_up, factor)
     points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
     names = [f"{model.name} at {place[0]:g},{place[1]:g}" for model, place in zip(models, places)]
-    shifts, tops, moved_aside = _starts(around, points, wanted, names)
+    shifts, tops = _starts(around, points, wanted, names)
     field = around.ground([middle(p) for p in points], tops, wanted.metres)
     starts = [(bodies, shift) for (bodies, *_), shift in zip(stood, shifts)]
     things = _things(starts, to_up, factor, wanted)
@@ -124,7 +163,7 @@ def prepared(
         **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
         "gravity": [round(float(v), 6) for v in direction],
     }  # fmt: skip
-    notes = (*(note for model in models for note in model.warnings), *moved_aside)
+    notes = tuple(note for model in models for note in model.warnings)
     return Falling(scene, things, ground, starts, to_up, factor, notes, what)
 
 
@@ -170,14 +209,14 @@ def _places(at: Any, count: int) -> list[tuple[float, float]]:
 
 def _starts(
     around: Surroundings, points: list[Array], wanted: Drop, names: list[str]
-) -> tuple[list[Array], list[float], list[str]]:
-    """For each thing the shift [3] to where it starts, and the z from which its ground is seen; and notes.
+) -> tuple[list[Array], list[float]]:
+    """For each thing the shift [3] to where it starts, and the z from which its ground is seen.
 
     points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene.
     Raises InputError where it cannot.
     """
     boxes: list[tuple[Array, Array]] = []
-    shifts, tops, notes = [], [], []
+    shifts, tops = [], []
     for own, name in zip(points, names):
         low, high = own.min(0), own.max(0)
         least = 0.0
@@ -185,20 +224,17 @@ def _starts(
             if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
                 least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
         lift = max(least, wanted.height * wanted.metres)
-        found = around.start(own, lift, least, wanted.metres, boxes)
+        found = around.start(own, lift, least, wanted.metres)
         if found is None:
             raise InputError(
                 f"There is no room for {name}: it would start inside of something; choose another place, or a larger "
                 "height."
             )
         shift, top = found
-        if shift[:2].any():
-            share = float(np.hypot(*shift[:2])) / wanted.metres
-            notes.append(f"{name} starts {share:.2g} of its size to the side: something stands in its way.")
         boxes.append((low + shift, high + shift))
         shifts.append(shift)
         tops.append(top)
-    return shifts, tops, notes
+    return shifts, tops
 
 
 def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[Thing]:
@@ -237,3 +273,26 @@ def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
         np.abs(a.centre - b.centre).max() > 1e-3 * metres or np.abs(a.turn - b.turn).max() > 2e-3
         for a, b in zip(before, now)
     )
+
+
+def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
+    """(the last poses, numbers of the things that fell out of the scene, whether the rest lies still)."""
+    bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
+    recent: deque[list[Pose]] = deque(maxlen=STILL + 1)
+    gone: frozenset[int] = frozenset()
+    for poses in fall(falling.things, falling.ground, frames=round(LONGEST * LOOKS) + 1, fps=LOOKS):
+        gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
+        recent.append([pose for k, pose in enumerate(poses) if k not in gone])
+        # A thing at the top of its flight is slow, too, but not for half a second.
+        if not recent[-1] or (len(recent) > STILL and _still(list(recent), falling.what["metres"])):
+            return poses, gone, True
+    return poses, gone, False
+
+
+def _in_view(scene: Scene, body: Body) -> bool:
+    place, depth = project(body.vertices, scene.camera)
+    return bool(((depth > 0) & (place > 0).all(-1) & (place < (scene.camera.width, scene.camera.height)).all(-1)).any())
+
+
+def _still(recent: list[list[Pose]], metres: float) -> bool:
+    return all(len(look) == len(recent[-1]) and not moves(look, recent[-1], metres) for look in recent[:-1])

@@ -1,12 +1,17 @@
-"""What things fall onto: the reconstructed surface as a height field along gravity, cut into convex blocks."""
+"""What things fall onto: the scene as a height field along gravity, cut into convex blocks.
+
+Coordinates are those of the simulation: metres, z up. `to_up` [3, 3] and `factor` lead there from the camera frame.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from materialist.types import Array
+from materialist.camera import unproject
+from materialist.types import Array, Scene
 
 CELLS = 128
 """Cells along each side of the field."""
@@ -14,6 +19,18 @@ STEEP = 0.15
 """Height over the floor, as a share of the thing's size, from which upright surfaces count."""
 BLOCKS = 1500
 """Most blocks; the flatness that a block must have is relaxed until there are no more."""
+REACH = 6.0
+"""Half of the side of the ground that things can fall onto, in longest sides."""
+FLAT = 0.004
+"""How plane a block of the ground must be, in longest sides."""
+GAP = 0.05
+"""Room that is left under what hangs over a thing, in longest sides."""
+BUMP = 0.2
+"""Height of what a thing is lifted over where it would start in it, in longest sides; the rest stands in its way."""
+BEHIND = 0.05
+"""Least cosine of a face's normal with a ray for the ray to come from behind."""
+LOW = 0.25
+"""Height up to which what rises above a flat thing is ground, in longest sides."""
 
 
 @dataclass(frozen=True)
@@ -65,20 +82,6 @@ def blocks(ground: Field, *, flat: float, depth: float) -> list[Array]:
     return found
 
 
-def tops(ground: Field, found: list[Array]) -> Array:
-    """[n, n, 4] z of the blocks over each cell of the field, at its corners in the order of a block's; NaN: none."""
-    n = ground.height.shape[0] - 1
-    result = np.full((n, n, 4), np.nan)
-    for block in found:
-        (column, row), (right, under) = np.round((block[[0, 3], :2] - ground.corner) / ground.cell).astype(int)
-        steps = np.linspace(0, 1, right - column + 1)
-        a, b, c, d = block[:4, 2]
-        v, u = steps[:, None], steps[None, :]
-        z = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d)  # a plane where it spans several cells
-        result[row:under, column:right] = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]], -1)
-    return result
-
-
 def _split(ground: Field, row: int, column: int, n: int, flat: float, depth: float, found: list[Array]) -> None:
     part = ground.height[row : row + n + 1, column : column + n + 1]
     known = np.isfinite(part)
@@ -106,3 +109,106 @@ def _block(ground: Field, row: int, column: int, n: int, tops: Array, depth: flo
     x = ground.corner[0] + ground.cell * (column + n * np.array([0, 1, 0, 1]))
     y = ground.corner[1] + ground.cell * (row + n * np.array([0, 0, 1, 1]))
     return np.concatenate([np.stack([x, y, tops], -1), np.stack([x, y, np.full(4, tops.min() - depth)], -1)])
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A scene that rays along gravity look at."""
+
+    target: Any
+    """`RenderScene` of its geometry and bodies."""
+    visible: Array
+    """[n, 3] points of the visible surface."""
+    to_up: Array
+    factor: float
+    """Metres a scene unit."""
+
+    @classmethod
+    def of(cls, scene: Scene, to_up: Array, factor: float) -> Surroundings:
+        """Those of a scene, with the bodies it has."""
+        from materialist.render.scene import RenderScene
+
+        target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+        visible = unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
+        return cls(target, visible, to_up, factor)
+
+    def meets(self, x: Array, y: Array, z: Array, upwards: bool = False) -> Array:
+        """z [n] of what rays down (or up) from (x, y, z) [n] meet first, NaN for nothing.
+
+        A ray down that begins in a solid, which rays up and down meet from behind, meets it at its start.
+        """
+        start = np.stack([x, y, z], -1) / self.factor @ self.to_up  # back in the camera frame
+        distance, behind = self._trace(start, 1.0 if upwards else -1.0)
+        if not upwards and behind.any():  # or it comes on the back of an open surface
+            distance[behind & self._trace(start, 1.0)[1]] = 0
+        return z + (distance if upwards else -distance)
+
+    def _trace(self, start: Array, sign: float) -> tuple[Array, Array]:
+        """(metres to what rays up (1) or down (-1) from [n, 3] meet first, NaN for nothing; whether from behind)."""
+        from materialist.buffers import floats
+
+        mi = self.target.mi
+        origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
+        direction = mi.Vector3f(*(float(sign * v) for v in self.to_up[2]))
+        hit = self.target.mi_scene.ray_intersect(mi.Ray3f(origin, direction))
+        met = np.array(hit.is_valid())
+        distance = np.where(met, np.array(hit.t, np.float64) * self.factor, np.nan)
+        return distance, met & (np.array(hit.n, np.float64).T @ (sign * self.to_up[2]) > BEHIND)
+
+    def room_over(self, points: Array, metres: float) -> float:
+        """How far a thing that stands with its points [n, 3] can be lifted before it meets what hangs over it.
+
+        inf under nothing. What does not rise above the thing as it stands, or above LOW, is ground or beside it.
+        """
+        low, high = points.min(0), points.max(0)
+        steps = np.linspace(0, 1, 9)
+        x, y = (v.ravel() for v in np.meshgrid(*(low[k] + steps * (high[k] - low[k]) for k in (0, 1))))
+        z = np.full_like(x, max(high[2], low[2] + LOW * metres))
+        over = self.meets(x, y, z, upwards=True)
+        return float(np.nanmin(over) - high[2]) if np.isfinite(over).any() else np.inf
+
+    def ground(self, places: list[Array], tops: list[float], metres: float) -> Field:
+        """Heights under and around places [2], seen from `tops` (z) over each and over what lies nearest to it."""
+        middles = np.stack(places)
+        half = REACH * metres + float(np.ptp(middles, axis=0).max()) / 2
+
+        def top(x: Array, y: Array) -> Array:
+            nearest = ((np.stack([x, y], -1)[:, None] - middles) ** 2).sum(-1).argmin(1)
+            return np.asarray(tops)[nearest]
+
+        return field(self.meets, self.visible, middles.mean(0), half, top, metres)
+
+    def start(self, points: Array, lift: float, least: float, metres: float) -> tuple[Array, float] | None:
+        """Where a thing that stands with its points [n, 3] is let go of: its shift [3], and z that sees its ground.
+
+        That is `lift` over its place, or lower, but not below `least`, where something hangs there. None where both are
+        inside of something.
+        """
+        high = float(points[:, 2].max())
+        under = min(lift, max(self.room_over(points, metres) - GAP * metres, 0.0))
+        for raised, space in ((lift, metres), (under, GAP * metres / 2)):
+            top = high + raised + space
+            deep = depth_in(self.ground([middle(points)], [top], metres), points + np.array([0, 0, raised]))
+            if raised >= least and deep <= BUMP * metres:
+                return np.array([0, 0, raised + max(deep, 0.0)]), top
+        return None
+
+
+def middle(points: Array) -> Array:
+    """[2] x and y of the middle of the box around points [n, 3]."""
+    return (points.min(0) + points.max(0))[:2] / 2
+
+
+def blocks_of(ground: Field, metres: float) -> list[Array]:
+    """Convex blocks [8, 3] each, for things whose longest side is `metres`."""
+    return blocks(ground, flat=FLAT * metres, depth=2 * metres)
+
+
+def depth_in(ground: Field, points: Array) -> float:
+    """How deep points [n, 3] lie in the ground at most; < 0 over it. A cell counts as high as its highest corner."""
+    column, row = np.floor((points[:, :2] - ground.corner) / ground.cell).astype(int).T
+    z = ground.height
+    cells = np.stack([z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]]).max(0)  # NaN beside a hole
+    inside = (column >= 0) & (row >= 0) & (column < cells.shape[1]) & (row < cells.shape[0])
+    deep = cells[row[inside], column[inside]] - points[inside, 2]
+    return float(np.nanmax(deep)) if np.isfinite(deep).any() else -np.inf
