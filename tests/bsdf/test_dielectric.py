@@ -81,9 +81,3 @@ def test_facets_are_distributed_as_visible_normals():
         for k in range(4000)
     ]
     assert np.mean(drawn) == pytest.approx(expected, abs=3e-3)
-
-
-def test_smooth_surfaces_have_one_facet():
-    d, n = pairs(5)
-    assert visible_facet(d, n, 0.0, 0.3, 0.8) is n
-    np.testing.assert_allclose(visible_facet(d, n, 1e-4, 0.3, 0.5), n, atol=1e-2)

@@ -122,24 +122,6 @@ def test_chi_squared_on_a_face_that_leans(roughness, metallic, degrees, side, ca
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 
-def test_a_ray_that_meets_the_front_sees_the_light_of_the_front():
-    """Its shading normal turns away: it must not be lit from behind, as a slit in a corner would be."""
-    surface, ctx, count = make(roughness=0.7, metallic=0), mi.BSDFContext(), 1 << 12
-    wi = np.array([0, 0.98, -0.199])
-    si = _leaning(wi, count)
-    face = np.array([0, 0.5, np.sqrt(0.75)])
-    assert wi @ face > 0.3 > 0 > wi[2]
-    rng = np.random.default_rng(2)
-    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
-    sample, weight = surface.sample(ctx, si, u1, u2)
-    wo, drawn = np.array(sample.wo).T, np.array(sample.pdf) > 0
-    assert drawn.mean() > 0.9 and (wo[drawn] @ face > -1e-5).all()
-    behind = wo * [1, 1, -1]
-    value = np.array(surface.eval(ctx, si, vector(behind))).T
-    assert (value[behind @ face < -1e-3] == 0).all() and (behind @ face < -1e-3).mean() > 0.3
-    assert np.array(weight).mean() > 0.3  # and it is not black
-
-
 def test_the_components_add_up():
     surface = make(roughness=0.4, metallic=0.3)
     wi, wo = pairs(1000, 6, 0.4)
@@ -151,17 +133,6 @@ def test_the_components_add_up():
     whole = np.array(surface.eval(mi.BSDFContext(), interaction(wi), vector(wo))).T
     assert parts[0] + parts[1] == pytest.approx(whole, rel=1e-5, abs=1e-7)
     assert (parts[0] > 0).mean() > 0.9 and (parts[1] > 0).mean() > 0.9
-
-
-def test_chi_squared_notices_a_wrong_density(capsys, tmp_path, monkeypatch):
-    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
-
-    monkeypatch.chdir(tmp_path)
-    xml = '<rgb name="base_color" value="0.5"/><float name="roughness" value="{}"/><float name="metallic" value="1"/>'
-    draw, _ = BSDFAdapter("materialist_disney", xml.format(0.6), wi=tilted(40).tolist())
-    _, density = BSDFAdapter("materialist_disney", xml.format(0.7), wi=tilted(40).tolist())
-    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
-    assert not test.run(significance_level=0.001)
 
 
 @pytest.mark.parametrize(("name", "step"), [("base_color", 0.02), ("roughness", 0.004), ("metallic", 0.02)])
@@ -227,14 +198,3 @@ def test_white_furnace_equals_quadrature():
     wo = np.stack([s * np.cos(phi), s * np.sin(phi), z], -1)
     value = brdf.evaluate(np.ones(3), 0.6, 0.4, NORMAL, tilted(45), wo)[..., 1] * z
     assert white_furnace(0.6, 0.4, 45) == pytest.approx(value.mean() * 2 * np.pi, rel=3e-3)
-
-
-def test_principled_is_another_model():
-    """Why there is a BSDF of our own: Mitsuba's dielectric reflects by Fresnel's equations, and its back is black."""
-    wi, wo = pairs(4000, 11, 0.2)
-    paper = (brdf.evaluate(np.array(ALBEDO), 0.2, 0.0, NORMAL, wi, wo) * wo[:, 2:])[:, 1]
-    theirs = evaluate(make(roughness=0.2, plugin="principled"), wi, wo)[:, 1]
-    assert np.percentile(np.abs(theirs - paper) / (paper + 0.01), 95) > 0.02
-    back = [tilted(30, -1)], [tilted(50, -1)]
-    assert (evaluate(make(plugin="principled"), *back) == 0).all()
-    assert (evaluate(make(), *back) > 0).all()

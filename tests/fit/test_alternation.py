@@ -105,35 +105,6 @@ def test_a_prior_that_explains_the_photo_gets_confidence(room):
         assert (stage["prior_confidence"] > 5) == explains
 
 
-def test_a_dark_photo_gets_no_brighter_light_than_it_needs(room):
-    """What the photo hardly constrains stays where the light starts: behind the camera, mostly."""
-    share = 0.1
-    dark = room.photo.linear * np.float32(share)
-    fit = room.fit(short(DEFAULT, 60), prior=room.truth)
-    fit.engine.set_radiance(dark)
-    state = replace(fit, photo=replace(room.photo, linear=dark, original=dark)).run()
-    assert 0.6 < state.envmap.mean() / (share * room.light.mean()) < 1.6  # from 0.6 it ended at more than three times
-
-
-def test_each_correction_has_noise_of_its_own(room):
-    seeds = []
-
-    def reference(materials, envmap, spp, seed):
-        seeds.append(seed)
-        return room.render(materials, envmap, spp, seed)
-
-    settings = replace(short(DEFAULT, 3), corrections=2, rounds=1)
-    room.fit(settings, reference=reference, seed=5).run()
-    assert len(set(seeds)) == len(seeds) == 2
-
-
-def test_the_light_after_a_white_one_is_fitted_to_what_the_photo_sends(room, monkeypatch):
-    sent, light = [], Fit._fit_light
-    monkeypatch.setattr(Fit, "_fit_light", lambda fit, *a: sent.append(fit.engine.radiance) or light(fit, *a))
-    room.fit(short(DEFAULT, 2), strategy="white-light-first").run()
-    assert len(sent) == 1 and sent[0] is room.photo.linear
-
-
 def test_a_speck_of_surface_is_fitted(room):
     """A share of a dozen pixels would be none of them."""
     from materialist.geometry.build import build_geometry
@@ -149,14 +120,6 @@ def test_a_speck_of_surface_is_fitted(room):
     surface = np.isin(problem.pixels.numpy(), engine.pixels.numpy())
     assert surface.sum() == len(engine.pixels) > 0
     assert torch.isfinite(problem.render(torch.ones(8, 16, 3))).all()
-
-
-def test_maps_are_in_range(fitted):
-    fit, state = fitted
-    materials = fit.materials(state)
-    for values in (materials.albedo, materials.roughness, materials.metallic):
-        assert values.dtype == np.float32
-        assert float(values.min()) >= 0 and float(values.max()) <= 1
 
 
 def test_true_materials_and_light_stay(room):

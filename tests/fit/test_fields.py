@@ -10,8 +10,6 @@ from materialist import metrics
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.fit.fields import (
     EnvmapMLP,
-    EnvmapSH,
-    EnvmapTexels,
     MaterialMaps,
     MaterialMLP,
     MaterialUNet,
@@ -53,22 +51,6 @@ def test_direction_field_is_continuous_where_the_map_is_sewn():
     assert float(envmap[0].std(0).max()) < 0.8 * float(flat[0].std(0).max())
 
 
-def test_jittered_lookups_average_to_the_map():
-    torch.manual_seed(0)
-    field = EnvmapMLP()
-    generator = torch.Generator().manual_seed(1)
-    with torch.no_grad():
-        jittered = torch.stack([field(16, generator) for _ in range(32)])
-        assert float((jittered[0] - jittered[1]).abs().max()) > 0
-        torch.testing.assert_close(jittered.mean(0), resize_envmap(field(48), 16), atol=0.02, rtol=0.05)
-
-
-def test_texels_start_where_they_are_told():
-    start = torch.rand(8, 16, 3) + 0.1
-    torch.testing.assert_close(EnvmapTexels(start)(8), start)
-    assert float(EnvmapTexels(torch.zeros(8, 16, 3))(8).detach().min()) > 0
-
-
 def test_spherical_harmonics_are_orthonormal_and_the_known_ones():
     d = texel_directions(128, 256)
     basis = sh_basis(d, 3).numpy()
@@ -81,15 +63,6 @@ def test_spherical_harmonics_are_orthonormal_and_the_known_ones():
     for column, axis in ((1, 0), (3, 2)):  # the sign is a convention
         np.testing.assert_allclose(np.abs(basis[..., column]), c1 * np.abs(d[..., axis]), atol=1e-5)
     np.testing.assert_allclose(basis[..., 6], c2 * (3 * d[..., 1] ** 2 - 1), atol=1e-5)
-
-
-def test_harmonics_field_starts_even_and_grey():
-    torch.testing.assert_close(EnvmapSH()(8).detach(), torch.full((8, 16, 3), math.log(2)))
-
-
-def test_resizing_to_the_same_size_changes_nothing():
-    envmap = torch.rand(16, 32, 3)
-    assert resize_envmap(envmap, 16) is envmap
 
 
 @pytest.mark.parametrize("height", [4, 8, 16, 32, 48, 80])
@@ -118,14 +91,6 @@ def test_enlarging_moves_nothing(height):
     envmap = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(1))
     expected = metrics.resample_envmap(envmap.numpy(), height)
     np.testing.assert_allclose(resize_envmap(envmap, height).numpy(), expected, atol=1e-3)
-
-
-def test_enlarging_wraps_in_azimuth():
-    envmap = torch.zeros(8, 16, 3)
-    envmap[:, 0] = 1
-    large = resize_envmap(envmap, 32)
-    torch.testing.assert_close(large[:, 0], large[:, 3])  # the bright column is symmetric about its centre
-    assert float(large[10, -1, 0]) == pytest.approx(0.375)  # 5/8 of a texel from it, across the seam
 
 
 def test_material_network_starts_exactly_at_the_prior():

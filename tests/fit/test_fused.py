@@ -60,20 +60,6 @@ def test_equals_the_terms_in_torch(encoding, clipped, holes):
     assert gradient == pytest.approx(slope, rel=1e-3, abs=1e-5 * float(np.abs(slope).max()))
 
 
-@pytest.mark.parametrize("term", ["weights", "smooth"])
-def test_each_regulariser_is_there(term):
-    tables, photo, prior, edges, factor = problem(3)
-    maps = 1 - prior
-    bare = replace(DEFAULT.materials, weights=(0, 0, 0), smooth=(0, 0, 0))
-    for k in range(3):
-        weights = tuple(0.5 if i == k else 0.0 for i in range(3))
-        fused, twin = both(tables, photo, prior, edges, factor, replace(bare, **{term: weights}))
-        alone, _ = both(tables, photo, prior, edges, factor, bare)
-        added = value_and_gradient(fused, maps)[0] - value_and_gradient(alone, maps)[0]
-        assert added > 1e-3
-        assert value_and_gradient(fused, maps)[0] == pytest.approx(value_and_gradient(twin, maps)[0], rel=1e-5)
-
-
 def test_dark_and_out_of_range_materials_stay_finite():
     tables, photo, prior, edges, factor = problem(5)
     black = Tables(0 * tables.diffuse, 0 * tables.specular)

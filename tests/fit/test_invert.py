@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from transport_scenes import furnished_room, windowed_sky
 
-from materialist import metrics
 from materialist.fit import invert
 from materialist.fit.invert import AUTO, FULL, FitResult, FitSetup, Inversion
 from materialist.fit.plane_extents import FoundExtents
@@ -57,14 +56,3 @@ def test_a_result_has_two_independent_halves(setup):
     names = [stage["name"] for stage in result.stages]
     assert names[:4] == ["geometry", "scene", "engine", "trace"] and names[-1] == "rerender"
     assert isinstance(result, FitResult) and result.prior_confidence >= 1
-
-
-def test_noise_is_taken_out_of_the_score():
-    """Pictures of 4 samples are scored as one of many would be."""
-    rng = np.random.default_rng(0)
-    truth = rng.uniform(0.2, 0.6, (64, 64, 3)).astype(np.float32)
-    found = truth + np.float32(0.02)
-    noisy = [found + rng.normal(0, 0.02, found.shape).astype(np.float32) for _ in range(2)]
-    assert metrics.psnr(np.mean(noisy, 0), truth) < metrics.psnr(found, truth) - 1
-    assert metrics.psnr_without_noise(*noisy, truth) == pytest.approx(metrics.psnr(found, truth), abs=0.2)
-    assert metrics.psnr_without_noise(truth, truth, truth) == 80

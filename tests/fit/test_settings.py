@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from materialist.errors import InputError
-from materialist.fit.engine import PathEngine
 from materialist.fit.light import envmap_field
 from materialist.fit.settings import DEFAULT, PAPER, preset
 
@@ -51,14 +50,6 @@ def test_paper_preset():
         for part in name.split("."):
             value = value[int(part)] if part.isdigit() else getattr(value, part)
         assert value == number, name
-
-
-def test_paper_engine_uses_64_samples():
-    import inspect
-
-    parameters = inspect.signature(PathEngine.__init__).parameters
-    assert parameters["spp"].default == 64
-    assert parameters["envmap_height"].default == 256
 
 
 def test_unknown_names_are_told():

@@ -166,23 +166,6 @@ def test_thin_bars_stand_free_of_the_background(width, tau):
     assert between[0] == -1
 
 
-def test_the_background_goes_on_for_a_pixel_under_the_foreground():
-    depth = np.full((9, 16), 6.0)
-    depth[:, 6:11] = 2.0
-    mesh, camera = mesh_of(depth)
-    tucks = mesh.faces[2 * depth.size :]
-    points = mesh.vertices[tucks].reshape(-1, 3).astype(float)
-    np.testing.assert_allclose(points[:, 2], -6, rtol=1e-5)
-    columns = points[:, 0] / 6 * camera.focal + camera.width / 2
-    assert sorted(np.unique(np.round(columns, 3))) == [6, 7, 10, 11]
-    assert set(mesh.face_pixel[2 * depth.size :] % 16) == {5, 11}
-    # Rays that graze past the bar's rim from behind the camera's back still find the wall.
-    origin = np.array([-0.05, 0.0, 0.0])
-    rim = np.array([(6 - 8) / camera.focal, 0, -1.0]) * 2
-    distance, _ = trace(mesh, origin, np.array([rim - origin + [-1e-4, 0, 0]]))
-    assert np.isfinite(distance[0])
-
-
 @given(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(0.5, 20), st.integers(3, 30), st.integers(3, 20))
 @settings(max_examples=25, deadline=None)
 def test_planes_are_reproduced_exactly(x, y, distance, width, height):

@@ -103,18 +103,6 @@ def test_a_table_top_goes_on_below_the_frame_but_not_into_the_air_above_the_floo
         assert hit(geometry.mesh, (x, 0.5, z), (0, -1, 0))[0] > 2
 
 
-def test_the_flat_face_of_an_object_is_not_continued():
-    wall = plane_depth(CAMERA, (0, 0, 1), -9.0)
-    box, box_normal = box_depth(CAMERA, (-1.2, -1.0, -4), (1.2, 1.0, -3))
-    depth = np.minimum(wall, box)
-    normal = np.where(np.isfinite(box)[..., None], box_normal, [0.0, 0, 1])
-    geometry = build_geometry(depth, normal, CAMERA)
-    face = geometry.plane_label[24, 32]
-    assert face >= 0 and face != geometry.plane_label[0, 0]
-    assert not (geometry.mesh.face_plane == face).any()
-    assert (geometry.mesh.face_plane == geometry.plane_label[0, 0]).any()
-
-
 def test_completion_can_be_switched_off_without_a_change_to_the_rest(furnished):
     geometry, depth, _, _, _ = furnished
     normal = room(CAMERA)[1]

@@ -64,18 +64,6 @@ def test_the_criterion_switches_at_tau(tau):
         assert cuts.cut_x.sum() == (30 if cut else 0) and not cuts.cut_y.any()
 
 
-def test_no_cut_at_holes_and_more_cuts_at_larger_tau():
-    rng = np.random.default_rng(1)
-    depth = rng.uniform(1, 3, (24, 31)) * (rng.random((24, 31)) > 0.3)
-    camera = Camera(31, 24, 60.0)
-    small, large = find_cuts(depth, camera, 2.0), find_cuts(depth, camera, 20.0)
-    pair = (depth[:, 1:] > 0) & (depth[:, :-1] > 0)
-    for cuts in (small, large):
-        np.testing.assert_array_equal(cuts.cut_x ^ cuts.link_x, pair)
-    assert (large.cut_x | ~small.cut_x).all() and (large.cut_y | ~small.cut_y).all()
-    assert large.cut_x.sum() > small.cut_x.sum()
-
-
 @pytest.mark.parametrize("width", [1, 3, 7])
 @pytest.mark.parametrize("tau", [1.0, 12.0])
 def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, tau):

@@ -95,28 +95,6 @@ def test_transmission_mixes_the_opaque_body_and_the_glass():
     assert half == pytest.approx(0.7 * opaque + 0.3, rel=0.01)
 
 
-def test_the_opaque_share_keeps_its_own_roughness():
-    """A film of chalk on smooth glass: neither does the film shine, nor is the glass frosted."""
-    light = uniform() * 0.05
-    light[:, :2] = light[:, -2:] = 1.0
-    given = {"ior": 1.5, "glass_roughness": 0.0}
-    coated = surface(0.6, 0.9, transmission=0.5, **given)
-    chalk, clear = surface(0.6, 0.9), surface(roughness=0.0, transmission=1.0, ior=1.5)
-    opaque, glass, both = (picture(sphere(s), light, spp=400)[disc()] for s in (chalk, clear, coated))
-    # At the middle, the mirror image of the light: half of each, whatever of the coat is seen from within.
-    np.testing.assert_allclose(both.mean(), 0.5 * (opaque + glass).mean(), rtol=0.06)
-    frosted = picture(sphere(surface(0.6, 0.9, transmission=0.5, ior=1.5)), light, spp=400)[disc()]
-    assert abs(frosted.mean() - both.mean()) > 0.03 * both.mean()
-
-
-def test_a_mirror_shows_the_light_behind_the_camera():
-    light = uniform() * 0.1
-    light[:, :2] = light[:, -2:] = 1.0
-    mirror = picture(sphere(surface(1.0, 0.0, 1.0)), light)
-    assert mirror[16, 24].mean() > 0.95
-    np.testing.assert_allclose(mirror[0, 0], 0.1, atol=0.01)
-
-
 def test_the_share_of_a_pixel_covered_by_a_body():
     body = sphere(surface())
     target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))

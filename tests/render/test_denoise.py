@@ -36,15 +36,6 @@ def test_noise_goes_and_the_edge_stays():
     assert np.array_equal(result, denoise(noisy, albedo=albedo, normal=normal))
 
 
-def test_inputs_stay_as_they_are_and_may_be_views():
-    pytest.importorskip("pyoidn")
-    _, noisy, albedo, normal = noisy_step()
-    before = noisy.copy()
-    flipped = denoise(noisy[:, ::-1], albedo=albedo[:, ::-1].astype(np.float64), normal=normal[:, ::-1])
-    assert np.array_equal(noisy, before)
-    assert np.isfinite(flipped).all() and flipped[:, :30].mean() > flipped[:, 36:].mean()
-
-
 @pytest.mark.parametrize("shape", [(1, 1), (2, 40), (40, 3)])
 def test_tiny_pictures_keep_their_light(shape):
     pytest.importorskip("pyoidn")

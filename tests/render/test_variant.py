@@ -2,13 +2,12 @@
 
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import pytest
 
 from materialist.errors import InputError, SetupError
 from materialist.render import variant
-from materialist.render.variant import LLVM, MINIMUM_LLVM, find_llvm, llvm_version, setup
+from materialist.render.variant import find_llvm, llvm_version, setup
 
 
 @pytest.fixture
@@ -19,7 +18,7 @@ def libraries(tmp_path, monkeypatch):
     def make(*names):
         for name in names:
             (tmp_path / name).write_bytes(b"")
-        monkeypatch.setattr(variant, "_candidates", lambda: [str(tmp_path / name) for name in names])
+        monkeypatch.setattr(variant, "_PLACES", [str(tmp_path / "*LLVM*")])
         return tmp_path
 
     return make
@@ -38,10 +37,6 @@ def libraries(tmp_path, monkeypatch):
 )
 def test_version_from_the_file_name(libraries, name, version):
     assert llvm_version(str(libraries(name) / name)) == version
-
-
-def test_a_missing_library_has_no_version(tmp_path):
-    assert llvm_version(str(tmp_path / "libLLVM.so.19.1")) is None
 
 
 @pytest.mark.parametrize(
@@ -63,16 +58,11 @@ def test_only_old_ones_name_the_package(libraries):
         find_llvm()
 
 
-@pytest.mark.parametrize(("name", "says"), [("libLLVM-15.so.1", "LLVM 15"), ("libLLVM-19.so.1", "no LLVM library")])
+@pytest.mark.parametrize(("name", "says"), [("libLLVM-15.so.1", "LLVM 15"), ("libLLVM.so", "no LLVM library")])
 def test_a_wrong_choice_of_the_user_is_explained(libraries, monkeypatch, name, says):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(libraries(name) / name))
     with pytest.raises(SetupError, match=says):
         find_llvm()
-
-
-def test_this_machine_has_one():
-    found = find_llvm()
-    assert isinstance(found, LLVM) and found.version >= MINIMUM_LLVM
 
 
 def test_a_wrong_library_never_aborts(libraries, tmp_path):
@@ -109,33 +99,3 @@ def test_what_kept_the_renderer_from_loading_is_the_first_cause():
         said = variant.unloaded(error)
     assert "libatomic.so.1 is missing" in said and "apt-get install -y libatomic1" in said
     assert "pip install --force-reinstall" in variant.unloaded(ImportError("no module named mitsuba"))
-
-
-@pytest.mark.parametrize("hidden", ["cause", "context"])
-def test_ctrl_c_while_the_renderer_loads_is_no_fault_of_it(monkeypatch, hidden):
-    class Loader:
-        """In the place of Mitsuba: an extension that turns a Ctrl-C into an error of its own."""
-
-        @staticmethod
-        def find_spec(name, *_):
-            if name != "mitsuba":
-                return None
-            try:
-                raise KeyboardInterrupt
-            except KeyboardInterrupt as stop:
-                if hidden == "cause":
-                    raise ImportError("mitsuba_ext did not load") from stop
-                raise NameError("name 'mitsuba_ext' is not defined")  # noqa: B904 - as Dr.Jit does it
-
-    monkeypatch.delitem(sys.modules, "mitsuba", raising=False)
-    monkeypatch.setattr(sys, "meta_path", [Loader, *sys.meta_path])
-    with pytest.raises(KeyboardInterrupt):
-        setup("cpu")
-
-
-def test_ctrl_c_while_the_variant_starts_is_no_fault_of_it():
-    def interrupted(_):
-        raise ImportError("initialization failed") from KeyboardInterrupt()
-
-    with pytest.raises(KeyboardInterrupt):
-        variant._start(SimpleNamespace(set_variant=interrupted), "cpu")

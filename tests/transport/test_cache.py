@@ -210,15 +210,3 @@ def test_light_is_linear(walled_floor):
     a, b = (rng.random((16, 32, 3)).astype(np.float32) for _ in range(2))
     tables = [walled_floor.gather(e, None).specular for e in (a, b, 2 * a + 3 * b)]
     np.testing.assert_allclose(tables[2], 2 * tables[0] + 3 * tables[1], rtol=1e-4, atol=1e-5)
-
-
-def test_progress_counts_every_lobe():
-    told = []
-    cache = TransportCache(
-        quads(floor(), pixels=[0], planes=[-1]), CAMERA, CacheSettings(4, 4),
-        progress=lambda *a: told.append(a),
-    )  # fmt: skip
-    assert told == []  # a light fit traces none of them
-    cache.trace()
-    cache.trace()
-    assert told == [("trace", k, 9) for k in range(1, 10)]

@@ -2,11 +2,10 @@
 
 import mitsuba as mi
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from materialist.envmap import row_solid_angle, texel_directions
+from materialist.envmap import row_solid_angle
 from materialist.transport.environment import (
     EnvmapLevel,
     EnvmapPyramid,
@@ -26,37 +25,6 @@ def look(envmap, directions):
     return np.array(EnvmapLevel(envmap).lookup(d, mi.Bool(True))).T
 
 
-def test_convention_of_directions():
-    """Centre column along -Z, columns to the right turn towards +X, top row is +Y (docs/conventions.md)."""
-    d = texel_directions(64, 128)
-    np.testing.assert_allclose(np.linalg.norm(d, axis=-1), 1, atol=1e-6)
-    np.testing.assert_allclose(d[32, [63, 64]].mean(0), [0, 0, -1], atol=0.03)
-    assert d[32, 96, 0] > 0.99
-    assert d[0, 0, 1] > 0.99
-
-
-def test_lookup_at_texel_centres_is_exact():
-    envmap = random_map(16)
-    np.testing.assert_allclose(
-        look(envmap, texel_directions(16, 32).reshape(-1, 3)), envmap.reshape(-1, 3), rtol=2e-4, atol=2e-5
-    )
-
-
-def test_lookup_wraps_in_azimuth():
-    """Behind the camera, the first and the last column meet."""
-    envmap = random_map(8)
-    middle = (envmap[3:5, 0] + envmap[3:5, -1]).mean(0) / 2
-    for side in (-1e-4, 1e-4):
-        np.testing.assert_allclose(look(envmap, [[side, 0, 1]])[0], middle, atol=1e-3)
-
-
-def test_lookup_is_clamped_at_the_poles():
-    envmap = random_map(8)
-    phi = 2 * np.pi * (5.5 / 16 - 0.5)
-    near_pole = [[1e-3 * np.sin(phi), 1, -1e-3 * np.cos(phi)], [1e-3 * np.sin(phi), -1, -1e-3 * np.cos(phi)]]
-    np.testing.assert_allclose(look(envmap, near_pole), envmap[[0, -1], 5], atol=1e-3)
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_lookup_equals_the_shares_of_the_light_matrix(seed):
@@ -66,16 +34,6 @@ def test_lookup_equals_the_shares_of_the_light_matrix(seed):
     index, share = bilinear(d, (8, 16))
     np.testing.assert_allclose(share.sum(-1), 1, atol=1e-9)
     np.testing.assert_allclose((envmap.reshape(-1, 3)[index] * share[..., None]).sum(1), look(envmap, d), atol=2e-4)
-
-
-def test_texel_directions_come_back_through_bilinear():
-    index, share = bilinear(texel_directions(16, 32).reshape(-1, 3), (16, 32))
-    np.testing.assert_array_equal(np.take_along_axis(index, share.argmax(-1)[:, None], -1)[:, 0], np.arange(512))
-    assert share.max(-1).min() > 0.999
-
-
-def test_solid_angles_add_up_to_the_sphere():
-    assert row_solid_angle(24).sum() * 48 == pytest.approx(4 * np.pi)
 
 
 def test_halving_keeps_the_mean_radiance_of_the_sphere():

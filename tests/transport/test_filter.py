@@ -6,7 +6,7 @@ from transport_scenes import furnished_room, windowed_sky
 
 from materialist.fit.engine import TransportEngine
 from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, Tables
-from materialist.transport.filter import Guide, filter_tables, guide_weights, joint_filter
+from materialist.transport.filter import Guide, filter_tables, joint_filter
 
 H, W = 12, 10
 
@@ -29,13 +29,6 @@ def noise(channels: int = 2):
     return torch.rand(H, W, channels, generator=torch.Generator().manual_seed(0))
 
 
-def test_constants_stay():
-    grey = torch.full((H, W, 2), 0.7)
-    for guide in (flat_guide(), folded_guide()):
-        for step in (1, 3):
-            torch.testing.assert_close(joint_filter(grey, guide, step=step), grey)
-
-
 def test_plane_gets_the_plain_box_average():
     """Inside, the filter equals a 5 x 5 average with half weight on the rim."""
     values, tap = noise(1), np.array([0.5, 1, 1, 1, 0.5]) / 4
@@ -47,25 +40,12 @@ def test_plane_gets_the_plain_box_average():
     np.testing.assert_allclose(filtered[2:-2, 2:-2], expected[2:-2, 2:-2], rtol=1e-5)
 
 
-def test_nothing_crosses_a_fold():
-    values = torch.zeros(H, W, 1)
-    values[:, 5:] = 1
-    torch.testing.assert_close(joint_filter(values, folded_guide()), values)
-    assert float(joint_filter(values, flat_guide())[:, 4].min()) > 0.2  # without the fold it does
-
-
 def test_nothing_crosses_a_step_in_depth():
     guide = flat_guide()
     guide.position[:, 5:, 2] -= 40
     values = torch.zeros(H, W, 1)
     values[:, 5:] = 1
     torch.testing.assert_close(joint_filter(values, guide), values)
-
-
-def test_weights_end_at_the_frame():
-    weight = guide_weights(flat_guide(), 1, -2, 32.0)
-    assert not weight[-1].any() and not weight[:, :2].any()
-    torch.testing.assert_close(weight[:-1, 2:], torch.ones(H - 1, W - 2))
 
 
 def test_pixels_without_a_surface_give_nothing():

@@ -73,14 +73,6 @@ def test_a_diffuse_surface_sends_out_what_a_white_sky_sends(scene):
         assert total[k] == pytest.approx(2 * (fd * wi[:, 2]).mean(), rel=0.01)
 
 
-def test_every_row_has_its_rays_whatever_part_it_falls_into(scene, monkeypatch):
-    whole = lit(scene)
-    monkeypatch.setattr("materialist.transport.rays.LANES", 5000)
-    parts = lit(scene)
-    assert error(parts, whole) < 0.01
-    torch.testing.assert_close(parts, whole, rtol=1e-3, atol=1e-4)
-
-
 def test_a_low_light_of_one_texel_reaches_all_pixels_that_see_it(scene):
     """What cosine-weighted rays seldom meet."""
     cache, materials, rows = scene

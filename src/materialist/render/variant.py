@@ -18,17 +18,17 @@ MINIMUM_LLVM = 17
 PREFERRED_LLVM = 19
 """The version this package is tested with: later ones are used only where no version up to this one is found."""
 
-_PATTERNS = (
+_PLACES = (
     "/usr/lib/*-linux-gnu/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
     "/usr/lib64/libLLVM*.so*",
     "/usr/lib64/llvm*/lib*/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
-    "/usr/lib/llvm/*/lib*/libLLVM*.so*",
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-    "/home/linuxbrew/.linuxbrew/opt/llvm*/lib/libLLVM*.so*",
     "C:/Program Files/LLVM/bin/LLVM-C.dll",
+    f"{sys.prefix}/lib/libLLVM*.so*",
+    f"{sys.prefix}/lib/libLLVM*.dylib",
 )
 
 
@@ -50,45 +50,18 @@ def find_llvm() -> LLVM:
         SetupError: none of version 17 or later is found; the message names the package to install.
     """
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
-    if chosen:
-        return _named(chosen)
-    versions = {path: llvm_version(path) for path in {os.path.realpath(p) for p in _candidates()}}
-    found = [LLVM(path, version) for path, version in versions.items() if version is not None]
-    usable = [f for f in found if f.version >= MINIMUM_LLVM]
+    paths = [chosen] if chosen else {os.path.realpath(path) for place in _PLACES for path in glob(place)}
+    versions = {path: llvm_version(path) for path in paths}
+    usable = [LLVM(path, version) for path, version in versions.items() if version and version >= MINIMUM_LLVM]
     if usable:
         return min(usable, key=lambda f: (f.version > PREFERRED_LLVM, abs(f.version - PREFERRED_LLVM), f.path))
-    seen = ", ".join(map(str, sorted({f.version for f in found})))
-    raise SetupError(f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}")
-
-
-def _named(path: str) -> LLVM:
-    """The library that the user chose, asked for its version whatever its name says."""
-    version = _ask(path)
-    by_name = llvm_version(path)
-    if version is None and by_name is not None and by_name < MINIMUM_LLVM:
-        version = by_name
-    if version is None:
-        raise SetupError(f"DRJIT_LIBLLVM_PATH is {path}, which is no LLVM library; unset it, or {_remedy()}")
-    if version < MINIMUM_LLVM:
+    seen = ", ".join(map(str, sorted({version for version in versions.values() if version})))
+    if chosen:
+        found = f"LLVM {seen}" if seen else "no LLVM library"
         raise SetupError(
-            f"DRJIT_LIBLLVM_PATH is LLVM {version}, and {MINIMUM_LLVM} or later is needed; unset it, or {_remedy()}"
+            f"DRJIT_LIBLLVM_PATH is {chosen}, {found}; LLVM {MINIMUM_LLVM} or later is needed: unset it, or {_remedy()}"
         )
-    return LLVM(path, version)
-
-
-def _candidates() -> list[str]:
-    """Paths that may be LLVM libraries: what the dynamic linker knows, the usual folders, this Python's environment."""
-    prefixes = {sys.prefix, os.environ.get("CONDA_PREFIX", sys.prefix)}
-    own = [f"{prefix}/lib/libLLVM*{end}" for prefix in prefixes for end in (".so*", ".dylib")]
-    return [path for pattern in (*_PATTERNS, *own) for path in glob(pattern)] + _linker_cache()
-
-
-def _linker_cache() -> list[str]:
-    try:
-        listing = subprocess.run(["ldconfig", "-p"], capture_output=True, text=True, timeout=10).stdout
-    except (OSError, subprocess.TimeoutExpired):
-        return []
-    return re.findall(r"^\s*libLLVM\S*\.so\S* .*=> (\S+)$", listing, re.MULTILINE)
+    raise SetupError(f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}")
 
 
 def _remedy() -> str:
@@ -137,20 +110,6 @@ def unloaded(error: BaseException) -> str:
     return f"the library {match[1]} is missing; install it with: sudo apt-get install -y {package_of(match[1])}"
 
 
-def _stop_if_interrupted(error: BaseException) -> None:
-    """Raise KeyboardInterrupt where a Ctrl-C is among the causes: an extension that loads turns it into its own."""
-    waiting: list[BaseException | None] = [error]
-    seen: set[int] = set()
-    while waiting:
-        cause = waiting.pop()
-        if cause is None or id(cause) in seen:
-            continue
-        if isinstance(cause, KeyboardInterrupt):
-            raise KeyboardInterrupt from error
-        seen.add(id(cause))
-        waiting += [cause.__cause__, cause.__context__]
-
-
 def package_of(library: str) -> str:
     """Debian's package of a shared library: libatomic.so.1 is in libatomic1."""
     return library.replace(".so.", "").replace(".so", "").lower()
@@ -192,7 +151,6 @@ def setup(device: str = "auto"):
     try:
         import mitsuba as mi
     except (ImportError, NameError) as error:  # Dr.Jit hides a loader's error behind a NameError
-        _stop_if_interrupted(error)
         raise SetupError(f"Mitsuba does not start: {unloaded(error)}") from error
 
     current = mi.variant()
@@ -234,7 +192,6 @@ def _start(mi, device: str) -> None:
     try:
         mi.set_variant(_VARIANTS[device])
     except ImportError as error:
-        _stop_if_interrupted(error)
         raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}).") from error
     if device == "cpu":
         _limit_threads()
