@@ -90,7 +90,7 @@ def test_cycles_sees_what_we_see(tmp_path):
     renderer = RenderScene(scene.geometry, scene.camera)
     renderer.set_materials(scene.materials)
     renderer.set_envmap(scene.envmap)
-    ours, theirs = renderer.render_path(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
+    ours, theirs = renderer.render(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
     assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30

@@ -134,7 +134,7 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
     target.set_materials(scene.materials)
     target.set_envmap(scene.envmap)
-    expected = target.render_path(spp=64, seed=1, max_depth=GLASS_DEPTH)
+    expected = target.render(spp=64, seed=1, max_depth=GLASS_DEPTH)
     done = export(scene, tmp_path / "scene", to="mitsuba")
     own = done.path.with_name("scene_materialist.xml")
     loaded = load_xml(target.mi, own, spp=64, max_depth=GLASS_DEPTH)

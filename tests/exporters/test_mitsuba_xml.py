@@ -32,7 +32,7 @@ def test_it_renders_as_ours_does(written, capfd):
     renderer.set_envmap(scene.envmap)
     mi = renderer.mi
     loaded = load_xml(mi, folder / OWN, spp=64, max_depth=3)
-    ours = [renderer.render_path(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
+    ours = [renderer.render(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
     theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
     # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
     noise = np.sqrt(np.mean((ours[0] - ours[1]) ** 2))
@@ -55,7 +55,7 @@ def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
     renderer.set_materials(scene.materials)
     renderer.set_envmap(scene.envmap)
     loaded = load_xml(renderer.mi, tmp_path / OWN, spp=256, max_depth=3)
-    ours, theirs = renderer.render_path(spp=256, seed=1, max_depth=3), np.array(renderer.mi.render(loaded, seed=2))
+    ours, theirs = renderer.render(spp=256, seed=1, max_depth=3), np.array(renderer.mi.render(loaded, seed=2))
     blocks = [image.reshape(5, 8, 8, 8, 3).mean((1, 3)) for image in (ours, theirs)]
     np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.05)  # inside `twosided`: 0.19
 

@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from materialist.fit.engine import MaterialProblem
+from materialist.fit.losses import edge_weights
 from materialist.fit.materials import material_objective
 from materialist.fit.settings import DEFAULT
-from materialist.fit.variation import edge_weights
 from materialist.render.variant import setup
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 from materialist.transport.shading import shade

@@ -35,13 +35,6 @@ def test_a_surface_becomes_a_metal_only_where_it_gains_more_than_its_price():
     assert start_of(0.0, 1.5 * cheap, metal_factor=1.0) > 0.9
 
 
-def test_where_the_prior_says_dielectric_metal_must_win_clearly():
-    price = SETTINGS.weights[2] * 0.95
-    between = price + SETTINGS.metal_margin / 2
-    assert start_of(0.0, between, metal_factor=1.0) < 0.1
-    assert start_of(0.0, between, metal_factor=1.0, metal_margin=0.0) > 0.9
-
-
 def test_a_region_of_one_metallic_decides_as_one():
     """Two pixels gain more than the other two lose: alone they part, under one mask all of them start as metal."""
     gain = torch.tensor([0.6, 0.6, -0.2, -0.2])[:, None]

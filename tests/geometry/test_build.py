@@ -1,7 +1,7 @@
 """Creases: normals are not shared across them, points are."""
 
 import numpy as np
-from geometry_scenes import plane_depth, sphere_depth
+from geometry_scenes import plane_depth
 
 from materialist.geometry.boundary import depth_to_mesh
 from materialist.geometry.build import build_geometry, split_creases
@@ -42,15 +42,3 @@ def test_points_faces_and_everything_else_stay():
     assert tucks.any()
     np.testing.assert_array_equal(split.normals[split.faces[tucks]], mesh.normals[mesh.faces[tucks]])
     assert np.unique(split.faces).size == len(split.vertices)
-
-
-def test_a_round_surface_is_shaded_as_before():
-    depth, normal = sphere_depth(CAMERA, (0, 0, -4), 1.0)
-    depth, normal = np.where(np.isfinite(depth), depth, 0), normal.astype(np.float32)
-    mesh = depth_to_mesh(depth, normal, CAMERA)
-    split = split_creases(mesh, depth, normal, crease=180)
-    assert len(split.vertices) == len(mesh.vertices)
-    np.testing.assert_allclose(split.normals[split.faces], mesh.normals[mesh.faces], atol=1e-5)
-    inner = np.abs(normal[..., 2].ravel()[split.face_pixel]) > 0.6
-    usual = split_creases(mesh, depth, normal)
-    np.testing.assert_allclose(usual.normals[usual.faces[inner]], mesh.normals[mesh.faces[inner]], atol=1e-5)

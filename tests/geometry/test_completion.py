@@ -87,22 +87,6 @@ def test_outdoors_the_sky_stays_open_and_the_ground_goes_far():
     assert plane is not None and plane >= 0 and distance == pytest.approx(6.5, rel=0.02)
 
 
-def test_a_table_top_goes_on_below_the_frame_but_not_into_the_air_above_the_floor():
-    # A table top ends at z = -4; beyond its edge one sees the floor, lower down.
-    top = plane_depth(CAMERA, (0, 1, 0), -0.8)
-    floor = plane_depth(CAMERA, (0, 1, 0), -2.0)
-    wall = plane_depth(CAMERA, (0, 0, 1), -9.0)
-    depth = np.minimum(np.where(top < 4, top, floor), wall)
-    normal = np.where((depth == wall)[..., None], [0.0, 0, 1], [0.0, 1, 0])
-    geometry = build_geometry(depth, normal, CAMERA)
-    table = geometry.plane_label[-1, 32]
-    assert table >= 0
-    distance, plane, _ = hit(geometry.mesh, (0.1, 0, -0.3), (0, -1, 0))
-    assert plane == table and distance == pytest.approx(0.8, abs=0.02)
-    for x, z in ((0.1, -6.0), (1.5, -7.0), (-1.5, -5.5)):  # seen floor: no table above it
-        assert hit(geometry.mesh, (x, 0.5, z), (0, -1, 0))[0] > 2
-
-
 def test_completion_can_be_switched_off_without_a_change_to_the_rest(furnished):
     geometry, depth, _, _, _ = furnished
     normal = room(CAMERA)[1]

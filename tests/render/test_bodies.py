@@ -39,7 +39,7 @@ def picture(body: Body, envmap, spp: int = 16) -> np.ndarray:
     target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
     target.set_envmap(envmap)
     depth = GLASS_DEPTH if is_transparent(body.surface) else 4
-    return target.render_path(spp=spp, seed=1, max_depth=depth)
+    return target.render(spp=spp, seed=1, max_depth=depth)
 
 
 def disc() -> np.ndarray:

@@ -82,18 +82,6 @@ def test_faces_keep_the_order_of_the_mesh():
     assert (geometry.mesh.face_pixel[np.array(hit.prim_index)] == np.arange(7 * 13)).all()
 
 
-def test_no_ray_slips_between_the_faces():
-    """Anywhere on a wall, and exactly through its vertices and along its edges."""
-    camera = Camera(48, 32, 40.0)
-    scene = RenderScene(wall(camera), camera, device="cpu")
-    rng = np.random.default_rng(0)
-    x, y = rng.uniform(0, 48, 50_000), rng.uniform(0, 32, 50_000)
-    row, col = np.indices((31, 47)).reshape(2, -1) + 1.0
-    x, y = np.concatenate([x, col, col + 0.5, col]), np.concatenate([y, row, row, row + 0.5])
-    hit = np.array(scene.mi_scene.ray_intersect_preliminary(camera_rays(scene, x, y)).is_valid())
-    assert hit.all(), f"{(~hit).sum()} of {len(hit)} rays slip through"
-
-
 @pytest.mark.parametrize(("rough", "metallic"), [(0.3, 0.7), (1.0, 0.0)])
 def test_direct_light_is_the_integral_of_the_reference(rough, metallic):
     """A wall under constant light: L = integral of f_r cos, by quadrature of the numpy reference."""
@@ -153,19 +141,6 @@ def test_a_continued_plane_carries_the_mean_of_its_pixels():
         np.testing.assert_allclose(value, np.broadcast_to(np.atleast_1d(mean), value.shape), rtol=1e-5)
 
 
-def test_the_floor_lights_the_wall():
-    """A white floor against a black one: half of what the wall sees, so A / 2 = 0.25 more light and a little gloss."""
-    label = np.full(SIZE, -1)
-    label[6] = 0
-    images = []
-    for value in (0.0, 1.0):
-        maps = uniform(CAMERA)
-        maps.albedo[6] = value
-        images.append(scene_of(with_floor(wall(CAMERA), label, height=-0.9), maps).render(spp=256, max_depth=3))
-    gain = images[1][:6].mean((1, 2)) - images[0][:6].mean((1, 2))
-    assert (gain > 0.22).all() and (gain < 0.32).all()
-
-
 def test_updates_give_the_picture_of_a_fresh_scene():
     maps, envmap = random_maps(5), np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
     label = np.full(SIZE, -1)
@@ -222,5 +197,4 @@ def test_normals_along_the_picture_s_x_are_normals_like_others():
     normal = np.zeros((*SIZE, 3), np.float32)
     normal[..., 0] = 1
     scene = scene_of(build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none"))
-    for integrator in (scene.render, scene.render_path):
-        assert np.isfinite(integrator(spp=4)).all()
+    assert np.isfinite(scene.render(spp=4)).all()

@@ -1,7 +1,6 @@
 """Cached shading and its gradients against the path tracer on the same scene."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +11,9 @@ from materialist.camera import project
 from materialist.color import linear_to_srgb
 from materialist.fit.engine import TransportEngine
 from materialist.fit.losses import l1_l2
-from materialist.geometry.build import build_geometry
-from materialist.io.exr import read_exr
 from materialist.render.scene import RenderScene
 from materialist.transport.shading import shade
-from materialist.types import Camera, Materials
-
-OFFICIAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "official_indoor"
+from materialist.types import Materials
 
 
 class Comparison:
@@ -53,7 +48,7 @@ class Comparison:
         """PSNR away from depth edges and over all surface pixels, with the noise of the reference taken out."""
         image = linear_to_srgb(self.cached(bounces))
         # Errors against two independent references: their noise has mean zero in the product.
-        errors = [image - linear_to_srgb(self.path.render_path(spp=spp, seed=s, max_depth=bounces + 1)) for s in (1, 2)]
+        errors = [image - linear_to_srgb(self.path.render(spp=spp, seed=s, max_depth=bounces + 1)) for s in (1, 2)]
         square = (errors[0].astype(np.float64) * errors[1]).mean(-1)
         return [float(-10 * np.log10(max(square[mask].mean(), 1e-9))) for mask in (self.away, self.surface)]
 
@@ -78,7 +73,7 @@ def test_cached_shading_equals_path_tracing(comparison, bounces, away, everywher
 
 
 def test_cached_shading_has_no_bias(comparison):
-    reference = comparison.path.render_path(spp=100, seed=3, max_depth=2)
+    reference = comparison.path.render(spp=100, seed=3, max_depth=2)
     ratio = comparison.cached(1)[comparison.away].mean() / reference[comparison.away].mean()
     assert ratio == pytest.approx(1, abs=0.01)
 
@@ -92,14 +87,14 @@ def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
 def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int = 256) -> list[float]:
     """Cosines of the gradients of L1 + L2 in albedo, roughness and metallic, noise of the reference taken out."""
     c.path.set_materials(c.materials)
-    target = torch.from_numpy(c.path.render_path(spp=image_spp, seed=7, max_depth=max_depth))
+    target = torch.from_numpy(c.path.render(spp=image_spp, seed=7, max_depth=max_depth))
     # Darker all over: where a rendering meets the photo, the gradient of L1 is a coin toss in both.
     start = replace(
         c.materials, albedo=c.materials.albedo * 0.6, roughness=np.clip(c.materials.roughness + 0.15, 0, 1),
         metallic=c.materials.metallic * 0.6 + 0.2,
     )  # fmt: skip
     c.path.set_materials(start)
-    image = torch.from_numpy(c.path.render_path(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
+    image = torch.from_numpy(c.path.render(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
     weight = torch.autograd.grad(l1_l2(image - target), image)[0]
     leaves = [t.requires_grad_() for t in _tensors(start)]
     light = torch.from_numpy(c.envmap)
@@ -116,36 +111,3 @@ def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int 
         float((g * (a + b)).sum() / 2 / (g.norm() * (a * b).sum().sqrt()))
         for g, a, b in zip(cached, first, second)
     ]
-
-
-@pytest.fixture(scope="module")
-def photograph():
-    """The published materials and light of a real photograph, at full size."""
-    if not OFFICIAL.is_dir():
-        pytest.skip(f"{OFFICIAL} is not there")
-    depth, normal = _exr("maps/depth")[..., 0], _exr("maps/normal")
-    camera = Camera(depth.shape[1], depth.shape[0], 35.0)
-    albedo, rest = _exr("official/albedo"), [_exr(f"official/{k}")[..., 0] for k in ("roughness", "metallic")]
-    materials = Materials(*(np.clip(m, 0, 1) for m in (albedo, *rest)))
-    envmap = np.maximum(_exr("official/envmap"), 0)
-    return Comparison(camera, build_geometry(depth, normal, camera), materials, envmap)
-
-
-def _exr(name: str):
-    image = read_exr(OFFICIAL / f"{name}.exr")
-    return np.ascontiguousarray(image.reshape(*image.shape[:2], -1), np.float32)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("bounces", "away", "everywhere"), [(1, 38, 32), (3, 34, 30)], ids=["direct", "indirect"])
-def test_cached_shading_equals_path_tracing_on_a_photograph(photograph, bounces, away, everywhere):
-    measured = photograph.decibels(bounces, spp=36)
-    assert measured[0] >= away
-    assert measured[1] >= everywhere
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("max_depth", [2, 4], ids=["direct", "indirect"])
-def test_cached_gradients_on_a_photograph(photograph, max_depth):
-    cosines = gradient_cosines(photograph, max_depth, spp=16)
-    assert min(cosines) >= 0.95, cosines

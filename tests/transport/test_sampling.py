@@ -21,15 +21,3 @@ def test_points_fill_the_square(lattice):
     assert x.min() >= 0 and y.min() >= 0 and x.max() < 1 and y.max() < 1
     counts, _, _ = np.histogram2d(x, y, bins=64, range=[[0, 1], [0, 1]])
     assert counts.min() >= 2 and counts.max() <= 6
-
-
-def test_shift_is_stratified_over_a_tile_and_repeats_with_the_seed():
-    shift = sampling.pixel_shift(9, 13, 5)
-    assert shift.shape == (9, 13, 2)
-    tile = shift[:4, :4].reshape(-1, 2)
-    assert len(np.unique(tile[:, 0])) == 16
-    cells = (tile * 2).astype(int)  # a quarter of the points in each quarter of the square, give or take one
-    counts = np.bincount(cells[:, 0] * 2 + cells[:, 1], minlength=4)
-    assert counts.min() >= 3 and counts.max() <= 5
-    np.testing.assert_array_equal(shift, sampling.pixel_shift(9, 13, 5))
-    assert not np.array_equal(shift, sampling.pixel_shift(9, 13, 6))

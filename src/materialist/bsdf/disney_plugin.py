@@ -45,32 +45,25 @@ def _define():
             albedo = mi.Color3f(self.base_color.eval(si, active))
             return albedo, self.roughness.eval_1(si, active), self.metallic.eval_1(si, active)
 
-        def _specular_probability(self, ctx, cos_i, albedo, metallic):
-            """Probability of the specular lobe: 0 or 1 where the context asks for one component."""
-            if ctx.component in (0, 1):
-                return mi.Float(ctx.component)
+        def _specular_probability(self, cos_i, albedo, metallic):
             return dr.detach(specular_probability(cos_i, mi.luminance(albedo), metallic))
 
-        def _value(self, ctx, wi, wo, albedo, roughness, metallic):
-            """f_r cos(theta_o) for directions above the surface, or the component of it that the context asks for."""
-            value = mi.Color3f(0)
-            if ctx.component != 1:
-                value += albedo * (1 - metallic) * lobes.diffuse(wi, wo, roughness)
-            if ctx.component != 0:
-                value += lobes.specular(wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic))
-            return value
+        def _value(self, wi, wo, albedo, roughness, metallic):
+            """f_r cos(theta_o) for directions above the surface."""
+            diffuse = albedo * (1 - metallic) * lobes.diffuse(wi, wo, roughness)
+            return diffuse + lobes.specular(wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic))
 
         def sample(self, ctx, si, sample1, sample2, active=True):
             albedo, roughness, metallic = self._materials(si, active)
             wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
-            probability = self._specular_probability(ctx, wi.z, albedo, metallic)
+            probability = self._specular_probability(wi.z, albedo, metallic)
             take_specular = sample1 < probability
             wo = lobes.sample(wi, dr.detach(alpha_of(roughness)), take_specular, sample2)
             active = active & (wi.z > 0) & (wo.z > 0)
             bs = mi.BSDFSample3f()
             side = self._side(si)
             bs.wo = lobes.lifted(mi.Vector3f(wo.x, wo.y, wo.z * side), self._face(si, side))
-            value, pdf = self._both(ctx, si, bs.wo, probability, albedo, roughness, metallic)
+            value, pdf = self._both(si, bs.wo, probability, albedo, roughness, metallic)
             bs.pdf = dr.select(active, pdf, 0)
             active = active & (bs.pdf > 0)
             bs.eta = 1.0
@@ -82,8 +75,8 @@ def _define():
 
         def eval_pdf(self, ctx, si, wo, active=True):
             albedo, roughness, metallic = self._materials(si, active)
-            probability = self._specular_probability(ctx, dr.abs(si.wi.z), albedo, metallic)
-            value, pdf = self._both(ctx, si, wo, probability, albedo, roughness, metallic)
+            probability = self._specular_probability(dr.abs(si.wi.z), albedo, metallic)
+            value, pdf = self._both(si, wo, probability, albedo, roughness, metallic)
             return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
 
         def _side(self, si):
@@ -96,20 +89,20 @@ def _define():
             """The face's normal in the shading frame, on that side of it; 0 where it is not believed."""
             return lobes.face_towards(si.to_local(si.n), mi.Vector3f(0, 0, side))
 
-        def _both(self, ctx, si, wo, probability, *materials):
+        def _both(self, si, wo, probability, *materials):
             """Value and density of `wo`: its own, and those of the direction that is lifted to it."""
             side = self._side(si)
             face = self._face(si, side)
             height = dr.dot(face, wo)
             below = wo - 2 * height * face
-            found = [self._one(ctx, si.wi, w, probability, *materials, seen & (side * w.z > 0))
+            found = [self._one(si.wi, w, probability, *materials, seen & (side * w.z > 0))
                      for w, seen in ((wo, height >= 0), (below, height > 0))]  # fmt: skip
             return found[0][0] + found[1][0], found[0][1] + found[1][1]
 
-        def _one(self, ctx, wi, wo, probability, albedo, roughness, metallic, active):
+        def _one(self, wi, wo, probability, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
-            value = dr.select(active, self._value(ctx, wi, wo, albedo, roughness, metallic), mi.Color3f(0))
+            value = dr.select(active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0))
             density = lobes.density(wi, wo, dr.detach(alpha_of(roughness)), probability)
             return value, dr.select(active, density, 0)
 

@@ -93,7 +93,7 @@ class Region(Place):
 class Rendering:
     """How an edited scene becomes a picture."""
 
-    spp: Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")] = 256
+    spp: Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")] = 128
     denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")] = True
     full_render: Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")] = False
     save: Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")] = (

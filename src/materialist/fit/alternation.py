@@ -13,11 +13,10 @@ from materialist.color import linear_to_srgb
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, LightProblem, TransportEngine, prepared_envmap
 from materialist.fit.light import envmap_field, fit_light, start_radiance
-from materialist.fit.losses import CLIPPED, residual
+from materialist.fit.losses import CLIPPED, edge_weights, residual
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
 from materialist.fit.settings import FitSettings, MaterialStage
-from materialist.fit.variation import edge_weights
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 

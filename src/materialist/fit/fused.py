@@ -15,9 +15,8 @@ import torch
 
 from materialist.bsdf.disney import DIELECTRIC_R0, base_reflectance, combine, quadratic
 from materialist.buffers import floats, integers
-from materialist.fit.losses import CLIPPED, encode, loss_weights, per_value
+from materialist.fit.losses import CLIPPED, EdgeWeights, encode, loss_weights, per_value
 from materialist.fit.settings import Encoding, MaterialSettings
-from materialist.fit.variation import EdgeWeights
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 

@@ -40,7 +40,7 @@ class FitSetup:
     seed: int = 0
     device: str = "auto"
     spp: int | None = None
-    """Camera rays a pixel of the re-rendering; None: those of `settings.final_paths`."""
+    """Paths a pixel of the re-rendering; None: `settings.rerender_spp`."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class FitResult:
     halves: tuple[Array, Array]
     """Two independent path-traced re-renderings [H, W, 3] linear, of half the samples each."""
     spp: int
-    """Camera rays a pixel of both together."""
+    """Paths a pixel of both together."""
     stages: tuple[dict, ...]
 
     @property
@@ -132,8 +132,7 @@ class Inversion:
         self.progress("rerender", 0, 1)
         renderer = prepared.renderer
         renderer.set_envmap(state.envmap)
-        rays = self.setup.spp or -(-self.setup.settings.final_paths // renderer.paths)
-        each = max(1, rays // 2)
+        each = max(1, (self.setup.spp or self.setup.settings.rerender_spp) // 2)
         reference = _reference(renderer)
         first, second = timed(stages, "rerender", lambda: [
             reference(materials, state.envmap, each, seed + k) for k in (1, 2)

@@ -12,10 +12,18 @@ from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
 from materialist.fit.fused import FusedLoss
-from materialist.fit.losses import consistency, fall_off, l1_l2, loss_weights, metal_factor, per_value, residual
+from materialist.fit.losses import (
+    EdgeWeights,
+    consistency,
+    fall_off,
+    l1_l2,
+    loss_weights,
+    metal_factor,
+    per_value,
+    residual,
+)
 from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import MaterialSettings, MaterialStage
-from materialist.fit.variation import EdgeWeights
 from materialist.types import Camera
 
 _COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}

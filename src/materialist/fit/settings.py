@@ -111,7 +111,7 @@ class FitSettings:
     confidence_power: float = 3.0  # how fast the prior's confidence grows below that error; tuned by eye
     max_confidence: float = 100.0
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
-    final_paths: int = 112  # paths a pixel of the final re-rendering, a splitting camera ray counts as three or four
+    rerender_spp: int = 64  # paths a pixel of the final re-rendering
 
     def confidence(self, error: float) -> float:
         """Factor >= 1 on what leaving the prior costs: (explained / error)^power, for the error that the best light
@@ -164,7 +164,7 @@ DEFAULT = FitSettings(
     ),
     rounds=3,
     corrections=2,
-    correction_spp=4,
+    correction_spp=8,
     explained=0.08,
     light_grid=16,
 )

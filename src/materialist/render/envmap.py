@@ -8,9 +8,7 @@ from materialist.errors import InputError
 from materialist.types import Array
 
 PEAKED = 3.0
-"""Mean squared over squared mean luminance of a map from which it counts as peaked: hard light,"""
-SUNNY = 30.0
-"""and from which it has sources as small as the sun."""
+"""Mean squared over squared mean luminance of a map from which its light counts as hard."""
 
 
 def on_mitsuba_grid(envmap, xp):
@@ -44,19 +42,9 @@ def check_envmap(envmap: Array) -> None:
 
 
 def is_peaked(envmap: Array) -> bool:
-    """Whether the light of [h, 2h, 3] is hard."""
-    return _unevenness(envmap) > PEAKED
-
-
-def is_sunny(envmap: Array) -> bool:
-    """Whether the light of [h, 2h, 3] comes from sources too small for the cells of `render.light_sampling`."""
-    return _unevenness(envmap) > SUNNY
-
-
-def _unevenness(envmap: Array) -> float:
-    """Mean squared over squared mean luminance over the sphere: the variance of one uniform direction, plus 1."""
+    """Whether the light of [h, 2h, 3] is hard: mean squared over squared mean luminance over the sphere."""
     luma = envmap.mean(-1)
     h, w = luma.shape
     area = np.sin(np.pi * (np.arange(h) + 0.5) / h)[:, None]
     share = np.broadcast_to(area / (area.sum() * w), (h, w))
-    return float((luma**2 * share).sum()) / max(float((luma * share).sum()) ** 2, 1e-30)
+    return float((luma**2 * share).sum()) > PEAKED * max(float((luma * share).sum()) ** 2, 1e-30)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from materialist.buffers import floats, integers, tensor
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf, body_emitter
-from materialist.render.envmap import check_envmap, half_turn, is_peaked, is_sunny, on_mitsuba_grid
+from materialist.render.envmap import check_envmap, half_turn, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
-
-if TYPE_CHECKING:
-    from materialist.render.light_sampling import LightSampler
 
 MAX_DEPTH = 4
 """Path length of the re-rendering and of the paper's engine: light reaches the camera by up to three surfaces."""
@@ -54,11 +49,6 @@ class RenderScene:
         if not (geometry.mesh.face_plane == -1).any():
             raise InputError("The mesh has no depth surface to render; give a depth map with some values above 0.")
         self.mi = mi = setup(device)
-        self._envmap = np.ones((4, 8, 3), np.float32)
-        self._sunny = False
-        self._sampler: LightSampler | None = None
-        self._openness: Array | None = None
-        self._like: RenderScene | None = None
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
         members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
@@ -99,67 +89,19 @@ class RenderScene:
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
-        if not np.array_equal(envmap, self._envmap):
-            self._envmap, self._sunny, self._sampler = np.array(envmap, np.float32), is_sunny(envmap), None
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
-    def render(
-        self,
-        *,
-        spp: int,
-        seed: int = 0,
-        max_depth: int = MAX_DEPTH,
-    ) -> Array:
-        """Path-trace the picture: by splitting paths (`render.split`), or under a sun by Mitsuba's `path`.
+    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH) -> Array:
+        """Path-trace the picture.
 
         Args:
-            spp: samples per pixel, at least this many: camera rays that split, or paths. seed: equal seeds give equal
-                pictures.
+            spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
             max_depth: path length; 2 is direct light alone, 1 the sky alone.
 
         Returns:
             [H, W, 3] float32 linear radiance.
         """
-        from materialist.render.split import DEEPEST, trace
-
-        _check_options(spp, max_depth)
-        if self._sunny or not 2 <= max_depth <= DEEPEST:
-            return self.render_path(spp=spp, seed=seed, max_depth=max_depth)
-        return trace(self.mi_scene, self.camera, self._lights(), spp=spp, seed=seed, max_depth=max_depth)
-
-    def sample_lights_as(self, other: RenderScene) -> None:
-        """Sample the light as another scene does, whose geometry differs: pictures with common random numbers."""
-        self._like, self._sampler = other, None
-
-    def _openness_seen(self) -> Array:
-        """From where light reaches what the camera sees (`light_sampling.openness`)."""
-        if self._like is not None:
-            return self._like._openness_seen()
-        if self._openness is None:
-            from materialist.render.light_sampling import openness
-
-            self._openness = openness(self.mi_scene, self.camera)
-        return self._openness
-
-    @property
-    def paths(self) -> int:
-        """Paths that `render` follows from one camera ray under this light."""
-        from materialist.render.split import SPLIT
-
-        return 1 if self._sunny else SPLIT + 1 + (self._lights() is not None)
-
-    def _lights(self) -> LightSampler | None:
-        """The sampler of this light, None where it is not worth its rays."""
-        from materialist.render.light_sampling import LightSampler
-
-        if self._sampler is None:
-            self._sampler = LightSampler(self._envmap, self._openness_seen())
-        # What is hidden from most of the scene may still be all the light of the rest.
-        return self._sampler if self._sampler.worth or is_peaked(self._envmap) else None
-
-    def render_path(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH) -> Array:
-        """The picture by Mitsuba's own path tracer, under any light; arguments as for `render`."""
         _check_options(spp, max_depth)
         mi = self.mi
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth})

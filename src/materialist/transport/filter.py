@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import torch
 
+from materialist.transport.cache import ROUGHNESS_LEVELS, Tables, TransportCache
+
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
 
@@ -72,8 +74,8 @@ def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
     return out
 
 
-def filter_tables(cache, tables, guide: Guide, known: list[Tap] | None = None):
-    """Filter the diffuse lobe and the specular levels that are wider than a pixel's neighbourhood; returns Tables."""
+def filter_tables(cache: TransportCache, tables: Tables, guide: Guide, known: list[Tap] | None = None) -> Tables:
+    """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
     kept = first_filtered()
     stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
     grid = torch.zeros(guide.scale.numel(), stack.shape[1])
@@ -81,11 +83,9 @@ def filter_tables(cache, tables, guide: Guide, known: list[Tap] | None = None):
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide, known=known).view(len(grid), -1)[pixels]
     levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
-    return type(tables)(smooth[:, :9].contiguous(), torch.stack(list(levels)))
+    return Tables(smooth[:, :9].contiguous(), torch.stack(list(levels)))
 
 
 def first_filtered() -> int:
     """Index of the first roughness level to filter: sharper ones are nearly noise-free and carry reflected detail."""
-    from materialist.transport.cache import ROUGHNESS_LEVELS
-
     return next(i for i, r in enumerate(ROUGHNESS_LEVELS) if r >= 0.2)

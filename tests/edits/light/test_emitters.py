@@ -29,7 +29,7 @@ def picture(scene: Scene, seed: int = 0, spp: int = 256) -> np.ndarray:
     target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
     target.set_materials(scene.materials)
     target.set_envmap(scene.envmap)
-    return target.render_path(spp=spp, seed=seed)
+    return target.render(spp=spp, seed=seed)
 
 
 @cache

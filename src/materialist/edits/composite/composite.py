@@ -20,15 +20,15 @@ from materialist.types import Array, Materials, Scene
 
 Upscale = Callable[[Array, tuple[int, int]], Array]
 """upscale(picture [H, W, 3] linear, (H0, W0)) -> [H0, W0, 3] linear."""
-RERENDERED = 36
-"""Camera rays a pixel of the re-rendering of an edited scene that is kept."""
+RERENDERED = 64
+"""Paths a pixel of the re-rendering of an edited scene that is kept."""
 
 
 def composite(
     scene: Scene,
     edited: Scene,
     *,
-    spp: int = 256,
+    spp: int = 128,
     seed: int = 0,
     full_render: bool = False,
     denoise: bool = True,

@@ -59,7 +59,7 @@ class Layers:
 
 
 def render_layers(
-    renderer: EditRenderer, edited: Scene, *, spp: int = 256, seed: int = 0, clean: bool = True, progress=None
+    renderer: EditRenderer, edited: Scene, *, spp: int = 128, seed: int = 0, clean: bool = True, progress=None
 ) -> Layers:
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 

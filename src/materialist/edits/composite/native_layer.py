@@ -82,7 +82,6 @@ def _traced(
     """The named bodies of a `RenderScene` as a layer."""
     from materialist.render.coverage import first_hits
     from materialist.render.native import only, radiance
-    from materialist.render.scene import MAX_DEPTH
 
     camera, native = scene.camera, scene.photo.original.shape[:2]
     working = (camera.height, camera.width)
@@ -104,7 +103,7 @@ def _traced(
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     contact = SETTINGS.lamp_contact if all(name.startswith("lamp") for name in names) else SETTINGS.contact
     gap = contact * _extent(alone)
-    depth = path_depth(edited) or MAX_DEPTH
+    depth = path_depth(edited)
     options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
     picture = radiance(target, size, part, **options)
     guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)

@@ -33,22 +33,17 @@ class EditRenderer:
         self._sky: Array | None = None
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
-        """render(spp, seed) of the base and of `edited`, by the same tracer; `spp` counts paths a pixel.
-
-        The splitting tracer serves most light. With lamps, a sun or glass on either side both pictures come from
-        Mitsuba's path tracer, which samples the lights and follows paths through glass.
-        """
+        """render(spp, seed) of the base and of `edited`, with paths of equal length; `spp` counts paths a pixel."""
         scene, edited = self.lit(self.scene, edited), self.lit(edited, edited)
         depth = max(path_depth(s) for s in (scene, edited))
-        paths = 1 if depth else max(self.render_scene(s).paths for s in (scene, edited))
 
         def base(spp: int, seed: int) -> Array:
-            key = (scene is self.scene, depth, paths, spp, seed)
+            key = (scene is self.scene, depth, spp, seed)
             if key not in self._base:
-                self._base[key] = self._render(scene, depth, paths, spp, seed)
+                self._base[key] = self._render(scene, depth, spp, seed)
             return self._base[key]
 
-        return base, lambda spp, seed: self._render(edited, depth, paths, spp, seed)
+        return base, lambda spp, seed: self._render(edited, depth, spp, seed)
 
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
@@ -115,11 +110,8 @@ class EditRenderer:
         target.set_envmap(scene.envmap)
         return target
 
-    def _render(self, scene: Scene, depth: int, paths: int, spp: int, seed: int) -> Array:
-        target = self.render_scene(scene)
-        if depth:
-            return target.render_path(spp=spp, seed=seed, max_depth=depth)
-        return target.render(spp=-(-spp // paths), seed=seed)
+    def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
+        return self.render_scene(scene).render(spp=spp, seed=seed, max_depth=depth)
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
@@ -137,8 +129,6 @@ class EditRenderer:
         target = RenderScene(
             scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
         )  # fmt: skip
-        if self._built:
-            target.sample_lights_as(self._built[0][1])
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target
@@ -164,25 +154,20 @@ def new_lamps(scene: Scene, edited: Scene) -> list[str]:
 
 
 def path_depth(scene: Scene) -> int:
-    """Length of the paths that Mitsuba's path tracer must follow; 0 where the splitting tracer serves the scene."""
-    from materialist.render.envmap import is_sunny
+    """Length of the paths that the scene needs: longer ones through glass."""
     from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
 
-    if any(is_transparent(body.surface) for body in scene.bodies):
-        return GLASS_DEPTH
-    glows = any(is_glowing(body.surface) for body in scene.bodies)
-    return MAX_DEPTH if glows or scene.lamps or is_sunny(scene.envmap) else 0
+    return GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH
 
 
 def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:
-    """[H, W, 3] float32 linear: the scene as it stands, with its bodies and lamps; `spp` camera rays a pixel.
+    """[H, W, 3] float32 linear: the scene as it stands, with its bodies and lamps; `spp` paths a pixel.
 
     Raises SetupError with `denoise` where the denoiser is not installed.
     """
     renderer = EditRenderer(scene, device=device)
     target = renderer.render_scene(scene)
-    depth = path_depth(scene) if scene.bodies or scene.lamps else 0
-    picture = target.render_path(spp=spp, seed=seed, max_depth=depth) if depth else target.render(spp=spp, seed=seed)
+    picture = target.render(spp=spp, seed=seed, max_depth=path_depth(scene))
     if denoise:
         from materialist.render.denoise import denoise as clean
 

@@ -178,7 +178,7 @@ def _estimated(
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters), device=device)
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), OFF, np.float32))
-    by_emitters = target.render_path(spp=settings.spp, seed=seed)  # [H, W, 3] of emitters of radiance 1 alone
+    by_emitters = target.render(spp=settings.spp, seed=seed)  # [H, W, 3] of emitters of radiance 1 alone
     photo = scene.photo.linear
     seen = (scene.depth > 0) & ~masked & (photo.max(-1) < settings.clipped)
     if not seen.any():
