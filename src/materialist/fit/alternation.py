@@ -12,11 +12,12 @@ from materialist.camera import pixel_rays
 from materialist.color import linear_to_srgb
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, LightProblem, TransportEngine, prepared_envmap
-from materialist.fit.light import envmap_field, fit_light, start_radiance
-from materialist.fit.losses import CLIPPED, edge_weights, residual
+from materialist.fit.light import envmap_field, fit_light, prior_light, start_radiance
+from materialist.fit.losses import CLIPPED, edge_weights
 from materialist.fit.materials import better_start, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
 from materialist.fit.settings import FitSettings, MaterialStage
+from materialist.io.photo import HDR_CLIP
 from materialist.transport.filter import joint_filter
 from materialist.types import Array, Camera, Materials, Photo
 
@@ -46,9 +47,9 @@ class Fit:
     prior: Materials
     engine: Engine
     settings: FitSettings
+    reference: Renderer
+    """Path tracer, for the fixed-point corrections."""
     envmap_height: int = 256
-    reference: Renderer | None = None
-    """Path tracer for the fixed-point corrections; None: no corrections."""
     mask: Array | None = None
     """[H, W] bool: roughness and metallic are one value inside."""
     strategy: str = "default"
@@ -56,8 +57,6 @@ class Fit:
     then light, then albedo (paper, Material Editing Settings)."""
     seed: int = 0
     progress: Progress | None = None
-    white: float = CLIPPED
-    """Value from which a channel of the photo counts as clipped."""
 
     def run(self) -> FitState:
         """Fit; returns maps and light."""
@@ -76,29 +75,17 @@ class Fit:
 
         A colour that is surely not the materials' is the light's: its weight falls as theirs rise.
         """
-        stage = self.prior_light()
-        scale = self.settings.confidence(stage["prior_error"])
-        state.stages.append({**stage, "prior_confidence": scale})
+        problem = self.engine.light_problem(self.prior)
+        result, error = prior_light(problem, self._photo(), self.settings.light, seed=self.seed, progress=self.progress)
+        scale = self.settings.confidence(error)
+        state.stages.append(
+            {**result.summary(), "name": "prior light", "prior_error": error, "prior_confidence": scale}
+        )
         light, materials = self.settings.light, self.settings.materials
         relaxation = None if light.albedo_relaxation is None else light.albedo_relaxation * scale
         light = replace(light, albedo_relaxation=relaxation, chroma=light.chroma / scale)
         materials = replace(materials, delta=materials.delta * scale)
         return replace(self, settings=replace(self.settings, light=light, materials=materials))
-
-    def prior_light(self) -> dict:
-        """The stage that fits a light to the photo with the prior's materials as they are.
-
-        Its `prior_error` is the mean absolute encoded error that remains.
-        """
-        strict = replace(self.settings.light, albedo_relaxation=None)
-        problem, photo = self.engine.light_problem(self.prior), self._photo()
-        light = envmap_field(strict, seed=self.seed, start=start_radiance(photo, strict))
-        steps = strict.strict_steps
-        result = fit_light(problem, photo, light, strict, steps=steps, seed=self.seed, progress=self.progress)
-        with torch.no_grad():
-            found = problem.render(light(problem.height))
-            error = residual(found, photo[problem.pixels], strict.encoding, clipped=strict.clipped)
-        return {**result.summary(), "name": "prior light", "prior_error": float(error.abs().mean())}
 
     # -- stages --------------------------------------------------------------------------------------------------------
 
@@ -118,9 +105,8 @@ class Fit:
         result = fit_light(problem, photo, light, settings, steps=steps, seed=self.seed, progress=self.progress)
         state.stages.append(result.summary())
         envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
-        state.envmap = paste_visible_sky(
-            envmap, self.photo.linear, self._surface(), self.photo.camera, white=self.white
-        )  # fmt: skip
+        white = HDR_CLIP if self.photo.hdr else CLIPPED
+        state.envmap = paste_visible_sky(envmap, self.photo.linear, self._surface(), self.photo.camera, white=white)
 
     def _fit_materials(self, state: FitState, *, corrections: int = 0, stages: tuple[MaterialStage, ...] = ()) -> None:
         settings = self.settings.materials
@@ -157,7 +143,6 @@ class Fit:
 
         A factor, not a difference: where the cache is too bright, a difference would leave nothing to optimise.
         """
-        assert self.reference is not None
         traced = self.reference(self.materials(state), state.envmap, self.settings.correction_spp, seed)
         cached = self._image(render(state.maps))
         both = torch.from_numpy(np.concatenate([traced, cached], -1)).reshape(-1, 6)[self.engine.pixels]

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from materialist.fit.alternation import Fit, Renderer
+from materialist.fit.alternation import Fit
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
-from materialist.fit.losses import CLIPPED
-from materialist.fit.plane_extents import find_extents
+from materialist.fit.optimise import Progress
+from materialist.fit.plane_extents import FoundExtents, find_extents
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
 from materialist.geometry.extents import PlaneExtent
-from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
@@ -53,7 +52,7 @@ class PreparedFit:
     geometry: Geometry
     renderer: RenderScene
     fit: Fit
-    stages: list[dict] = field(default_factory=list)
+    stages: tuple[dict, ...]
     notes: tuple[str, ...] = ()
     """What a report should say."""
 
@@ -83,99 +82,80 @@ class FitResult:
         return next((s["prior_confidence"] for s in reversed(self.stages) if "prior_confidence" in s), None)
 
 
-class Inversion:
-    """Geometry, light and materials of one photo.
+def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
+    """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
+    tick, stages = progress or (lambda *_: None), list[dict]()
+    photo, prior = setup.photo, setup.prior
+    ends, notes = tuple[PlaneExtent, ...](), tuple[str, ...]()
+    if setup.completion == AUTO and setup.settings.explained is not None:
+        tick("walls", 0, 1)
+        found = timed(stages, "walls", lambda: find_extents(
+            photo.linear, prior, photo.camera, setup.settings, tau=setup.tau, seed=setup.seed
+        ))  # fmt: skip
+        if found is not None:
+            ends, notes = found.ends, (_note(found),)
+    completion = FULL if setup.completion == AUTO else setup.completion
+    tick("geometry", 0, 1)
+    geometry = timed(stages, "geometry", lambda: build_geometry(
+        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=completion, extents=ends, seed=setup.seed
+    ))  # fmt: skip
+    renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
+    engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
+
+    def reference(materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
+        renderer.set_materials(materials)
+        renderer.set_envmap(envmap)
+        return renderer.render(spp=spp, seed=seed)
+
+    fit = Fit(
+        photo, prior.materials, engine, setup.settings, reference, envmap_height=setup.envmap_height, mask=setup.mask,
+        strategy=setup.strategy, seed=setup.seed, progress=progress,
+    )  # fmt: skip
+    return PreparedFit(completion, ends, geometry, renderer, fit, tuple(stages), notes)
+
+
+def invert(
+    setup: FitSetup, *, progress: Progress | None = None, found: Callable[[str, Any], Any] = lambda *_: None
+) -> FitResult:
+    """Geometry, light, materials and the path-traced re-rendering of one photo.
 
     Args:
         progress: called as progress(stage, done, total).
         found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
     """
-
-    def __init__(self, setup: FitSetup, *, progress: Any = None, found: Callable[[str, Any], Any] = lambda *_: None):
-        self.setup, self.found = setup, found
-        self.progress = progress or (lambda *_: None)
-
-    def run(self) -> FitResult:
-        """Mesh, light, materials, path-traced re-rendering."""
-        return self.finish(self.prepare())
-
-    def prepare(self) -> PreparedFit:
-        """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
-        setup, stages = self.setup, list[dict]()
-        searched = setup.completion == AUTO and setup.settings.explained is not None
-        ends, notes = self._extents(stages) if searched else ((), ())
-        completion = FULL if setup.completion == AUTO else setup.completion
-        self.progress("geometry", 0, 1)
-        camera, prior = setup.photo.camera, setup.prior
-        geometry = timed(stages, "geometry", lambda: build_geometry(
-            prior.depth, prior.normal, camera, tau=setup.tau, completion=completion, extents=ends, seed=setup.seed
-        ))  # fmt: skip
-        renderer = timed(stages, "scene", lambda: RenderScene(geometry, camera, device=setup.device))
-        engine = timed(stages, "engine", lambda: self._engine(renderer, geometry))
-        fit = Fit(
-            setup.photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height,
-            reference=_reference(renderer), mask=setup.mask, strategy=setup.strategy, seed=setup.seed,
-            progress=self.progress, white=HDR_CLIP if setup.photo.hdr else CLIPPED,
-        )  # fmt: skip
-        return PreparedFit(completion, ends, geometry, renderer, fit, stages, notes)
-
-    def finish(self, prepared: PreparedFit) -> FitResult:
-        """Light, materials, path-traced re-rendering."""
-        fit, stages, seed = prepared.fit, list(prepared.stages), self.setup.seed
-        if isinstance(fit.engine, TransportEngine):
-            timed(stages, "trace", fit.engine.cache.trace)
-        state = fit.run()
-        stages += state.stages
-        materials = fit.materials(state)
-        self.found("light", state.envmap)
-        self.found("materials", materials)
-        self.progress("rerender", 0, 1)
-        renderer = prepared.renderer
-        renderer.set_envmap(state.envmap)
-        each = max(1, (self.setup.spp or self.setup.settings.rerender_spp) // 2)
-        reference = _reference(renderer)
-        first, second = timed(stages, "rerender", lambda: [
-            reference(materials, state.envmap, each, seed + k) for k in (1, 2)
-        ])  # fmt: skip
-        return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
-
-    def _extents(self, stages: list[dict]) -> tuple[tuple[PlaneExtent, ...], tuple[str, ...]]:
-        """Where walls end, and what a report should say of it; empty for the usual extents."""
-        setup = self.setup
-        self.progress("walls", 0, 1)
-        found = timed(stages, "walls", lambda: find_extents(
-            setup.photo.linear, setup.prior, setup.photo.camera, setup.settings, tau=setup.tau, seed=setup.seed
-        ))  # fmt: skip
-        if found is None:
-            return (), ()
-        note = (
-            f"Walls beyond the picture end where light explains the photo best with the predicted materials (error "
-            f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
-        )
-        return found.ends, (note,)
-
-    def _engine(self, renderer: RenderScene, geometry: Geometry) -> Engine:
-        setup = self.setup
-        if setup.engine == "path":
-            surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
-            return PathEngine(
-                renderer, setup.photo.camera, surface, envmap_height=setup.envmap_height, seed=setup.seed
-            )  # fmt: skip
-        return TransportEngine(
-            geometry, setup.photo.camera, setup.photo.linear, seed=setup.seed,
-            light_height=setup.settings.light_grid, progress=self.progress,
-        )  # fmt: skip
+    prepared = prepare(setup, progress)
+    fit, stages, seed = prepared.fit, list(prepared.stages), setup.seed
+    if isinstance(fit.engine, TransportEngine):
+        timed(stages, "trace", fit.engine.cache.trace)
+    state = fit.run()
+    stages += state.stages
+    materials = fit.materials(state)
+    found("light", state.envmap)
+    found("materials", materials)
+    if progress is not None:
+        progress("rerender", 0, 1)
+    each = max(1, (setup.spp or setup.settings.rerender_spp) // 2)
+    first, second = timed(stages, "rerender", lambda: [
+        fit.reference(materials, state.envmap, each, seed + k) for k in (1, 2)
+    ])  # fmt: skip
+    return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
 
 
-def _reference(renderer: RenderScene) -> Renderer:
-    """The path tracer as a function (materials, envmap, spp, seed) -> [H, W, 3]."""
+def _note(found: FoundExtents) -> str:
+    return (
+        f"Walls beyond the picture end where light explains the photo best with the predicted materials (error "
+        f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
+    )
 
-    def render(materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
-        renderer.set_materials(materials)
-        renderer.set_envmap(envmap)
-        return renderer.render(spp=spp, seed=seed)
 
-    return render
+def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress: Progress | None) -> Engine:
+    camera, seed = setup.photo.camera, setup.seed
+    if setup.engine == "path":
+        surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
+        return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
+    return TransportEngine(
+        geometry, camera, setup.photo.linear, seed=seed, light_height=setup.settings.light_grid, progress=progress
+    )
 
 
 def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:

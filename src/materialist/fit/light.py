@@ -90,6 +90,25 @@ def fit_light(
     return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)
 
 
+def prior_light(
+    problem: LightProblem, photo: torch.Tensor, settings: LightSettings, *, steps: int | None = None, seed: int = 0,
+    progress: Progress | None = None,
+) -> tuple[StageResult, float]:  # fmt: skip
+    """Fit a light to the photo [H * W, 3] with the problem's materials as they are.
+
+    Returns:
+        The stage, and the mean absolute encoded error that remains.
+    """
+    strict = replace(settings, albedo_relaxation=None)
+    light = envmap_field(strict, seed=seed, start=start_radiance(photo, strict))
+    steps = steps or strict.strict_steps
+    result = fit_light(problem, photo, light, strict, steps=steps, seed=seed, progress=progress)
+    with torch.no_grad():
+        found = problem.render(light(problem.height))
+        error = residual(found, photo[problem.pixels], strict.encoding, clipped=strict.clipped)
+    return result, float(error.abs().mean())
+
+
 def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:
     """[height, 2 height, 3] of a field whose map has `settings.height` rows.
 

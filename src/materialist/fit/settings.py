@@ -80,19 +80,11 @@ class MaterialSettings:
 class ExtentSettings:
     """Search for the extents of planes beyond the picture (`fit.plane_extents`)."""
 
-    pixels: int = 1024  # surface pixels whose light is looked at; more is slower and less noisy; tuned by eye
-    levels: tuple[float, ...] = (0.0, 0.25, 0.5, 1.0, 2.0)  # how far a side goes on, in the plane's visible size
-    starts: tuple[float, ...] = (0.0, 0.5, 1.0)  # levels of all sides with which a descent may begin
-    descents: int = 2  # of all starts, the best so many are followed
-    finalists: int = 6  # of all extents that were tried, the best so many are compared on a finer map; tuned by eye
-    final_rows: int = 32  # rows of that map
-    sweeps: int = 2  # rounds over all planes and sides, at most
-    gain: float = 0.04  # least relative gain in error for which a side moves; tuned on 8 synthetic scenes
-    least_gain: float = 5e-4  # least absolute gain, encoded; below it is the noise of so few pixels
-    reweightings: int = 2  # of the least squares, towards the absolute encoded error
-    steps: int = 30  # projected gradient steps after each
-    ridge: float = 1e-3  # weight of bright texels that hardly reach anything, relative to a mean texel's error
-    small: float = 0.02  # encoded errors below this count by their square
+    side: int = 96  # longer side, in pixels, at which the search looks at the photo; more is slower; tuned by eye
+    pixels: int = 1024  # of that, pixels whose light is looked at; tuned by eye
+    levels: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)  # how far a wall goes on, in its visible size
+    steps: int = 80  # of the light fit for each candidate; tuned by eye
+    gain: float = 0.04  # least relative gain in error for which a wall ends elsewhere; tuned on 8 synthetic scenes
 
 
 @dataclass(frozen=True)

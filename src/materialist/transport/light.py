@@ -57,10 +57,6 @@ class LightMatrix:
         """Radiance [Q, 3] from the light of the parts [2, Q, 3], with another albedo [Q, 3] if one is given."""
         return (self.albedo if albedo is None else albedo) * light[0] + light[1]
 
-    def per_channel(self) -> torch.Tensor:
-        """[3, Q, h * 2h] direct transport of red, green and blue, the parts combined."""
-        return torch.stack([self.combine(self.parts, self.albedo[:, c : c + 1]) for c in range(3)])
-
 
 class _Product(torch.autograd.Function):
     """matrix [N, T] @ light [T, 3], differentiable in the light.
