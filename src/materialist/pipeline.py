@@ -60,7 +60,8 @@ def invert(
     from materialist.render.variant import setup
 
     setup(wanted.device)
-    from materialist.fit.invert import AUTO, FULL, FitSetup, Inversion
+    from materialist.fit import invert as fitting
+    from materialist.fit.invert import AUTO, FULL, FitSetup
     from materialist.fit.settings import preset as named
     from materialist.geometry.build import SYNONYMS
 
@@ -75,7 +76,7 @@ def invert(
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
         device=wanted.device, spp=wanted.spp,
     )  # fmt: skip
-    best = Inversion(fit_setup, progress=progress, found=tell).run()
+    best = fitting.invert(fit_setup, progress=progress, found=tell)
     prepared = best.prepared
     report = _report(picture, prior, best, (*stages, *best.stages), prepared.notes, start)
     return Scene(

@@ -7,7 +7,7 @@ import pytest
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist.fit import invert
-from materialist.fit.invert import AUTO, FULL, FitResult, FitSetup, Inversion
+from materialist.fit.invert import AUTO, FULL, FitResult, FitSetup, prepare
 from materialist.fit.plane_extents import FoundExtents
 from materialist.fit.settings import PAPER, Schedule
 from materialist.geometry.extents import PlaneExtent
@@ -40,7 +40,7 @@ def setup():
 )
 def test_only_auto_asks_the_light_for_extents(setup, monkeypatch, completion, found, ends):
     monkeypatch.setattr(invert, "find_extents", lambda *_, **__: found)
-    prepared = Inversion(replace(setup, completion=completion)).prepare()
+    prepared = prepare(replace(setup, completion=completion))
     assert (prepared.completion, prepared.ends) == (FULL, ends)
     assert bool(prepared.notes) == bool(ends)
     if ends:
@@ -49,7 +49,7 @@ def test_only_auto_asks_the_light_for_extents(setup, monkeypatch, completion, fo
 
 def test_a_result_has_two_independent_halves(setup):
     told = {}
-    result = Inversion(replace(setup, completion="none"), found=told.__setitem__).run()
+    result = invert.invert(replace(setup, completion="none"), found=told.__setitem__)
     assert result.spp == 4 and not np.array_equal(*result.halves)
     np.testing.assert_allclose(result.rerender, np.mean(result.halves, 0), rtol=1e-6)
     assert told["light"] is result.envmap and told["materials"] is result.materials

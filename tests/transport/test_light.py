@@ -106,10 +106,3 @@ def test_every_ray_either_leaves_or_meets_a_surface(both):
     direct = matrix.direct(torch.from_numpy(light).reshape(-1, 3))
     indirect = matrix.indirect(torch.from_numpy(cache.slot_radiance(surfaces)))
     torch.testing.assert_close(matrix.combine(direct + indirect), shaded(both, light, surfaces), rtol=0.03, atol=0.01)
-
-
-def test_transport_per_channel_is_that_of_the_parts_together(both):
-    matrix = both[3]
-    light = torch.rand(matrix.parts.shape[-1], 3, generator=torch.Generator().manual_seed(3))
-    found = torch.einsum("cqt,tc->qc", matrix.per_channel(), light)
-    torch.testing.assert_close(found, matrix.combine(matrix.direct(light)), rtol=1e-4, atol=1e-5)

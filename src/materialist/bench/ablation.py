@@ -24,7 +24,7 @@ from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.fit.engine import prepared_envmap
-from materialist.fit.invert import FULL, FitSetup, Inversion
+from materialist.fit.invert import FULL, FitSetup, prepare
 from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.losses import l1_l2, residual
 from materialist.fit.materials import fit_materials, material_field, remapped

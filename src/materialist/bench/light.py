@@ -203,7 +203,7 @@ def fit(
 
     from materialist.fit.alternation import paste_visible_sky
     from materialist.fit.engine import PathEngine, prepared_envmap
-    from materialist.fit.invert import FitSetup, Inversion
+    from materialist.fit.invert import FitSetup, prepare
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
 
@@ -220,7 +220,7 @@ def fit(
         engine = PathEngine(mesh, photo.camera, pixels, envmap_height=method.path_height, seed=seed)
     else:
         setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
-        prepared = Inversion(setup).prepare()
+        prepared = prepare(setup)
         engine, mesh = prepared.fit.engine, prepared.renderer
     problem = engine.light_problem(given.materials)
     field = envmap_field(light, seed=seed)

@@ -7,6 +7,7 @@ are right nobody sees; but with wrong ones no light explains the photo as well.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import torch
@@ -19,6 +20,10 @@ from materialist.geometry.completion import ContinuedWall, complete, continued_w
 from materialist.geometry.extents import PlaneExtent
 from materialist.geometry.planes import find_planes
 from materialist.types import Array, Camera, Geometry, Materials, Prediction
+
+SIDES = ("left", "right", "up")
+NO_PLANES = np.full((1, 1), -1, np.int8)
+"""Labels of a geometry whose materials are asked for by pixel alone."""
 
 
 @dataclass(frozen=True)
@@ -37,33 +42,40 @@ def find_extents(
 ) -> FoundExtents | None:
     """The extents of the walls of a photo [H, W, 3] linear; None if there are none, or the usual ones do as well.
 
-    One wall after the other ends where a light fitted to a small version of the photo leaves the least error.
+    One side of one wall after the other moves to where a light fitted to a small version of the photo leaves the least
+    error.
     """
     chosen = settings.extents
     photo, prior, camera = reduced(photo, prior, camera, chosen.side)
     planes = find_planes(prior.depth, prior.normal, camera, seed=seed)
     walls = continued_walls(planes, prior.depth, camera)
     mesh = depth_to_mesh(prior.depth, prior.normal, camera, tau=tau)
-    label = np.full(prior.depth.shape, -1, np.int8)
 
+    @cache
     def error(ends: tuple[PlaneExtent, ...]) -> float:
-        geometry = Geometry(complete(mesh, planes, prior.depth, camera, extents=ends), label)
+        geometry = Geometry(complete(mesh, planes, prior.depth, camera, extents=ends), NO_PLANES)
         engine = TransportEngine(
             geometry, camera, photo, seed=seed, light_height=settings.light_grid, light_pixels=chosen.pixels
         )
-        flat = torch.from_numpy(photo.reshape(-1, 3))
         problem = engine.light_problem(prior.materials)
+        flat = torch.from_numpy(photo.reshape(-1, 3))
         return prior_light(problem, flat, settings.light, steps=chosen.steps, seed=seed)[1]
 
-    best = tuple(wall.usual for wall in walls)
-    least = usual = error(best) if walls else 0.0
+    def better(best: tuple[PlaneExtent, ...], others: list[tuple[PlaneExtent, ...]]) -> tuple[PlaneExtent, ...]:
+        """The best of the others where that is clearly better: a little is gained by any wall."""
+        least = min(others, key=error)
+        return least if error(least) < (1 - chosen.gain) * error(best) else best
+
+    if not walls:
+        return None
+    usual = tuple(wall.usual for wall in walls)
+    even = [tuple(at_level(wall, level) for wall in walls) for level in chosen.levels[:-1]]
+    ends = better(usual, [tuple(map(nowhere, walls)), *even])
     for k, wall in enumerate(walls):
-        for end in (nowhere(wall), *(at_level(wall, level) for level in chosen.levels)):
-            ends = (*best[:k], end, *best[k + 1 :])
-            found = error(ends)
-            if found < (1 - chosen.gain) * least:
-                best, least = ends, found
-    return FoundExtents(best, least, usual) if least < usual else None
+        for side in SIDES:
+            moved = [moved_to(ends[k], wall, side, level) for level in chosen.levels]
+            ends = better(ends, [(*ends[:k], end, *ends[k + 1 :]) for end in moved])
+    return None if ends == usual else FoundExtents(ends, error(ends), error(usual))
 
 
 def at_level(wall: ContinuedWall, level: float) -> PlaneExtent:
@@ -73,6 +85,13 @@ def at_level(wall: ContinuedWall, level: float) -> PlaneExtent:
         wall.usual, left=seen.left - beyond, right=seen.right + beyond, down=min(wall.usual.down, seen.down),
         up=seen.up + beyond,
     )  # fmt: skip
+
+
+def moved_to(end: PlaneExtent, wall: ContinuedWall, side: str, level: float) -> PlaneExtent:
+    """The extent with one side at a level; a wall that went nowhere has the others where the picture shows them."""
+    if end.right <= end.left:
+        end = at_level(wall, 0)
+    return replace(end, **{side: getattr(at_level(wall, level), side)})
 
 
 def nowhere(wall: ContinuedWall) -> PlaneExtent:
