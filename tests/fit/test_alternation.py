@@ -105,23 +105,6 @@ def test_a_prior_that_explains_the_photo_gets_confidence(room):
         assert (stage["prior_confidence"] > 5) == explains
 
 
-def test_a_speck_of_surface_is_fitted(room):
-    """A share of a dozen pixels would be none of them."""
-    from materialist.geometry.build import build_geometry
-
-    camera = Camera(64, 48, 40.0)
-    depth = np.zeros((48, 64), np.float32)
-    depth[10:13, 10:14] = 2
-    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (48, 64, 3)).copy()
-    grey = np.full((48, 64, 3), 0.4, np.float32)
-    materials = Materials(grey, np.full((48, 64), 0.5, np.float32), np.zeros((48, 64), np.float32))
-    engine = TransportEngine(build_geometry(depth, normal, camera), camera, grey, light_height=8, light_pixels=60)
-    problem = engine.light_problem(materials)
-    surface = np.isin(problem.pixels.numpy(), engine.pixels.numpy())
-    assert surface.sum() == len(engine.pixels) > 0
-    assert torch.isfinite(problem.render(torch.ones(8, 16, 3))).all()
-
-
 def test_true_materials_and_light_stay(room):
     """With true maps as the prior, the fit finds no reason to leave them."""
     fit = room.fit(DEFAULT, prior=room.truth)

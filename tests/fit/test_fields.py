@@ -13,7 +13,6 @@ from materialist.fit.fields import (
     MaterialMaps,
     MaterialMLP,
     MaterialUNet,
-    Unified,
     positional_encoding,
     resize_envmap,
     sh_basis,
@@ -85,14 +84,6 @@ def test_shrinking_keeps_the_light_of_every_texel(height):
         np.testing.assert_allclose(small.numpy(), metrics.resample_envmap(envmap.numpy(), height), atol=1e-3)
 
 
-@pytest.mark.parametrize("height", [24, 27, 32, 50])
-def test_enlarging_moves_nothing(height):
-    """By any ratio: as the metric's own, in another library."""
-    envmap = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(1))
-    expected = metrics.resample_envmap(envmap.numpy(), height)
-    np.testing.assert_allclose(resize_envmap(envmap, height).numpy(), expected, atol=1e-3)
-
-
 def test_material_network_starts_exactly_at_the_prior():
     prior = prior_maps(40)
     assert MaterialMLP(prior)().equal(prior)
@@ -114,11 +105,3 @@ def test_unet_takes_any_size_and_starts_at_the_prior(height, width):
     torch.testing.assert_close(field(), prior)
     field().square().sum().backward()
     assert any(p.grad is not None and p.grad.abs().max() > 0 for p in field.parameters())
-
-
-def test_unified_roughness_and_metallic_are_one_value_in_the_mask():
-    prior, inside = prior_maps(20), torch.arange(20) < 7
-    maps = Unified(MaterialMaps(prior), inside)()
-    torch.testing.assert_close(maps[:7, 3:], prior[:7, 3:].mean(0).expand(7, 2))
-    assert maps[:, :3].equal(prior[:, :3])
-    assert maps[7:].equal(prior[7:])

@@ -180,18 +180,6 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     np.testing.assert_allclose(mesh.vertices @ normal, -distance, rtol=2e-5)
 
 
-def test_normals_are_turned_to_the_camera_and_zero_ones_replaced():
-    depth = np.full((4, 6), 3.0)
-    normal = np.zeros((4, 6, 3), np.float32)
-    normal[:, :3] = (0, 0.8, -0.6)
-    mesh = depth_to_mesh(depth, normal, Camera(6, 4, 20.0))
-    cosine = (mesh.normals * -mesh.vertices).sum(-1) / np.linalg.norm(mesh.vertices, axis=-1)
-    assert (cosine > 0.019).all()
-    left = mesh.vertices[:, 0] < -0.01
-    assert (mesh.normals[left, 1] > 0.95).all()  # turned the least way: still upwards
-    assert cosine[mesh.vertices[:, 0] > 0.1] == pytest.approx(1, abs=1e-5)
-
-
 @pytest.mark.parametrize(
     "depth, normal, tau, said",
     [

@@ -127,19 +127,3 @@ def test_the_completion_of_a_stored_scene_is_told_by_its_provenance_or_its_mesh(
     assert completion_of(build_geometry(depth, normal, CAMERA, completion="none")) == "none"
     again = build_geometry(depth, normal, CAMERA, completion="planes,backs")
     np.testing.assert_array_equal(again.mesh.faces, geometry.mesh.faces)
-
-
-def test_faces_of_continuations_are_well_formed(furnished):
-    geometry, _, _, _, _ = furnished
-    mesh = geometry.mesh
-    added = mesh.face_plane >= 0
-    corners = mesh.vertices[mesh.faces[added]].astype(float)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert (np.linalg.norm(normal, axis=-1) > 0).all()
-    assert ((normal * -corners[:, 0]).sum(-1) > 0).all()  # counter-clockwise seen from the camera's side
-    pixel = mesh.face_pixel[added]
-    np.testing.assert_array_equal(geometry.plane_label.ravel()[pixel], mesh.face_plane[added])
-    uv = mesh.uv[mesh.faces[added]]
-    texel = np.floor(uv[..., 1] * 48).astype(int) * 64 + np.floor(uv[..., 0] * 64).astype(int)
-    np.testing.assert_array_equal(texel, np.repeat(pixel[:, None], 3, 1))
-    assert added.sum() < 60_000

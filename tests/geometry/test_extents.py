@@ -47,16 +47,6 @@ def test_a_wall_ends_where_it_is_told():
             assert wall_at(mesh, x, y) == inside, (right, up, x, y)
 
 
-def test_a_wall_may_go_nowhere():
-    depth, normal, _ = room(CAMERA)
-    (wall,) = continued_walls(find_planes(depth, normal, CAMERA), depth, CAMERA)
-    nowhere = replace(wall.usual, right=wall.usual.left, up=wall.usual.down)
-    meshes = [build_geometry(depth, normal, CAMERA, extents=told).mesh for told in ([nowhere], [])]
-    faces = [int((mesh.face_plane == wall.index).sum()) for mesh in meshes]
-    floors = build_geometry(depth, normal, CAMERA, completion="floors").mesh
-    assert faces[0] == int((floors.face_plane == wall.index).sum()) < faces[1]
-
-
 def test_ends_are_those_of_the_nearest_plane():
     first = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1, 1, -1, 1)
     tilted = replace(first, normal=(0.2, 0.0, 0.98))

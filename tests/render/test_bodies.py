@@ -77,18 +77,6 @@ def test_tint_colours_what_passes_through_once():
     np.testing.assert_allclose(inside.mean(0), [0.25, 0.5, 1.0], rtol=0.01)
 
 
-def test_a_ball_lens_turns_the_picture_round():
-    light = np.full((64, 128, 3), 0.05, np.float32)
-    light[:, :64] = 1.0  # the left half of the world, seen ahead of the camera at the left
-    plain = picture(sphere(surface(transmission=1.0, ior=1.0)), light)
-    lens = picture(sphere(surface(transmission=1.0, ior=1.5)), light)
-    inner = disc()
-    left = inner & (np.arange(CAMERA.width) < CAMERA.width // 2)[None]
-    right = inner & ~left
-    assert plain[left].mean() > 0.9 > 0.1 > plain[right].mean()
-    assert lens[right].mean() > 3 * lens[left].mean()
-
-
 def test_transmission_mixes_the_opaque_body_and_the_glass():
     mixed = surface(albedo=0.6, transmission=0.3, ior=1.0)
     opaque, half = (picture(sphere(s), uniform(), spp=256)[disc()].mean() for s in (surface(0.6), mixed))

@@ -5,7 +5,6 @@ import pytest
 from disney_reference import diffuse_coefficients, specular_split
 
 from materialist.envmap import texel_directions
-from materialist.geometry.build import build_geometry
 from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, CacheSettings, TransportCache
 from materialist.types import Camera, Geometry, Mesh
 
@@ -98,22 +97,6 @@ def test_a_small_sun_is_neither_missed_nor_met_twice():
         truth = (light[..., 0] * np.maximum(d[..., 1], 0) * solid[:, None]).sum() / np.pi
         ratio.append(cache.gather(light, None).diffuse[:, 0].numpy().mean() / truth)
     assert np.std(ratio) < 0.12, ratio
-
-
-def test_matte_white_looked_at_from_above_is_a_furnace():
-    """D0 + R D1 + R^2 D2 in closed form for wo = n: F_d(wo) = 1 and (h.n)^2 = (1 + cos) / 2."""
-    camera = Camera(9, 9, 2.0)
-    geometry = build_geometry(np.full((9, 9), 2.0, np.float32), _facing(9), camera, completion="none")
-    cache = TransportCache(geometry, camera, CacheSettings(1024, 16))
-    d = cache.gather(constant(1.0), None).diffuse[40].reshape(3, 3)[:, 0]
-    # 1 + (R (1 + c) - 1/2) (1 - c)^5 against 2 c dc: Beta integrals 2 B(2, 6) = 1/21 and 2 B(3, 6) = 1/84.
-    assert d[0] == pytest.approx(1 - 0.5 / 21, abs=1e-3)
-    assert d[1] == pytest.approx(1 / 21 + 1 / 84, abs=1e-3)
-    assert d[2] == pytest.approx(0, abs=1e-3)
-
-
-def _facing(size: int):
-    return np.broadcast_to(np.array([0, 0, 1], np.float32), (size, size, 3)).copy()
 
 
 @pytest.mark.parametrize("level", [2, 4, 6, 7])

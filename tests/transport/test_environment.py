@@ -25,6 +25,15 @@ def look(envmap, directions):
     return np.array(EnvmapLevel(envmap).lookup(d, mi.Bool(True))).T
 
 
+def test_convention_of_directions():
+    """Centre column along -Z, columns to the right turn towards +X, top row is +Y (docs/conventions.md)."""
+    d = texel_directions(64, 128)
+    np.testing.assert_allclose(np.linalg.norm(d, axis=-1), 1, atol=1e-6)
+    np.testing.assert_allclose(d[32, [63, 64]].mean(0), [0, 0, -1], atol=0.03)
+    assert d[32, 96, 0] > 0.99
+    assert d[0, 0, 1] > 0.99
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_lookup_equals_the_shares_of_the_light_matrix(seed):

@@ -96,13 +96,3 @@ def test_other_materials_give_their_own_light(both, change):
     reference = shaded((cache, rows, changed, None), envmap, None)
     assert relative_error(found, reference) < 0.035  # of metals, gathering interpolates between roughness levels
     assert relative_error(matrix.combine(matrix.direct(flat)), reference) > 0.05
-
-
-def test_every_ray_either_leaves_or_meets_a_surface(both):
-    """In a furnace, where surfaces send what the sky sends both agree almost without noise."""
-    cache, _, materials, matrix = both
-    light = np.ones((HEIGHT, 2 * HEIGHT, 3), np.float32)
-    surfaces = np.ones_like(materials.albedo)
-    direct = matrix.direct(torch.from_numpy(light).reshape(-1, 3))
-    indirect = matrix.indirect(torch.from_numpy(cache.slot_radiance(surfaces)))
-    torch.testing.assert_close(matrix.combine(direct + indirect), shaded(both, light, surfaces), rtol=0.03, atol=0.01)
