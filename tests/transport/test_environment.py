@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from materialist.envmap import row_solid_angle
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.transport.environment import (
     EnvmapLevel,
     EnvmapPyramid,

@@ -5,14 +5,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from materialist.transport import sampling
+from materialist.transport.cache import point
 
 N = 1 << 14
 
 
 @pytest.fixture(scope="module")
 def lattice():
-    return sampling.point(dr.arange(mi.UInt32, N), dr.opaque(mi.UInt32, N), mi.Point2f(0.2, 0.7))
+    return point(dr.arange(mi.UInt32, N), dr.opaque(mi.UInt32, N), mi.Point2f(0.2, 0.7))
 
 
 def test_points_fill_the_square(lattice):

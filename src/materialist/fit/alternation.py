@@ -63,19 +63,24 @@ class Fit:
         state = FitState(self.prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
         if self.strategy == "white-light-first":
             return self._white_light_first(state)
-        fit = self if self.settings.explained is None else self._confident(state)
+        problem = self.engine.light_problem(self.prior)
+        fit = self if self.settings.explained is None else self._confident(state, problem)
         for round_ in range(self.settings.rounds):
+            if round_ > 0:
+                found = self.materials(state)
+                problem = self.engine.light_problem(
+                    replace(self.prior, roughness=found.roughness, metallic=found.metallic)
+                )
+            fit._fit_light(state, problem, again=round_ > 0)
             last = round_ == self.settings.rounds - 1
-            fit._fit_light(state, round_)
             fit._fit_materials(state, corrections=self.settings.corrections * last)
         return state
 
-    def _confident(self, state: FitState) -> Fit:
+    def _confident(self, state: FitState, problem: LightProblem) -> Fit:
         """The fit with what leaving the prior costs scaled by how well the prior explains the photo.
 
         A colour that is surely not the materials' is the light's: its weight falls as theirs rise.
         """
-        problem = self.engine.light_problem(self.prior)
         result, error = prior_light(problem, self._photo(), self.settings.light, seed=self.seed, progress=self.progress)
         scale = self.settings.confidence(error)
         state.stages.append(
@@ -89,19 +94,12 @@ class Fit:
 
     # -- stages --------------------------------------------------------------------------------------------------------
 
-    def _fit_light(self, state: FitState, round_: int = 0) -> None:
+    def _fit_light(self, state: FitState, problem: LightProblem, *, again: bool = False) -> None:
         """Fit the light with the prior's albedo: the light must not explain what later stages have baked in."""
         settings, photo = self.settings.light, self._photo()
-        problem: LightProblem
-        if round_ == 0:
-            problem, start = self.engine.light_problem(self.prior), start_radiance(photo, settings)
-            light = envmap_field(settings, seed=self.seed, start=start)
-        else:
-            found = self.materials(state)
-            given = replace(self.prior, roughness=found.roughness, metallic=found.metallic)
-            problem = self.engine.light_problem(given)
-            light = envmap_field(settings, seed=self.seed, start=torch.from_numpy(state.envmap))
-        steps = settings.refit_steps if round_ > 0 and settings.refit_steps else None
+        start = torch.from_numpy(state.envmap) if again else start_radiance(photo, settings)
+        light = envmap_field(settings, seed=self.seed, start=start)
+        steps = settings.refit_steps if again and settings.refit_steps else None
         result = fit_light(problem, photo, light, settings, steps=steps, seed=self.seed, progress=self.progress)
         state.stages.append(result.summary())
         envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
@@ -170,7 +168,7 @@ class Fit:
         refined = replace(start, prior=self._as_materials(state.maps))
         if isinstance(self.engine, TransportEngine):  # what the white map made surfaces send is not in the photo
             self.engine.set_radiance(self.photo.linear)
-        refined._fit_light(state)
+        refined._fit_light(state, self.engine.light_problem(refined.prior))
         albedo = (MaterialStage(("albedo",), schedule),)
         refined._fit_materials(state, stages=albedo, corrections=self.settings.corrections)
         return state

@@ -91,7 +91,6 @@ class TransportEngine:
         self.camera, self.seed = camera, seed
         self.light_height, self.light_pixels, self.least_pixels = light_height, light_pixels, least_pixels
         self.radiance = radiance
-        self._last: tuple[Materials, Array, LightProblem] | None = None
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
@@ -101,15 +100,6 @@ class TransportEngine:
         self.radiance = radiance
 
     def light_problem(self, materials: Materials) -> LightProblem:
-        # Asked twice in a row: for the prior's error, and then for the first light.
-        last = self._last
-        if last and last[0] is materials and last[1] is self.radiance:
-            return last[2]
-        problem = self._light_problem(materials)
-        self._last = (materials, self.radiance, problem)
-        return problem
-
-    def _light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)

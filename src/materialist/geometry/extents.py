@@ -35,10 +35,6 @@ class PlaneExtent:
         """[4, 2] counter-clockwise."""
         return np.array([[self.left, self.down], [self.right, self.down], [self.right, self.up], [self.left, self.up]])
 
-    def holds(self, x: Array, y: Array) -> Array:
-        """[N] bool: whether coordinates [N] and [N] in `axes` are inside."""
-        return (x > self.left) & (x < self.right) & (y > self.down) & (y < self.up)
-
 
 def read_extents(provenance: dict[str, Any]) -> tuple[PlaneExtent, ...]:
     """The extents of continued walls in a scene's provenance; none in that of an older version.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,26 +36,16 @@ def coverage(scene, camera: Camera, names: Sequence[str]) -> Array:
 
     scene: a Mitsuba scene (`RenderScene.mi_scene`).
     """
-    import drjit as dr
-    import mitsuba as mi
-
-    shapes = [shape for shape in scene.shapes() if shape.id() in names]
     size = (camera.height, camera.width)
-    total = np.zeros(size[0] * size[1], np.float32)
-    for direction in _directions(camera, size, (0, size[0], 0, size[1])):
-        hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(0), direction))
-        wanted = mi.Bool(False)
-        for shape in shapes:
-            wanted |= hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
-        total += np.array(dr.select(wanted, mi.Float(1), mi.Float(0)))
-    return (total / GRID**2).reshape(size)
+    return first_hits(scene, camera, dict.fromkeys(names), size, (0, size[0], 0, size[1])).share
 
 
-def first_hits(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> FirstHits:
+def first_hits(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, int], box: Box) -> FirstHits:
     """See `FirstHits`.
 
     Args:
-        scene: a Mitsuba scene in which the bodies are shapes by these names (`RenderScene.mi_scene`).
+        scene: a Mitsuba scene (`RenderScene.mi_scene`).
+        bodies: by the names of their shapes; None: its albedo is not asked for.
         size: (H, W) of the whole picture. box: the part of it that is wanted.
     """
     top, bottom, left, right = box
@@ -69,7 +59,7 @@ def first_hits(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, 
     return FirstHits(take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7]))
 
 
-def _strip(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int], box: Box) -> Array:
+def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, int], box: Box) -> Array:
     """[h, w, 8] share, albedo, normal and depth of a few rows."""
     import mitsuba as mi
 
@@ -81,10 +71,10 @@ def _strip(scene, camera: Camera, bodies: dict[str, Body], size: tuple[int, int]
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), direction))
         normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
         for name, body in bodies.items():
-            hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
-            if hit.any():
-                part = [np.ones((hit.sum(), 1)), _albedo(body, uv[hit]), normal[hit], depth[hit, None]]
-                total[hit] += np.concatenate(part, 1)
+            if name in shapes:
+                hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
+                albedo = np.zeros((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
+                total[hit] += np.concatenate([np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1)
     total[:, 1:] /= np.maximum(total[:, :1], 1)
     total[:, 0] /= GRID**2
     return total.reshape(h, w, 8)

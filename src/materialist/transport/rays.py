@@ -25,8 +25,7 @@ from materialist.bsdf.disney import (
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import half_vector, lifted, visible_normal
 from materialist.buffers import floats, integers
-from materialist.transport.cache import TransportCache, spawn
-from materialist.transport.sampling import R2, point
+from materialist.transport.cache import R2, TransportCache, point, spawn
 from materialist.types import Array
 
 STEPS = tuple(round(g * 2**32) for g in R2)
