@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.bsdf.rough_dielectric import COSINES, directional_albedo
+from materialist.bsdf.rough_dielectric import COSINES, PLUGIN, directional_albedo
 from materialist.render.variant import setup
 
 
@@ -29,3 +29,14 @@ def test_the_albedo_is_what_mitsubas_sampler_leaves(ior, alpha):
             context = mi.BSDFContext(mi.TransportMode.Importance)  # energy: no factor for the density of radiance
             _, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), True)
             assert table[side, k] == pytest.approx(float(np.mean(weight.x)), abs=0.01)
+
+
+def test_new_values_change_the_gain():
+    setup()
+    import mitsuba as mi
+
+    bsdf = mi.load_dict({"type": PLUGIN, "interface": described(1.5, 0.1)})
+    params = mi.traverse(bsdf)
+    params["interface.alpha.value"], params["interface.eta"] = 0.5, 1.3
+    params.update()
+    np.testing.assert_allclose(np.array(bsdf.table).reshape(2, -1), directional_albedo(1.3, 0.5), atol=1e-5)

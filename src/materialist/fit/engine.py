@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -44,22 +43,6 @@ class MaterialProblem:
     """[P, 5] (albedo, roughness, metallic) -> radiance [P, 3], differentiable."""
     tables: Tables | None = None
     """The transport behind `render`, where the engine has one."""
-
-
-class Engine(Protocol):
-    """A differentiable renderer of one camera and geometry."""
-
-    name: str
-    pixels: torch.Tensor
-    """[P] int64 row-major pixels with a surface."""
-
-    def light_problem(self, materials: Materials) -> LightProblem:
-        """Rendering as a function of the light."""
-        ...
-
-    def material_problem(self, envmap: Array) -> MaterialProblem:
-        """Rendering as a function of the materials."""
-        ...
 
 
 class TransportEngine:
@@ -178,6 +161,10 @@ class PathEngine:
             return image.reshape(-1, 3)[self.pixels]
 
         return MaterialProblem(render)
+
+
+Engine = TransportEngine | PathEngine
+"""A differentiable renderer of one camera and geometry: `pixels` with a surface, and the two problems."""
 
 
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
