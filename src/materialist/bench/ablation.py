@@ -106,7 +106,7 @@ class _Photo:
         """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
         height, seed = self.sample.envmap.shape[0], self.bench.seed
         shared: dict[str, Any] = {"envmap_height": height, "seed": seed, "device": self.bench.device}
-        prepared: Any = Inversion(FitSetup(self.sample.photo, self.prior, PAPER, FULL, **shared)).prepare()
+        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, FULL, **shared))
         engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=seed)
         engine.cache.trace()
         fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=seed)
