@@ -12,6 +12,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -65,7 +66,7 @@ def examine(device: str = "auto") -> list[Finding]:
     """
     llvm, path = _llvm()
     return [
-        _python(),
+        Finding("Python", "ok", platform.python_version()),
         *(_package(name) for name in ("torch", "mitsuba", "drjit")),
         llvm,
         _renderer(path),
@@ -75,13 +76,6 @@ def examine(device: str = "auto") -> list[Finding]:
         _memory(),
         _disk(),
     ]
-
-
-def _python() -> Finding:
-    good = sys.version_info >= (3, 11)
-    return Finding(
-        "Python", "ok" if good else "broken", platform.python_version(), "" if good else "apt install python3"
-    )
 
 
 def _package(name: str) -> Finding:
@@ -118,39 +112,28 @@ def _renderer(llvm: str | None) -> Finding:
         return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
     absent = re.search(r"(lib\S+\.so\S*): cannot open shared object", child.stderr)
     if absent:
-        return Finding("renderer (CPU)", "broken", f"{absent[1]} is missing", _apt(absent[1]))
+        from materialist.render.variant import package_of
+
+        remedy = f"sudo apt-get install -y {package_of(absent[1])}"
+        return Finding("renderer (CPU)", "broken", f"{absent[1]} is missing", remedy)
     last = (child.stderr.strip().splitlines() or ["no message"])[-1]
     return Finding(
         "renderer (CPU)", "broken", f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19"
     )
 
 
-def _apt(library: str) -> str:
-    from materialist.render.variant import package_of
-
-    return f"sudo apt-get install -y {package_of(library)}"
-
-
 def _cuda(needed: bool = False) -> Finding:
-    """Whether an NVIDIA driver answers."""
-    found = _driver()
-    if needed and found.state != "ok":
-        return Finding(found.name, "broken", found.detail.split(";")[0], "materialist doctor --device cpu")
-    return found
-
-
-def _driver() -> Finding:
-    tool = shutil.which("nvidia-smi")
-    if tool is None:
-        return Finding("GPU (CUDA)", "missing", "no NVIDIA driver; everything runs on the CPU")
-    query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
-    try:
-        child = subprocess.run(query, capture_output=True, text=True, timeout=20, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return Finding("GPU (CUDA)", "missing", f"nvidia-smi does not answer ({error}); the CPU is used")
-    if child.returncode != 0 or not child.stdout.strip():
-        return Finding("GPU (CUDA)", "missing", "nvidia-smi reports no GPU; the CPU is used")
-    return Finding("GPU (CUDA)", "ok", child.stdout.strip().splitlines()[0])
+    """Whether an NVIDIA driver answers; broken where a GPU is `needed` and none does."""
+    tool, said = shutil.which("nvidia-smi"), ""
+    if tool is not None:
+        query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
+        with suppress(OSError, subprocess.SubprocessError):
+            said = subprocess.run(query, capture_output=True, text=True, timeout=20, check=True).stdout.strip()
+    if said:
+        return Finding("GPU (CUDA)", "ok", said.splitlines()[0])
+    if needed:
+        return Finding("GPU (CUDA)", "broken", "no NVIDIA GPU answers", "materialist doctor --device cpu")
+    return Finding("GPU (CUDA)", "missing", "no NVIDIA GPU answers; everything runs on the CPU")
 
 
 def _extra(name: str, extra: str, purpose: str) -> Finding:
@@ -167,9 +150,8 @@ def _weights() -> Finding:
     here = [model.name for model in KNOWN if is_complete(model)]
     if here:
         return Finding("hub models", "ok", f"{', '.join(here)} in {models_folder()}")
-    return Finding(
-        "hub models", "missing", f"optional: none in {models_folder()}", "materialist models download matnet"
-    )
+    lacking = f"optional: none in {models_folder()}"
+    return Finding("hub models", "missing", lacking, "materialist models download matnet")
 
 
 def _memory() -> Finding:
@@ -177,14 +159,15 @@ def _memory() -> Finding:
 
     free = psutil.virtual_memory().available / 2**30
     detail = f"{free:.1f} GB free (an inversion at 512 needs up to 4)"
-    return Finding(
-        "memory", "ok" if free >= 4 else "missing", detail, "" if free >= 4 else "materialist invert --size 256"
-    )
+    if free >= 4:
+        return Finding("memory", "ok", detail)
+    return Finding("memory", "missing", detail, "materialist invert --size 256")
 
 
 def _disk() -> Finding:
     where = Path.cwd()
     free = shutil.disk_usage(where).free / 2**30
-    good = free >= 0.5 and os.access(where, os.W_OK)
     detail = f"{free:.1f} GB free in {where}"
-    return Finding("disk", "ok" if good else "missing", detail, "" if good else f"df -h {where}")
+    if free >= 0.5 and os.access(where, os.W_OK):
+        return Finding("disk", "ok", detail)
+    return Finding("disk", "missing", detail, f"df -h {where}")

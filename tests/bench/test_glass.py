@@ -58,11 +58,11 @@ def test_without_refraction_both_models_show_the_background(scene, true):
     mask = scene.mask
     bent = models.two_interface(case(scene, room, 1.0 + 1e-6), true, behind)
     traced = models.closed(case(scene, room, 1.0 + 1e-4), true, behind)
-    assert np.abs(bent - room)[mask].mean() < 0.02 * room[mask].mean()
-    # Sampled at random places of a pixel, a fine pattern is another one, but no brighter or darker.
-    assert np.abs(traced - room)[mask].mean() < 0.12 * room[mask].mean()
-    assert traced[mask].mean() == pytest.approx(room[mask].mean(), rel=0.04)
-    assert (bent[~mask] == 0).all() and (traced[~mask] == 0).all()
+    for found in (bent, traced):
+        # Sampled at several places of a pixel, a fine pattern is another one, but no brighter or darker.
+        assert np.abs(found - room)[mask].mean() < 0.12 * room[mask].mean()
+        assert found[mask].mean() == pytest.approx(room[mask].mean(), rel=0.04)
+        assert (found[~mask] == 0).all()
 
 
 def test_the_background_looks_like_its_picture_in_the_light(scene):

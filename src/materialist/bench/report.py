@@ -13,7 +13,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder
+from materialist.io.atomic import make_folder, whole_file
 from materialist.io.display import write_sheet
 from materialist.plain import plain
 from materialist.types import Array
@@ -68,26 +68,25 @@ def claim(folder: Path, *, force: bool = False) -> Path:
 
 
 def write(report: Report, folder: Path) -> None:
-    """Write report.json, report.md, plot.png and sheet.png; files of the same run that are there are replaced."""
-    try:
-        _replace(folder / "report.json", json.dumps(as_dict(report), indent=1, default=float).encode())
-        _replace(folder / "report.md", markdown(report).encode())
-        if report.rows and report.plotted:
-            _plot(report, folder / "plot.png")
-        write_sheet(report.sheet, folder / "sheet.png")
-    except OSError as error:
-        raise OutputError(f"The report cannot be written to {folder}: {error.strerror or error}.") from error
+    """Write report.json, report.md, plot.png and sheet.png; files of the same run that are there are replaced.
 
-
-def as_dict(report: Report) -> dict[str, Any]:
-    """The content of report.json."""
-    return {
+    Raises OutputError where they cannot be written.
+    """
+    content = {
         "title": report.title,
         "settings": report.settings,
         "machine": {"cores": os.cpu_count(), "processor": platform.machine(), "python": platform.python_version()},
         "means": means(report),
-        "rows": [{k: plain(v) for k, v in row.items()} for row in report.rows],
+        "rows": report.rows,
     }
+    with whole_file(folder / "report.json", force=True) as file:
+        file.write_text(json.dumps(plain(content), indent=1), "utf-8")
+    with whole_file(folder / "report.md", force=True) as file:
+        file.write_text(markdown(report), "utf-8")
+    if report.rows and report.plotted:
+        with whole_file(folder / "plot.png", force=True) as file:
+            _plot(report, file)
+    write_sheet(report.sheet, folder / "sheet.png")
 
 
 def means(report: Report) -> dict[str, dict[str, float]]:
@@ -145,10 +144,3 @@ def _plot(report: Report, path: Path) -> None:
         axis.invert_yaxis()
         axis.tick_params(labelsize=8)
     figure.savefig(path, dpi=110)
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    temporary = path.with_suffix(path.suffix + ".part")
-    temporary.write_bytes(content)
-    temporary.replace(path)
