@@ -15,7 +15,6 @@ from materialist.predict.unet import UNetArchitecture
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint
 from materialist.train.export import export_run
-from materialist.train.task import load_initial
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +30,7 @@ def test_the_averaged_weights_are_exported_and_predict(run, tmp_path):
     facts = export_run(run, file)
     assert facts["megabytes"] < 1
     predictor = BundledPredictor(file)
-    assert predictor.facts["step"] == facts["step"] == 3 and predictor.facts["data"]["seed"] == 5
+    assert predictor.facts["step"] == facts["step"] == 3 and predictor.facts["data"]["seed"] == [5]
     state = checkpoint.load(run, "matnet")
     for name, tensor in predictor.network.state_dict().items():
         torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
@@ -83,13 +82,17 @@ def test_exports_that_cannot_be(run, tmp_path):
 
 
 def test_a_run_begins_with_exported_weights(run, tmp_path):
-    network = BundledNetwork(made_runs.NETWORK)
-    load_initial(network, run / checkpoint.WEIGHTS)
+    def begin(**changes):
+        data = run.parent / "data"
+        task = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, **changes))
+        task.init = run / checkpoint.WEIGHTS
+        return task.network().state_dict()
+
     averaged = checkpoint.load(run, "matnet")["averaged"]
-    for name, tensor in network.state_dict().items():
+    for name, tensor in begin().items():
         torch.testing.assert_close(tensor, averaged[name], atol=2e-3, rtol=2e-3)
     with pytest.raises(WeightsError, match="is not a checkpoint of BundledNetwork"):
-        load_initial(BundledNetwork(replace(made_runs.NETWORK, fine=16)), run / checkpoint.WEIGHTS)
+        begin(fine=16)
 
 
 def test_the_encoder_is_not_stored_with_a_network(tmp_path):

@@ -13,7 +13,7 @@ from materialist.predict.matnet.network import MatNet, Size
 from materialist.predict.matnet.predictor import FORMAT
 from materialist.predict.weights import metadata
 from materialist.train import matnet
-from materialist.train.matnet import RECIPE, PaperTask, freeze, load_start
+from materialist.train.matnet import PaperTask, freeze, load_start
 from materialist.train.stream import epoch
 
 TINY = Size(width=12, blocks=4, heads=2, layers=(0, 1, 2, 3), pyramid=(8, 8, 8, 8), fused=8, grid=4)
@@ -33,11 +33,6 @@ def task(source):
 def network():
     torch.manual_seed(0)
     return MatNet(TINY)
-
-
-def test_the_recipe_is_the_papers():
-    paper = RECIPE
-    assert (paper.rate, paper.side, paper.clip, paper.ema, paper.warm_up, paper.last_rate) == (1e-5, 512, 1e9, 0, 0, 1)
 
 
 def test_what_is_frozen(network):
@@ -80,11 +75,6 @@ def test_lpips_is_taken_where_it_is(monkeypatch, source):
     assert task._perceptual(found, true, mask + 1) > 0.05
 
 
-def test_the_notes_say_what_stands_in_for_lpips(task):
-    assert any("in place of LPIPS" in note for note in task.notes)
-    assert any("random weights" in note for note in task.notes)
-
-
 def test_only_flips_upside_down_and_crops(task, source):
     seen = set()
     for seed in range(8):
@@ -94,10 +84,6 @@ def test_only_flips_upside_down_and_crops(task, source):
         seen.add(bool(sample.normal[surface][0, 1] < 0))
         assert (sample.normal[surface][:, 0] == 0).all()
     assert seen == {True, False}
-
-
-def test_small_pictures_are_enlarged_to_the_crop(task, source):
-    assert task.prepare(source.read(0), 96, np.random.default_rng(0)).image.shape == (96, 96, 3)
 
 
 def test_starting_from_other_checkpoints(network, tmp_path):

@@ -73,17 +73,10 @@ def resized(sample: Sample, height: int, width: int) -> Sample:
     return _each(sample, work)
 
 
-def flip(sample: Sample) -> Sample:
-    """The mirror image: columns reversed, x of normals and rays negated."""
-    mirror = np.array([-1, 1, 1], np.float32)
-    mirrored = _each(sample, lambda array, _: np.ascontiguousarray(array[:, ::-1]))
-    return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
-
-
-def flip_vertical(sample: Sample) -> Sample:
-    """The picture upside down: rows reversed, y of normals and rays negated."""
-    mirror = np.array([1, -1, 1], np.float32)
-    mirrored = _each(sample, lambda array, _: np.ascontiguousarray(array[::-1]))
+def flip(sample: Sample, axis: int = 1) -> Sample:
+    """The mirror image along an axis: 1 reverses columns and negates x of normals and rays, 0 rows and y."""
+    mirror = np.float32([-1, 1, 1] if axis == 1 else [1, -1, 1])
+    mirrored = _each(sample, lambda array, _: np.ascontiguousarray(np.flip(array, axis)))
     return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
 
 

@@ -17,7 +17,7 @@ from materialist.procedural.photographic import as_photo
 from materialist.train import losses
 from materialist.train.augment import augment
 from materialist.train.maps import MapsTask
-from materialist.train.task import Batch, Recipe, load_initial
+from materialist.train.task import Batch, Recipe
 from materialist.types import Prediction
 
 RECIPE = Recipe(
@@ -60,20 +60,18 @@ class BundledTask(MapsTask):
 
     def __init__(
         self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
-        architecture: BundledArchitecture = ARCHITECTURE, loss: BundledLoss | None = None,
+        architecture: BundledArchitecture = ARCHITECTURE,
     ):  # fmt: skip
         super().__init__(source, recipe, init=init, score_samples=score_samples)
-        self.architecture, self.loss = architecture, loss or BundledLoss()
+        self.architecture = architecture
 
     def identity(self) -> dict[str, Any]:
         """The architecture."""
         return {"name": self.name, "network": self.architecture.as_dict()}
 
-    def network(self) -> nn.Module:
-        """A network of the architecture, to begin from."""
+    def make(self) -> BundledNetwork:
+        """A network of the architecture."""
         network = BundledNetwork(self.architecture)
-        if self.init is not None:
-            load_initial(network, self.init)
         return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
@@ -83,7 +81,7 @@ class BundledTask(MapsTask):
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Losses of all maps; see `BundledLoss`."""
         image = batch["image"].contiguous(memory_format=torch.channels_last)
-        out, mask, w = network(image, batch["rays"]), batch["mask"], self.loss
+        out, mask, w = network(image, batch["rays"]), batch["mask"], BundledLoss()
         albedo, depth = srgb(batch["albedo"]), relative_log_depth(batch["depth"], mask)
 
         def gradient(name: str, true: Tensor | None = None) -> Tensor:
@@ -115,11 +113,6 @@ class BundledTask(MapsTask):
         assert isinstance(network, BundledNetwork)
         with torch.inference_mode():
             return infer(network, sample.image, sample.rays, device=next(network.parameters()).device)
-
-    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
-        """Write the network as `--predictor bundled` reads it."""
-        assert isinstance(network, BundledNetwork)
-        network.save(path, facts)
 
 
 def relative_log_depth(depth: Tensor, mask: Tensor) -> Tensor:

@@ -9,7 +9,6 @@ from typing import Any
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
-from materialist.io.atomic import make_folder
 
 NAME = "checkpoint.pt"
 VERSION = 2
@@ -52,14 +51,6 @@ def resumed(folder: Path, kind: str, *, resume: bool, device: Any = "cpu") -> di
     return load(folder, kind, device)
 
 
-def make(folder: Path) -> None:
-    """Make the folder of a run; raises OutputError when it cannot be made."""
-    try:
-        make_folder(folder)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be made ({error.strerror or error}); choose another folder.") from error
-
-
 def load(folder: Path, kind: str, device: Any = "cpu") -> dict[str, Any]:
     """The state in FOLDER/checkpoint.pt.
 
@@ -84,14 +75,3 @@ def append_line(path: Path, values: dict[str, Any]) -> None:
     """Add one line of JSON to a log."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(values) + "\n")
-
-
-def read_lines(path: Path) -> list[dict[str, Any]]:
-    """The lines of a log; none when there is no such file. A last line that was cut off is left out."""
-    found = []
-    for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
-        try:
-            found.append(json.loads(line))
-        except ValueError:
-            continue
-    return found

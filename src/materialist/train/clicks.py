@@ -15,7 +15,7 @@ from materialist.errors import InputError
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.unet import UNetArchitecture
 from materialist.train.click_views import ClickView, draw_click, load
-from materialist.train.task import Batch, Recipe, load_initial
+from materialist.train.task import Batch, Examples, Recipe, Task
 from materialist.types import Array
 
 RECIPE = Recipe(side=224, batch=16, rate=1.5e-3, growth=((0.5, 128),))
@@ -27,7 +27,7 @@ DRAWS = 100
 """Views tried for one with something to click on."""
 
 
-class ClickExamples:
+class ClickExamples(Examples):
     """Random parts of views with a click in them."""
 
     def __init__(self, views: list[ClickView]):
@@ -35,9 +35,6 @@ class ClickExamples:
 
     def __len__(self) -> int:
         return len(self.views)
-
-    def refresh(self) -> None:
-        """Nothing: the views are in memory."""
 
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """maps [C, side, side] and mask [side, side] of a click in that view, or in another one if it shows nothing."""
@@ -48,11 +45,10 @@ class ClickExamples:
         raise InputError("The views show nothing to click on; make them of a larger data set.")
 
 
-class ClickTask:
+class ClickTask(Task):
     """The network that finds the object at a click."""
 
     kind: ClassVar[str] = "clicks"
-    notes: tuple[str, ...] = ()
 
     def __init__(
         self, views: Path, recipe: Recipe = RECIPE, *, init: Path | None = None,
@@ -63,23 +59,12 @@ class ClickTask:
         if not found:
             raise InputError(f"{views} holds no views to learn from.")
         aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0
-        self.examples, self.held_out = ClickExamples(found[: len(found) - aside]), found[len(found) - aside :]
-        self.recipe, self.init, self.architecture = recipe, init, architecture
+        super().__init__(ClickExamples(found[: len(found) - aside]), recipe, init)
+        self.held_out, self.architecture = found[len(found) - aside :], architecture
 
-    def identity(self) -> dict[str, Any]:
-        """The architecture."""
-        return {"network": ClickNet(self.architecture).architecture.as_dict()}
-
-    def data(self) -> dict[str, Any]:
-        """How many views there are."""
-        return {"views": len(self.examples)}
-
-    def network(self) -> nn.Module:
-        """ClickNet, or one with the weights in `init`."""
-        network = ClickNet(self.architecture)
-        if self.init is not None:
-            load_initial(network, self.init)
-        return network
+    def make(self) -> ClickNet:
+        """ClickNet."""
+        return ClickNet(self.architecture)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Cross-entropy, and one minus the soft overlap (Dice), of logits with masks [B, S, S]."""
@@ -95,11 +80,6 @@ class ClickTask:
                     found = network(torch.from_numpy(maps)[None])[0].numpy() > 0
                 overlap.append((found & mask).sum() / (found | mask).sum())
         return {"iou": float(np.mean(overlap)), "iou_median": float(np.median(overlap))} if overlap else {}
-
-    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
-        """Write the network as the package reads it."""
-        assert isinstance(network, ClickNet)
-        network.save(path, facts)
 
 
 def click_losses(found: Tensor, mask: Tensor) -> dict[str, Tensor]:

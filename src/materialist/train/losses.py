@@ -80,23 +80,6 @@ def gradient(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> 
     return total / scales
 
 
-def perceptual_substitute(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> Tensor:
-    """Stands in for LPIPS where its backbone cannot be had: multi-scale structure of encoded colours in [0, 1].
-
-    LPIPS compares network features over growing windows, each normalised. This compares the same windows without a
-    network: 1 - structural similarity (7 x 7 means, as Wang et al. 2004) at 1, 1/2, 1/4, 1/8 of the resolution, plus
-    the multi-scale gradient loss. In [0, 2] or so, like LPIPS about 0.1 to 0.6 for images of interest.
-    """
-    total = gradient(predicted, true, mask, scales)
-    p, t, m = predicted * mask, true * mask, mask
-    for _ in range(scales):
-        total = total + (1 - _ssim(p, t, m)) / scales
-        if min(p.shape[-2:]) < 14:
-            break
-        p, t, m = (F.avg_pool2d(x, 2) for x in (p, t, m))
-    return total
-
-
 def per_picture(values: Tensor, mask: Tensor) -> Tensor:
     """[B, 1, 1, 1] mean of values [B, C, H, W] over the kept pixels of each picture."""
     over = (values * mask).flatten(1).sum(1)
@@ -120,16 +103,3 @@ def slopes(log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, s
     whole = 1 - F.max_pool2d(1 - F.avg_pool2d(mask, step), 3, 1)
     alike = (true.norm(dim=1, keepdim=True) > 0.97).float() * (whole > 0.99).float()
     return mean(1 - F.cosine_similarity(normal, true, dim=1, eps=1e-8).unsqueeze(1), alike)
-
-
-def _ssim(a: Tensor, b: Tensor, mask: Tensor) -> Tensor:
-    """Mean structural similarity over 7 x 7 windows whose centre is kept."""
-    window = min(7, *a.shape[-2:])
-    pool = lambda x: F.avg_pool2d(x, window, 1)  # noqa: E731
-    mean_a, mean_b = pool(a), pool(b)
-    var_a, var_b = pool(a * a) - mean_a**2, pool(b * b) - mean_b**2
-    covariance = pool(a * b) - mean_a * mean_b
-    c1, c2 = 0.01**2, 0.03**2
-    similarity = (2 * mean_a * mean_b + c1) * (2 * covariance + c2)
-    similarity = similarity / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))
-    return mean(similarity, pool(mask)) if bool(mask.any()) else similarity.new_ones(())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from materialist.io.display import strip, write_sheet
 from materialist.io.samples import Sample, Source
 from materialist.metrics.maps import score, summary
 from materialist.procedural.photographic import as_photo
-from materialist.train.task import Recipe
+from materialist.train.task import Examples, Recipe, Task
 from materialist.types import Array, Prediction
 
 HELD_OUT_EVERY = 40
@@ -26,7 +26,7 @@ HELD_OUT, TRAINED_ON = "samples kept aside", "samples trained on"
 
 
 @dataclass
-class Pictures:
+class Pictures(Examples):
     """The samples of a set that are trained on, changed at random by `prepare`."""
 
     source: Source
@@ -48,22 +48,19 @@ class Pictures:
         return arrays_of(self.prepare(self.source.read(self._places[index]), side, rng))
 
 
-class MapsTask(ABC):
+class MapsTask(Task):
     """A network from a picture to all maps, on procedural samples or on InteriorVerse."""
 
     kind: ClassVar[str] = "matnet"
     name: ClassVar[str]
     """The --config of the command."""
-    notes: tuple[str, ...] = ()
-    scored_on = ""
-    """What the last scores are of: HELD_OUT or TRAINED_ON."""
 
     def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
         """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""
         if score_samples < 0:
             raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
-        self.source, self.recipe, self.init, self.score_samples = source, recipe, init, score_samples
-        self.examples = Pictures(source, self.prepare)
+        super().__init__(Pictures(source, self.prepare), recipe, init)
+        self.source, self.score_samples = source, score_samples
         self.notes = (*self.notes, *getattr(source, "notes", list)())
 
     @abstractmethod
@@ -94,10 +91,9 @@ class MapsTask(ABC):
         write_sheet(strips, folder / "sheet.png")
         if not samples:
             return {}
-        self.scored_on = TRAINED_ON if none_held_out(self.source) else HELD_OUT
         found = summary([row for row in rows if row])
         shown = {name: value for name, value in found.items() if not name.endswith(("_mse", "_raw", "_scale"))}
-        return {"of": self.scored_on, **shown}
+        return {"of": TRAINED_ON if none_held_out(self.source) else HELD_OUT, **shown}
 
 
 def arrays_of(sample: Sample) -> dict[str, Array]:

@@ -55,8 +55,7 @@ class PaperTask(MapsTask):
         )  # fmt: skip
         perceptual = (
             "Albedo: L1 and LPIPS (VGG)." if self.lpips is not None
-            else "Albedo: L1 and a multi-scale structure loss (losses.perceptual_substitute) in place of LPIPS, whose "
-            "package or backbone is not installed."
+            else "Albedo: L1 and gradients at four scales in place of LPIPS, which is not installed."
         )  # fmt: skip
         self.notes = (perceptual, start)
         super().__init__(source, recipe, init=init, score_samples=score_samples)
@@ -65,12 +64,17 @@ class PaperTask(MapsTask):
         """The size of MatNet."""
         return {"name": self.name, "network": self.size if isinstance(self.size, str) else asdict(self.size)}
 
-    def network(self) -> nn.Module:
+    def make(self) -> MatNet:
         """MatNet, its encoder frozen and of its depth decoder all but the RefineNet layers."""
         network = MatNet(self.size)
+        freeze(network)
+        return network
+
+    def network(self) -> MatNet:
+        """MatNet with what the checkpoint in `init` has of it."""
+        network = self.make()
         if self.init is not None:
             load_start(network, self.init)
-        freeze(network)
         return network
 
     def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
@@ -83,7 +87,7 @@ class PaperTask(MapsTask):
         top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
         sample = augment.window(sample, top, left, side, side)
         if rng.random() < 0.5:
-            sample = augment.flip_vertical(sample)
+            sample = augment.flip(sample, axis=0)
         return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
@@ -103,10 +107,10 @@ class PaperTask(MapsTask):
         }
 
     def _perceptual(self, found: Tensor, true: Tensor, mask: Tensor) -> Tensor:
-        """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or its substitute."""
+        """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or gradients in its place."""
         found, true = srgb(found), srgb(true)
         if self.lpips is None:
-            return losses.perceptual_substitute(found, true, mask)
+            return losses.gradient(found, true, mask)
         kept = torch.where(mask > 0, found, true)
         return self.lpips.to(found.device)(2 * kept - 1, 2 * true - 1).mean()
 
@@ -118,7 +122,7 @@ class PaperTask(MapsTask):
         unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
         return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
 
-    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
+    def save(self, path: Path, network: MatNet, facts: dict[str, Any]) -> None:
         """Write the network as `--predictor matnet:FILE` reads it."""
         write_weights(path, network.state_dict(), {"format": FORMAT, "facts": json.dumps(facts)})
 

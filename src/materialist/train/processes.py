@@ -9,7 +9,7 @@ import torch
 from torch import distributed, nn
 from torch.nn.parallel import DistributedDataParallel
 
-from materialist.errors import SetupError
+from materialist.predict.device import on_gpu
 
 
 @dataclass(frozen=True)
@@ -46,24 +46,16 @@ class Processes:
             distributed.destroy_process_group()
 
 
-def place_of(device: str = "auto") -> torch.device:
-    """Where this process trains: `auto` (CUDA where there is one), `cpu` or `cuda`.
-
-    Raises SetupError when there is no such device.
-    """
-    if device == "cuda" and not torch.cuda.is_available():
-        raise SetupError("There is no CUDA device that PyTorch can use; train with --device cpu.")
-    if device == "cpu" or not torch.cuda.is_available():
-        return torch.device("cpu")
-    return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
-
-
 def join(device: str = "auto") -> Processes:
-    """Take the place that torchrun gave this process, or be alone; raises SetupError when there is no such device."""
-    place = place_of(device)
+    """Take the place that torchrun gave this process, or be alone; raises SetupError when there is no such device.
+
+    `device`: `auto` (CUDA where there is one), `cpu` or `cuda`.
+    """
+    gpu = on_gpu(device)
+    place = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if gpu else torch.device("cpu")
     world, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
-    if place.type == "cuda":
+    if gpu:
         torch.cuda.set_device(place)
     if world > 1:
-        distributed.init_process_group("nccl" if place.type == "cuda" else "gloo")
+        distributed.init_process_group("nccl" if gpu else "gloo")
     return Processes(rank, world, place)

@@ -17,7 +17,7 @@ from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness.dataset import load
 from materialist.procedural.thickness.errors import mean_errors
-from materialist.train.task import Batch, Recipe, load_initial
+from materialist.train.task import Batch, Examples, Recipe, Task
 from materialist.types import Array
 
 RECIPE = Recipe(side=SIDE, batch=32, rate=2e-3, growth=((0.6, 32),))
@@ -35,7 +35,7 @@ class ThicknessLoss:
     """Added to solid and hollow thickness before logarithms, in object sizes: thinner parts count little."""
 
 
-class ViewExamples:
+class ViewExamples(Examples):
     """Views of shapes in memory; `draw` mirrors and recolours them."""
 
     def __init__(self, views: dict[str, Array]):
@@ -44,9 +44,6 @@ class ViewExamples:
 
     def __len__(self) -> int:
         return len(self.views["maps"])
-
-    def refresh(self) -> None:
-        """Nothing: the views are in memory."""
 
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """maps [C, S, S], target [5, S, S] and hollow [] of one view; S is `side`."""
@@ -64,53 +61,32 @@ class ViewExamples:
         return {"maps": maps, "target": target, "hollow": np.float32(views["hollow"][index])}
 
 
-class RefractionTask:
+class RefractionTask(Task):
     """The network that predicts how thick an object is, and the normals of its back."""
 
     kind: ClassVar[str] = "refraction"
-    notes: tuple[str, ...] = ()
 
-    def __init__(
-        self, views: Path, held_out: Path | None, recipe: Recipe = RECIPE, *, init: Path | None = None,
-        loss: ThicknessLoss | None = None,
-    ):  # fmt: skip
+    def __init__(self, views: Path, held_out: Path | None, recipe: Recipe = RECIPE, *, init: Path | None = None):
         """Views to learn from, views that are only scored, and weights to begin from.
 
         Raises InputError for a folder without views, or pictures larger than SIDE.
         """
         if recipe.side > SIDE:
             raise InputError(f"The size of training pictures is {recipe.side}; views have {SIDE} pixels.")
-        self.examples = ViewExamples(load(views))
+        super().__init__(ViewExamples(load(views)), recipe, init)
         self.held_out = None if held_out is None else load(held_out)
-        self.recipe, self.init, self.loss = recipe, init, loss or ThicknessLoss()
 
-    def identity(self) -> dict[str, Any]:
-        """The architecture."""
-        return {"network": RefractionNet().architecture.as_dict()}
-
-    def data(self) -> dict[str, Any]:
-        """How many views there are."""
-        return {"views": len(self.examples)}
-
-    def network(self) -> nn.Module:
-        """RefractionNet, which begins as the symmetry prior, or with the weights in `init`."""
-        network = RefractionNet()
-        if self.init is not None:
-            load_initial(network, self.init)
-        return network
+    def make(self) -> RefractionNet:
+        """RefractionNet, which begins as the symmetry prior."""
+        return RefractionNet()
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Relative length and logarithm of solid and hollow thickness; the normals of the back."""
-        return thickness_losses(network(batch["maps"]).float(), batch, self.loss)
+        return thickness_losses(network(batch["maps"]).float(), batch, ThicknessLoss())
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Errors on the views kept aside; see `procedural.thickness.errors`."""
         return {} if self.held_out is None else mean_errors(copy.deepcopy(network).cpu(), self.held_out)
-
-    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
-        """Write the network as the package reads it."""
-        assert isinstance(network, RefractionNet)
-        network.save(path, facts)
 
 
 def smaller(views: dict[str, Array], side: int, at_a_time: int = 256) -> dict[str, Array]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from torch import Tensor, nn
 
@@ -64,60 +65,60 @@ class Recipe:
         return asdict(self)
 
 
-class Examples(Protocol):
+class Examples(ABC):
     """What a network learns from."""
 
+    @abstractmethod
     def __len__(self) -> int:
         """How many there are at present."""
-        ...
 
+    @abstractmethod
     def draw(self, index: int, side: int, rng: Any) -> dict[str, Array]:
         """A random variant of example `index` at side x side pixels, float32; raises InputError when it is damaged."""
-        ...
 
-    def refresh(self) -> None:
-        """Look again: a set may grow while it is used."""
-        ...
+    def refresh(self) -> None:  # noqa: B027 (examples in memory do not change)
+        """Look again: a set on disk may grow while it is used."""
 
 
-class Task(Protocol):
+class Task(ABC):
     """One of the networks, and everything that its training needs."""
 
     kind: ClassVar[str]
     """What checkpoints call its runs: the name of the command."""
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     """What the log must say at the start."""
-    recipe: Recipe
-    examples: Examples
+
+    def __init__(self, examples: Examples, recipe: Recipe, init: Path | None = None):
+        """`init`: weights to begin from."""
+        self.examples, self.recipe, self.init = examples, recipe, init
+
+    @abstractmethod
+    def make(self) -> Any:
+        """A new network; parameters that do not learn have requires_grad False."""
+
+    @abstractmethod
+    def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
+        """Weighted terms of the loss by name; their sum is minimised."""
+
+    @abstractmethod
+    def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
+        """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
+
+    def network(self) -> Any:
+        """A network to begin from. Raises WeightsError for weights that are damaged or of another architecture."""
+        network = self.make()
+        if self.init is not None:
+            load_weights(network, read_state(self.init) | shared_tensors(network), self.init)
+        return network
 
     def identity(self) -> dict[str, Any]:
-        """Plain values that a resumed run must share, such as the network's architecture."""
-        ...
+        """Plain values that a resumed run must share."""
+        return {"network": self.make().architecture.as_dict()}
 
     def data(self) -> dict[str, Any]:
         """Plain values about the data, stored with the weights."""
-        ...
+        return {"views": len(self.examples)}
 
-    def network(self) -> nn.Module:
-        """A network to begin from; parameters that do not learn have requires_grad False."""
-        ...
-
-    def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        """Weighted terms of the loss by name; their sum is minimised."""
-        ...
-
-    def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
-        """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
-        ...
-
-    def save(self, path: Path, network: nn.Module, facts: dict[str, Any]) -> None:
+    def save(self, path: Path, network: Any, facts: dict[str, Any]) -> None:
         """Write the network as `predict` reads it."""
-        ...
-
-
-def load_initial(network: nn.Module, path: Path) -> None:
-    """Give the network the weights in a file that an earlier run wrote.
-
-    Raises WeightsError for a file that is damaged or of another architecture.
-    """
-    load_weights(network, dict(read_state(path)) | shared_tensors(network), path)
+        network.save(path, facts)

@@ -13,7 +13,8 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
+from materialist.io.atomic import make_folder
 from materialist.train import checkpoint, stream
 from materialist.train.processes import Processes
 from materialist.train.schedule import Budget, StopRequest, TrainingSchedule
@@ -75,7 +76,10 @@ class Trainer:
         self.last_scores: dict[str, Any] = {}
         if state is not None:
             self._restore(state)
-        checkpoint.make(folder)
+        try:
+            make_folder(folder)
+        except OSError as error:
+            raise OutputError(f"{folder} cannot be made ({error.strerror or error}); choose another folder.") from error
         self.wrapped = self.processes.wrap(self.network)
         for text in task.notes:
             note(text)
