@@ -11,7 +11,7 @@ from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.predict.refraction.thickness import Thickness
 from materialist.procedural.objects import shapes
-from materialist.procedural.synthetic import mitsuba_mesh
+from materialist.procedural.objects.shapes import mitsuba_mesh
 
 GREY = np.full((16, 32, 3), 0.5, np.float32)
 

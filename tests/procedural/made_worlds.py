@@ -1,12 +1,16 @@
 """Small worlds for the tests, and Mitsuba's own path tracer on them as the slow twin."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from materialist.procedural import materials as m
 from materialist.procedural.objects import shapes as s
+from materialist.procedural.synthetic import sensor
 from materialist.procedural.walls import Opening, RoomWall, surface
 from materialist.procedural.world import Portal, ScenePart, World, block, look, moved
 from materialist.render.envmap import half_turn, on_mitsuba_grid
+from materialist.types import Camera
 
 X, Y, Z = np.eye(3)
 
@@ -16,7 +20,7 @@ def plain(colour, roughness=0.6, metallic=0.0, emission=(0.0, 0.0, 0.0)):
     return m.Material(0, (colour,) * 3, 0.0, (roughness,) * 2, (metallic,) * 2, emission=emission)
 
 
-def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> World:
+def room(*, window: bool, lamp: bool, sky: float = 1.0) -> World:
     """A closed box of 2 m with a metal and a painted block, lit by a window in its right side and by a lamp."""
     grey, red = plain((0.6, 0.6, 0.55)), plain((0.7, 0.2, 0.15), 0.4)
     parts = [
@@ -34,7 +38,7 @@ def room(*, window: bool, lamp: bool, portal: bool = True, sky: float = 1.0) -> 
     envmap = np.full((32, 64, 3), sky, np.float32)
     envmap[:12] *= np.array([1.0, 1.5, 3.0], np.float32)
     envmap[10, 40] *= 60
-    portals = [Portal(np.array([1, 0.6, -0.4]), 0.8 * Z, 0.9 * Y)] if window and portal else []
+    portals = [Portal(np.array([1, 0.6, -0.4]), 0.8 * Z, 0.9 * Y)] if window else []
     return World(parts, envmap, look((0.1, 1.0, 0.95), (0, 0.6, -0.5), 70), portals)
 
 
@@ -57,26 +61,18 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
     description = {"type": "scene", "integrator": {"type": "path", "max_depth": depth, "rr_depth": 100}}
     for k, part in enumerate(world.parts):
         material = part.material
-        flat = lambda v, c: {  # noqa: E731
-            "type": "bitmap", "raw": True, "data": mi.TensorXf(np.full((2, 2, c), v, np.float32)),
+        flat = lambda v: {  # noqa: E731
+            "type": "bitmap", "raw": True, "data": mi.TensorXf(np.tile(np.float32(v), (2, 2, 1))),
         }  # fmt: skip
-        colour = {**flat(0, 3), "data": mi.TensorXf(np.tile(np.float32(material.colours[0]), (2, 2, 1)))}
-        props = mi.Properties()
-        props["bsdf"] = mi.load_dict(
-            {"type": "materialist_disney", "base_color": colour, "roughness": flat(material.roughness[0], 1),
-             "metallic": flat(material.metallic[0], 1)}
-        )  # fmt: skip
+        colour, roughness, metallic = map(flat, (material.colours[0], material.roughness[0], material.metallic[0]))
+        bsdf = {"type": "materialist_disney", "base_color": colour, "roughness": roughness, "metallic": metallic}
+        light = None
         if max(material.emission) > 0:
-            radiance = np.array(material.emission) * material.colours[0]
-            props["light"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": radiance.tolist()}})
-        solid = part.solid
-        mesh = mi.Mesh(f"part{k}", len(solid.vertices), len(solid.faces), has_vertex_normals=True, props=props)
-        params = mi.traverse(mesh)
-        params["vertex_positions"] = np.ravel((solid.vertices - origin) @ rotation).astype(np.float32)
-        params["vertex_normals"] = np.ravel(solid.normals @ rotation).astype(np.float32)
-        params["faces"] = np.ravel(solid.faces).astype(np.uint32)
-        params.update()
-        description[f"part{k}"] = mesh
+            radiance = (np.array(material.emission) * material.colours[0]).tolist()
+            light = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
+        place, normals = (part.solid.vertices - origin) @ rotation, part.solid.normals @ rotation
+        solid = replace(part.solid, vertices=place, normals=normals)
+        description[f"part{k}"] = s.mitsuba_mesh(solid, bsdf, f"part{k}", light)
     grid = on_mitsuba_grid(world.envmap, np)
     to_camera = np.eye(4)
     to_camera[:3, :3] = rotation.T
@@ -84,12 +80,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
         "type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
         "to_world": mi.ScalarTransform4f(to_camera) @ half_turn(mi),
     }  # fmt: skip
-    description["sensor"] = {
-        "type": "perspective", "fov": world.view.fov, "fov_axis": "x", "near_clip": 1e-3, "far_clip": 1e3,
-        "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0]),
-        "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
-        "sampler": {"type": "multijitter"},
-    }  # fmt: skip
+    description["sensor"] = sensor(Camera(size, size, world.view.fov))
     scene = mi.load_dict(description)
     params = mi.traverse(scene)
     params["sky.data"] = mi.TensorXf(grid)

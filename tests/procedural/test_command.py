@@ -30,9 +30,3 @@ def test_makes_resumes_refuses_and_draws(tmp_path, capsys):
     assert (code, (tmp_path / "sheet.png").read_bytes()) == (2, drawn)
     assert "--force" in out.err
     assert run(capsys, "-o", folder, "--sheet", tmp_path / "sheet.png", "--force")[0] == 0
-
-
-def test_a_sheet_of_nothing_is_refused(tmp_path, capsys):
-    code, out = run(capsys, "-o", tmp_path, "--sheet", tmp_path / "sheet.png")
-    assert code == 2
-    assert "no folder 'samples'" in out.err

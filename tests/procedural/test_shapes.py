@@ -2,18 +2,37 @@
 
 import numpy as np
 import pytest
-from shape_measures import volume
 
 from materialist.procedural.objects import shapes
+from materialist.procedural.objects.glassware import creature, level_set
+
+
+def volume(solid) -> float:
+    """Volume inside a closed mesh whose faces look outwards."""
+    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
+
+
+def open_edges(solid) -> int:
+    """Directed edges that do not run as often one way as the other."""
+    faces = solid.faces.astype(np.int64)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    number = np.unique(np.sort(edges, 1) @ [len(solid.vertices), 1], return_inverse=True)[1]
+    there = np.bincount(number, np.where(edges[:, 0] < edges[:, 1], 1, -1))
+    return int((there != 0).sum())
+
 
 SOLIDS = {
     "box": (shapes.box(np.array([1.0, 2.0, 3.0])), 6.0),
+    "slab": (shapes.slab((1.0, 0.6, 2.0)), 1.2),
+    "rounded slab": (shapes.slab((1.0, 0.6, 2.0), 0.1), None),
     "sphere": (shapes.superquadric(np.ones(3), 1, 1), np.pi / 6),
     "ellipsoid": (shapes.superquadric(np.array([1.0, 2.0, 0.5]), 1, 1), np.pi / 6),
     "rounded box": (shapes.superquadric(np.ones(3), 0.25, 0.25), None),
     "capsule": (shapes.capsule(0.2, 0.4), np.pi * 0.04 * 0.4 + 4 / 3 * np.pi * 0.008),
     "cylinder": (shapes.lathe(np.array([(0, 0), (0.5, 0), (0.5, 2), (0, 2)])), np.pi * 0.5),
     "vase": (shapes.vessel(np.array([(0.1, 0), (0.2, 0.3), (0.1, 0.6)]), 0.02), None),
+    "torus": (shapes.grounded(shapes.torus(1.0, 0.2, 60)), 2 * np.pi**2 * 0.04),
 }
 
 
@@ -47,9 +66,37 @@ def test_placing_turns_normals_with_the_shape():
     assert np.allclose(outward, 1)
 
 
-def test_a_panel_faces_right_cross_up():
-    panel = shapes.panel(np.zeros(3), np.array([2.0, 0, 0]), np.array([0, 0, -1.0]), (4, 2))
-    assert np.allclose(panel.normals, [0, 1, 0])
-    a, b, c = panel.vertices[panel.faces[0]]
-    assert np.cross(b - a, c - a)[1] > 0
-    assert panel.uv.max(0).tolist() == [4, 2]
+@pytest.mark.parametrize(
+    "flat",
+    [shapes.panel(np.zeros(3), np.array([2.0, 0, 0]), np.array([0, 0, -1.0]), (4, 2)),
+     shapes.sheet((0, 0, 0), (2, 0, 0), (0, 0, -3), 4)],
+    ids=["panel", "sheet"],
+)  # fmt: skip
+def test_flat_ones_face_right_cross_up(flat):
+    assert np.allclose(flat.normals, [0, 1, 0])
+    assert (shapes.face_normals(flat.vertices, flat.faces)[:, 1] > 0).all()
+
+
+def test_texture_coordinates_of_slabs_are_metres():
+    solid = shapes.slab(np.array([2.0, 1.0, 0.5]))
+    edge = np.linalg.norm(solid.vertices[solid.faces[:, 1]] - solid.vertices[solid.faces[:, 0]], axis=-1)
+    across = np.linalg.norm(solid.uv[solid.faces[:, 1]] - solid.uv[solid.faces[:, 0]], axis=-1)
+    np.testing.assert_allclose(across, edge)
+
+
+def test_a_level_set_has_the_volume_the_radius_and_the_normals_of_a_ball():
+    centre, radius = np.array([0.1, -0.2, 0.05]), 0.7
+    ball = level_set(lambda p: np.linalg.norm(p - centre, axis=-1) - radius, 1.1, points=48)
+    out = ball.vertices - centre
+    np.testing.assert_allclose(np.linalg.norm(out, axis=-1), radius, atol=0.01)
+    assert volume(ball) == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.02) and open_edges(ball) == 0
+    assert (np.sum(ball.normals * out, -1) / radius).min() > 0.98  # faces and normals look outwards
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_creatures_are_whole_and_stand(seed):
+    made = creature(np.random.default_rng(seed))
+    assert np.isfinite(made.vertices).all() and open_edges(made) == 0
+    assert 0.01 < volume(made) < 4
+    low = made.vertices[:, 1].min()
+    assert (made.vertices[:, 1] < low + 0.01 * np.ptp(made.vertices[:, 1])).sum() >= 3

@@ -76,7 +76,7 @@ def test_white_furnace(mitsuba):
     assert np.allclose(lit[~surface & np.roll(~surface, 1, 0) & np.roll(~surface, -1, 0)], 1, atol=0.15)
 
 
-@pytest.mark.parametrize("index", range(10))
+@pytest.mark.parametrize("index", range(3))
 def test_every_scene_has_objects_that_do_not_touch(index):
     items = scenes.arrangement(index, seed=0, data=None)
     things = items[1 + index % 3 :]
@@ -87,7 +87,7 @@ def test_every_scene_has_objects_that_do_not_touch(index):
     assert np.abs(low).max() < 1e-9
 
 
-@pytest.mark.parametrize("index", range(10))
+@pytest.mark.parametrize("index", range(3))
 def test_cameras_look_down_onto_the_objects(index):
     for k in range(5):
         view = scenes.view(index, k, seed=0)

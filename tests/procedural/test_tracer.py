@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.procedural import packing, tracer
+from materialist.procedural import packing, sample, tiles, tracer
+from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes as s
-from materialist.procedural.sample import labels_of
-from materialist.procedural.world import ScenePart, World, look
+from materialist.procedural.world import ScenePart, World, look, one_thing
 from materialist.types import Camera
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -50,7 +50,7 @@ def test_equals_mitsubas_integrator(world, tolerance):
 
 def test_a_portal_changes_the_noise_alone():
     with_portal, _ = traced(room(window=True, lamp=False))
-    without, _ = traced(room(window=True, lamp=False, portal=False), spp=1600)
+    without, _ = traced(replace(room(window=True, lamp=False), portals=[]), spp=1600)
     np.testing.assert_allclose(with_portal.mean((0, 1)), without.mean((0, 1)), rtol=0.03)
 
 
@@ -95,7 +95,7 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
     colour = (0.5, 0.3, 0.1)
     ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain(colour, 0.7))
     world = World([ground], np.ones((8, 16, 3), np.float32), look((0, 2, 0), (0, 0, -3), 40))
-    labels = labels_of(probed(world))
+    labels = sample.labels_of(probed(world))
     up = world.view.to_scene.T @ np.array([0, 1, 0])
     assert labels["mask"].all()
     np.testing.assert_allclose(labels["normal"], np.broadcast_to(up, (SIZE, SIZE, 3)), atol=1e-5)
@@ -112,12 +112,12 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
 def test_normals_face_the_viewer_even_from_behind():
     behind = ScenePart(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
     world = World([behind], np.ones((8, 16, 3), np.float32), look((0, 0, 0), (0, 0, -1), 40))
-    labels = labels_of(probed(world))
+    labels = sample.labels_of(probed(world))
     np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
 
 
 def test_the_sky_has_no_labels():
-    labels = labels_of(probed(still()))
+    labels = sample.labels_of(probed(still()))
     sky = ~labels["mask"]
     assert 0.05 < sky.mean() < 0.95
     for name in ("depth", "normal", "albedo", "roughness", "metallic"):
@@ -131,7 +131,7 @@ def test_texture_labels_average_the_part_that_the_centre_sees():
         "normal": np.zeros((1, 1, 4, 3)), "albedo": np.array([[[[0.1] * 3, [0.2] * 3, [0.9] * 3, [0.6] * 3]]]),
         "roughness": np.array([[[0.1, 0.2, 0.9, 0.6]]]), "metallic": np.zeros((1, 1, 4)),
     }  # fmt: skip
-    labels = labels_of(probe)  # the centre of 2 x 2 is the last
+    labels = sample.labels_of(probe)  # the centre of 2 x 2 is the last
     assert labels["depth"][0, 0] == 4
     np.testing.assert_allclose(labels["albedo"][0, 0], 0.3)
     np.testing.assert_allclose(labels["roughness"][0, 0], 0.3)
@@ -159,18 +159,37 @@ def test_sizes_that_do_not_fill_vectors_are_refused():
 
 
 def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
-    from types import SimpleNamespace
-
-    from materialist.procedural.sample import things_of
-    from materialist.procedural.world import one_thing, placed
-
-    solid, _ = SimpleNamespace(), None
-    floor = ScenePart(solid, None)
-    cup = one_thing([ScenePart(solid, None), ScenePart(solid, None)])
-    ball = one_thing([ScenePart(solid, None)])
-    assert cup[0].thing is cup[1].thing is not ball[0].thing
-    world = SimpleNamespace(parts=[floor, *cup, *ball])
+    block = still().parts[1]
+    floor, cup, ball = block, one_thing([block, block]), one_thing([block])
+    world = replace(still(), parts=[floor, *cup, *ball])
     owner = np.array([[[-1] * 4, [0] * 4, [1] * 4, [2] * 4, [3] * 4]])
-    found = things_of(world, {"owner": owner})[0]
+    found = sample.things_of(world, {"owner": owner})[0]
     assert found[0] == 0 and found[1] < 0 and found[2] == found[3] > 0 and found[4] > 0 and found[4] != found[2]
-    assert placed([], [0, 0, 0]) == []
+
+
+def developed(world):
+    """The stored arrays of a world, and what its label rays saw."""
+    rng = np.random.default_rng(0)
+    seen = tracer.SampleTracer(packing.pack(world, rng), Camera(64, 64, world.view.fov), device="cpu")
+    probe = seen.probe(sample.PROBE)
+    return sample._developed(world, probe, seen, rng, sample.Options(size=64, device="cpu")), probe
+
+
+def test_texture_is_not_printed_into_the_shading():
+    """A chequered floor under an even sky: its light is even, too."""
+    tile = tiles.bank()[1]["checker"][0]
+    floor = Material(tile, ((0.1, 0.1, 0.1), (0.8, 0.8, 0.8), (0.9, 0.3, 0.1)), 0.3, (0.6, 0.6), repeat=(0.3, 0.3))
+    ground = ScenePart(s.sheet((-9, 0, 9), 18 * X, -18 * Z), floor)
+    arrays, probe = developed(World([ground], np.ones((16, 32, 3), np.float32), look((0, 2, 1e-3), (0, 0, 0), 50)))
+    texture = probe["albedo"].mean((2, 3))
+    shading = arrays["shading"].astype(np.float32).mean(-1)
+    assert texture.std() > 0.4 * texture.mean(), "the floor has a texture to print"
+    assert abs(np.corrcoef(texture.ravel(), shading.ravel())[0, 1]) < 0.15
+    assert shading.std() < 0.04 * shading.mean()
+
+
+def test_the_shading_ends_where_the_surface_does():
+    arrays, probe = developed(still())
+    shading, covered = arrays["shading"].astype(np.float32).mean(-1), (probe["owner"] >= 0).mean(2)
+    assert (covered == 0).sum() > 100 and (covered == 1).sum() > 1000
+    assert np.percentile(shading[covered == 0], 99) < 0.05 * np.median(shading[covered == 1])

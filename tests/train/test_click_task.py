@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from materialist.cli import app
 from materialist.errors import InputError
 from materialist.predict.clicks.features import CHANNELS
-from materialist.procedural.dataset import options_for
 from materialist.procedural.dataset import produce as produce_set
+from materialist.procedural.sample import Options
 from materialist.train import checkpoint, click_views
 from materialist.train.click_views import ClickView, click_in, draw_click, worse
 from materialist.train.clicks import click_losses
@@ -80,7 +80,7 @@ def test_scores_of_views_kept_aside(folder, tmp_path):
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
-        produce_set(data, options_for(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
+        produce_set(data, Options(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
     views = tmp_path / "run" / "views"
     assert click_views.produce(sets[0], views) == 1
     (made,) = click_views.load(views)

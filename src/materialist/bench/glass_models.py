@@ -16,7 +16,7 @@ from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted, window
 from materialist.errors import SetupError, WeightsError
 from materialist.geometry.extents import PlaneExtent
 from materialist.predict.refraction.thickness import Thickness
-from materialist.procedural.synthetic import mitsuba_mesh
+from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.types import Array
 
 

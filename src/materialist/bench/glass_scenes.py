@@ -16,8 +16,8 @@ from materialist.errors import InputError
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.synthetic import mitsuba_mesh, sensor
+from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
+from materialist.procedural.synthetic import sensor
 from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera
 

@@ -64,9 +64,10 @@ def data(
         report_success("train data", as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
     from materialist.cli.progress import StageProgress
-    from materialist.procedural.dataset import options_for, produce
+    from materialist.procedural.dataset import produce
+    from materialist.procedural.sample import Options
 
-    options = options_for(
+    options = Options(
         size=wanted.size, seed=seed, spp=wanted.spp, split=wanted.split, meshes=wanted.meshes, envmaps=wanted.envmaps,
         device=device, only=wanted.only,
     )  # fmt: skip

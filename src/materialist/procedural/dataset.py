@@ -16,7 +16,7 @@ from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import SampleFolder, claim, described, write_arrays
 from materialist.procedural.objects import things
-from materialist.procedural.sample import KINDS, SPLITS, Options, make_sample
+from materialist.procedural.sample import Options, make_sample
 
 FORMAT = 1
 CONTENT = 5
@@ -24,12 +24,6 @@ CONTENT = 5
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
 """What decides what the samples of a set hold."""
-HELD_OUT = frozenset(
-    ("binoculars", "capsule", "fandisk", "lightbulb", "spot_cow", "train",
-     "aristea_wreck_puresky", "brown_photostudio_06", "dikhololo_night", "kiara_dawn", "museum", "st_fagans_interior",
-     "venice_sunset")
-)  # fmt: skip
-"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -40,36 +34,6 @@ class Made:
     rendered: int
     existing: int
     seconds: float
-
-
-def options_for(
-    *, size: int = 256, seed: int = 0, spp: int = 16, split: str = "train", meshes: Path | None = None,
-    envmaps: Path | None = None, device: str = "auto", only: str = "",
-) -> Options:  # fmt: skip
-    """Checked options with the files of the split. Raises InputError for values or folders that cannot be used."""
-    if not 32 <= size <= 2048 or size % 4:
-        raise InputError(f"The size is {size}; give 32 to 2048 pixels, a multiple of 4.")
-    if not 1 <= spp <= 4096:
-        raise InputError(f"spp is {spp}; give 1 to 4096 samples per pixel.")
-    if seed < 0:
-        raise InputError(f"The seed is {seed}; give 0 or more.")
-    if only and only not in KINDS:
-        raise InputError(f"There is no kind '{only}' of scene; give one of {', '.join(KINDS)}, or none for all.")
-    if split not in SPLITS:
-        raise InputError(f"The split is {split!r}; choose one of {', '.join(SPLITS)}.")
-    return Options(size, seed, spp, split, _files(meshes, ".ply", split), _files(envmaps, ".exr", split), device, only)
-
-
-def _files(folder: Path | None, ending: str, split: str) -> tuple[Path, ...]:
-    """The files below a folder that a split may use, sorted by name; none for no folder."""
-    if folder is None:
-        return ()
-    if not Path(folder).is_dir():
-        raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
-    wanted = [p for p in Path(folder).rglob(f"*{ending}") if (p.stem in HELD_OUT) == (split == "heldout")]
-    if not wanted:
-        raise InputError(f"{folder} holds no {ending} file for the split {split!r}; give another or leave it out.")
-    return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
 
 
 def produce(
@@ -88,7 +52,7 @@ def produce(
     folder = Path(folder)
     if count < 1 or workers < 1:
         raise InputError(f"count is {count} and workers is {workers}; give at least 1 of each.")
-    for path in options.meshes:  # a damaged one must not end a long run
+    for path in options.mesh_files:  # a damaged one must not end a long run
         things.mesh(path)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
@@ -134,12 +98,10 @@ def _write(folder: Path, options: Options, index: int) -> int:
 def _description(options: Options) -> dict[str, Any]:
     from materialist import __version__
 
-    return {
-        "format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT,
-        "options": {"spp": options.spp, "meshes": [p.stem for p in options.meshes],
-                    "envmaps": [p.stem for p in options.envmaps]} | ({"only": options.only} if options.only else {}),
-        "tool_version": __version__,
-    }  # fmt: skip
+    files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
+    drawn = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    told = {"format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT}
+    return told | {"options": drawn | ({"only": options.only} if options.only else {}), "tool_version": __version__}
 
 
 def read_description(folder: str | Path) -> dict[str, Any]:

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.buffers import floats, integers, tensor
+from materialist.buffers import floats, tensor
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
+from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
@@ -217,22 +218,6 @@ def _mesh(item: scenes.Item, number: int) -> Any:
     return mitsuba_mesh(item.solid, {"type": "materialist_disney", **maps}, f"item{number:02d}")
 
 
-def mitsuba_mesh(solid: Any, bsdf: dict[str, Any], name: str = "mesh") -> Any:
-    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
-    import mitsuba as mi
-
-    props = mi.Properties()
-    props["bsdf"] = mi.load_dict(bsdf)
-    mesh = mi.Mesh(
-        name, len(solid.vertices), len(solid.faces), props=props, has_vertex_normals=True, has_vertex_texcoords=True
-    )
-    params = mi.traverse(mesh)
-    params["vertex_positions"], params["vertex_normals"] = floats(mi, solid.vertices), floats(mi, solid.normals)
-    params["vertex_texcoords"], params["faces"] = floats(mi, solid.uv), integers(mi, solid.faces)
-    params.update()
-    return mesh
-
-
 def sensor(camera: Camera) -> dict[str, Any]:
     """Pinhole at the origin looking along -Z; every pixel is the mean over its own square."""
     import mitsuba as mi
@@ -255,5 +240,6 @@ def _emitter() -> dict[str, Any]:
     """An envmap emitter whose centre column looks along -Z; Mitsuba's own convention has it along +Z."""
     import mitsuba as mi
 
-    placeholder = mi.Bitmap(np.ones((9, 8, 3), np.float32))
-    return {"type": "envmap", "bitmap": placeholder, "to_world": mi.ScalarTransform4f().rotate([0, 1, 0], 180)}
+    from materialist.render.envmap import half_turn
+
+    return {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": half_turn(mi)}

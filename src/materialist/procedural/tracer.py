@@ -18,6 +18,7 @@ import numpy as np
 from materialist.buffers import floats, integers
 from materialist.errors import InputError
 from materialist.procedural import shading, tiles
+from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.procedural.packing import Packed
 from materialist.procedural.shading import Hit, Lights, Surfaces
 from materialist.render.variant import setup
@@ -55,7 +56,7 @@ class SampleTracer:
             dr.eval(copy)
             return copy
 
-        self.scene = mi.load_dict({"type": "scene", "mesh": _mesh(packed)})
+        self.scene = mi.load_dict({"type": "scene", "mesh": mitsuba_mesh(packed)})
         self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank())
         rows, columns = packed.env.shape[:2]
         sizes = dr.opaque(mi.Float, float(rows)), dr.opaque(mi.Float, float(columns))
@@ -177,15 +178,6 @@ class SampleTracer:
         labels = ("ray", "rng", "fate", "depth", "beta", "beta_white", "total", "white", "pdf", "active")
         out = dr.while_loop(state, lambda *s: s[-1], body, labels=labels, mode="symbolic")
         return out[6], out[7]
-
-
-def _mesh(packed: Packed):
-    mesh = mi.Mesh("all", len(packed.vertices), len(packed.faces))
-    params = mi.traverse(mesh)
-    params["vertex_positions"] = floats(mi, packed.vertices)
-    params["faces"] = integers(mi, packed.faces)
-    params.update()
-    return mesh
 
 
 class _Even:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.buffers import floats, integers
-from materialist.procedural.objects.shapes import Solid
+from materialist.buffers import floats
+from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
 from materialist.types import Array
 
 MOST = 24
@@ -53,11 +53,7 @@ class ShapeTracer:
         from materialist.render.variant import setup
 
         self._mi = mi = setup()
-        mesh = mi.Mesh("shape", len(solid.vertices), len(solid.faces))
-        params = mi.traverse(mesh)
-        params["vertex_positions"] = floats(mi, solid.vertices)
-        params["faces"] = integers(mi, solid.faces)
-        params.update()
+        mesh = mitsuba_mesh(solid)
         self._scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "shape": mesh})
         self._faces, self._normals = solid.faces, solid.normals
         corners = solid.vertices[solid.faces]
