@@ -145,7 +145,7 @@ def sketch_glass(picture: Array, region: Array, tint: glass.Tint) -> Array:
     """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
     import cv2
 
-    spread = 1 + int(0.6 * np.sqrt(region.sum()))  # pixels
+    spread = 1 + int(1.5 * np.sqrt(region.sum()))  # pixels
     blurred = cv2.blur(picture, (spread, spread))
     return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
 
