@@ -27,3 +27,10 @@ def answer(report, how="fine", out=None, wait=0.0):
         report.found(name="albedo", file="a.jpg")
     time.sleep(60 if how == "wait" else wait)
     return {"how": how, "pid": os.getpid(), "threads": os.environ.get("OMP_NUM_THREADS"), "outdated": report.outdated}
+
+
+def until(done, seconds=15.0):
+    end = time.monotonic() + seconds
+    while not done():
+        assert time.monotonic() < end, "took too long"
+        time.sleep(0.02)

@@ -1,9 +1,7 @@
 """The queue of jobs: order, limit, stop, failures."""
 
-import time
-
 import pytest
-from made_tasks import answer
+from made_tasks import answer, until
 
 from materialist.jobs.queue import QUEUED, RUNNING, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
@@ -18,13 +16,6 @@ def jobs():
 
 def ask(jobs: JobQueue, how: str, folder, owner: str = "me") -> Job:
     return jobs.submit(Job("invert", owner, folder, answer, {"how": how, "out": str(folder)}))
-
-
-def until(done, seconds: float = 15) -> None:
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "took too long"
-        time.sleep(0.02)
 
 
 def test_results_failures_and_the_queue_goes_on(jobs, tmp_path):

@@ -1,13 +1,11 @@
 """Worker processes and pools: results, failures, death, and the end of the coordinator."""
 
-import os
 import subprocess
 import sys
 import tempfile
-import time
 
 import psutil
-from made_tasks import answer
+from made_tasks import answer, until
 
 from materialist.jobs.pool import LocalPool
 from materialist.jobs.process import LOST, Worker
@@ -15,7 +13,7 @@ from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 COORDINATOR = """
 import sys, time
-from made_tasks import answer
+from made_tasks import answer, until
 from materialist.jobs.process import Worker
 worker = Worker()
 worker.begin(answer, {"how": "wait"})
@@ -34,13 +32,6 @@ def told(worker, how, **more):
             return message, kinds
         kinds.append(message.kind)
     raise AssertionError
-
-
-def until(done, seconds=15.0):
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "took too long"
-        time.sleep(0.02)
 
 
 def test_one_process_does_task_after_task_until_it_dies():
@@ -109,11 +100,3 @@ def test_a_pool_replaces_dead_workers_and_keeps_the_others():
             kinds[key] = message.kind
     pool.close()
     assert pool.free() == 2 and pool.wait(0) == []
-
-
-def test_a_task_that_cannot_be_imported_there_fails(monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", os.environ["PYTHONPATH"].partition(os.pathsep)[2])
-    worker = Worker()
-    failed, _ = told(worker, "fine")
-    assert failed.kind == FAILED and "made_tasks" in failed.facts["reason"]
-    worker.close()

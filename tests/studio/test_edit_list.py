@@ -18,10 +18,10 @@ def test_add_move_toggle_remove():
     off = edits.toggled(1)
     assert off.active == (A, C) and off.steps[1].skipped and off.toggled(1).steps == edits.steps
     assert edits.without(0).steps == (B, C) and edits.without(0).current is None
-    assert edits.in_hand == C and edits.without(0).in_hand is None
+    assert edits.current_step == C and edits.without(0).current is None
 
 
-def test_ticking_and_moving_leave_the_one_in_hand():
+def test_ticking_and_moving_leave_the_current_one():
     edits = EditList((A, B, C), 2)
     assert edits.toggled(0).current == 2 and edits.toggled(0).toggled(0).current == 2
     assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None

@@ -1,13 +1,13 @@
 """Glass that follows its sliders: the tracing process, what is asked of it, and what the stage shows meanwhile."""
 
 import os
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import studio_glass_task
+from made_tasks import until
 from studio_scenes import block, package, room
 
 from materialist.edits.recipe import Step
@@ -39,13 +39,6 @@ def tracer(log, tmp_path):
 
 def glass(ior, mask="mask-1.png", **more):
     return Step("glass", {"mask": mask, "ior": str(ior), **more})
-
-
-def until(done, seconds=15.0):
-    end = time.monotonic() + seconds
-    while not done():
-        assert time.monotonic() < end, "took too long"
-        time.sleep(0.02)
 
 
 def test_the_last_value_wins_and_the_picture_is_kept(tracer, log):

@@ -27,7 +27,7 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     stands = session.live.edited(session.edits.active).bodies[0]
     assert objects.let_fall(session, 0.5) == []
     step = session.edits.steps[0]
-    assert [s.kind for s in session.edits.steps] == ["drop"] and session.in_hand == "drop"
+    assert [s.kind for s in session.edits.steps] == ["drop"] and session.current_kind == "drop"
     assert step.options["at"] == ["32", "34"] and step.options["scale"] == "0.5" and step.options["seed"] == "0"
     lies = session.live.edited(session.edits.active).bodies[0]
     assert lies.vertices.shape == stands.vertices.shape and np.abs(lies.vertices - stands.vertices).max() > 0.01
@@ -49,7 +49,7 @@ def test_choosing_an_object_brings_its_values(session):
     objects.place(session, 50, 40)
     ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
     session.deselect()
-    assert "thing" not in control_values(session)  # nothing in hand: the controls are for the next
+    assert "thing" not in control_values(session)  # no current step: the controls are for the next
     session.act("choose", 0)
     shown = named().everything(session)
     assert {name: shown[name] for name in ring} == ring
@@ -79,7 +79,7 @@ class _Tracer:
         self.kept = ()
 
 
-def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
+def test_the_current_glass_is_asked_for_and_no_other(session, monkeypatch):
     tracer = _Tracer()
     monkeypatch.setattr(session, "glass", tracer)
     click(session)
@@ -88,7 +88,7 @@ def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
         session.set("glass", ior="9")
     session.set("glass", ior="1.3", transmission="1")
     shown = stage(session)
-    assert session.in_hand == "glass" and shown["waiting"] and "tracing" in shown["badge"]
+    assert session.current_kind == "glass" and shown["waiting"] and "tracing" in shown["badge"]
     assert [(len(others), ior) for others, ior in tracer.asked] == [(1, "1.3")]
     session.set("glass", ior="1.4")
     stage(session)
@@ -96,6 +96,6 @@ def test_glass_in_hand_is_asked_for_and_no_other(session, monkeypatch):
     session.act("choose", 0)
     session.set("edit", hue="100")
     stage(session)
-    assert len(tracer.asked) == 2 and "glass_ior" not in control_values(session)  # another edit is in hand
+    assert len(tracer.asked) == 2 and "glass_ior" not in control_values(session)  # another edit is current
     session.act("remove", 1)
     assert [step.kind for step in tracer.kept] == ["edit"]

@@ -110,7 +110,7 @@ def test_glass_follows_its_slider(page, running):
     page.wait_for_selector("#stage .badge >> text=Glass traced")
     coated = pixels(page)[20:28, 20:30].reshape(-1, 3).mean(0)
     assert coated[0] - coated[1] > clear[20:28, 20:30, 0].mean() - clear[20:28, 20:30, 1].mean() + 10  # red again
-    page.locator("#steps .text").click()  # no longer in hand, and in hand again
+    page.locator("#steps .text").click()  # no longer current, and current again
     page.wait_for_selector("#steps li:not(.current)")
     page.locator("#steps .text").click()
     page.wait_for_selector("#steps li.current")

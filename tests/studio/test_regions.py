@@ -5,7 +5,6 @@ import pytest
 from studio_scenes import block, click, named, room
 
 from materialist.edits.recipe import apply, read_recipe
-from materialist.errors import InputError
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 
@@ -18,7 +17,7 @@ def loaded(session, folder, text):
     return session
 
 
-@pytest.mark.parametrize("where", ["click: [25, 24]", "box: [12, 12, 40, 36]", "click: [25, 24], with: grabcut"])
+@pytest.mark.parametrize("where", ["box: [12, 12, 40, 36]", "click: [25, 24], with: grabcut"])
 def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
     loaded(session, tmp_path, f"- edit: {{{where}, hue: 50}}")
     session.act("choose", 0)
@@ -48,14 +47,3 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     assert stage(other)["badge"] == "Live preview" and not stage(other)["bad"]
     other.close()
     (session.workspace / "thing-cube.ply").unlink()
-
-
-def test_regions_are_those_of_the_original_photo_as_in_the_result(session):
-    """What was taken away can not be painted: the page says so, not only `apply`."""
-    click(session)
-    session.live.wait()
-    session.set("remove", shadow=None)
-    session.edits = session.edits.chosen(None)
-    with pytest.raises(InputError, match="An earlier step took away what is there"):
-        session.set("edit", hue="90")
-    assert [step.kind for step in session.edits.steps] == ["remove"]

@@ -45,7 +45,7 @@ def test_a_selection_that_grows_takes_its_edit_along(session):
     first = session.edits.steps[0].options["mask"]
     click(session, 50, 40, "add")
     assert session.edits.current == 0 and session.edits.steps[0].options["mask"] != first
-    click(session, 25, 24, "new")  # inside the mask: taken away, so nothing of it is left in hand
+    click(session, 25, 24, "new")  # inside the mask: taken away, so nothing of it is current
     click(session, 25, 24, "new")
     session.set("edit", value="0.5")
     assert len(session.edits.steps) == 2
@@ -58,7 +58,7 @@ def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
     place_lamp(session, 10, 40)
     assert [step.skipped for step in session.edits.steps] == [True, False]
     session.act("choose", 0)
-    assert "the edit in hand is switched off" in stage(session)["badge"]
+    assert "the current edit is switched off" in stage(session)["badge"]
 
 
 def test_choosing_a_step_brings_its_region_and_values_back(session):

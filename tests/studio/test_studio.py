@@ -11,13 +11,13 @@ from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import progress
 from materialist.studio.server import check_host, check_port, first_target, new_studio
-from materialist.studio.studio import ALONE, Studio
+from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
 
 
 @pytest.fixture
 def shared(tmp_path):
-    studio = Studio(WorkFolder(tmp_path), JobQueue(1), alone=False)
+    studio = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
     yield studio
     studio.jobs.close()
 
@@ -28,7 +28,7 @@ def test_people_are_kept_apart(shared):
     (project.scene).mkdir()
     session = shared.session("page", shared.person(bert))
     assert shared.projects(bert) == [] and shared.projects(anna) == [project]
-    shared.start = shared.work.new("For all", ALONE)
+    shared.start = shared.work.new("For all", LOCAL_PERSON)
     assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
     with pytest.raises(InputError, match="no longer"):
         shared.open(session, project.name)
@@ -84,7 +84,7 @@ def test_a_scene_elsewhere_is_known_again(tmp_path):
     scene = tmp_path / "kitchen.scene"
     scene.mkdir()
     (scene / "scene.json").write_text("{}")
-    studio = new_studio(tmp_path / "work", alone=True)
+    studio = new_studio(tmp_path / "work", single_user=True)
     first = first_target(studio.work, str(scene))
     assert first.scene == scene and first == first_target(studio.work, str(scene))
     assert first_target(studio.work, None) is None
@@ -96,7 +96,7 @@ def test_a_scene_elsewhere_is_known_again(tmp_path):
 
 
 def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
-    studio = new_studio(tmp_path / "work", alone=True)
+    studio = new_studio(tmp_path / "work", single_user=True)
     file = studio.work.root / "result.png"
     file.write_bytes(b"x")
     first, second = studio.public_copy(file), studio.public_copy(file)

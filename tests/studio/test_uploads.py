@@ -47,10 +47,7 @@ def test_sizes_of_other_headers(tmp_path):
     with pytest.raises(InputError, match="2000 megapixels"):
         uploads.checked_picture(tmp_path / "a.hdr", "a.hdr")
 
-
-def test_the_size_of_a_float_tiff(tmp_path):
-    """Pillow does not know its pixels, and `invert` reads it."""
-    import cv2
+    import cv2  # Pillow does not know the pixels of a float TIFF, and `invert` reads it
 
     cv2.imwrite(str(tmp_path / "a.tif"), np.full((20, 30, 3), 0.5, np.float32))
     assert uploads.header_size(tmp_path / "a.tif", "a.tif") == (30, 20)

@@ -30,14 +30,14 @@ Watch = Callable[[Status], None]
 
 
 @dataclass(frozen=True)
-class Pace:
+class BatchSettings:
     """How often a batch does things; tuned by eye."""
 
     tries: int = 3  # how often a photo is begun whose worker dies
     refresh: float = 30.0  # seconds between two writings of the summary and the page while the batch runs
 
 
-PACE = Pace()
+SETTINGS = BatchSettings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +76,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.png.
 
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
-    photo, which is begun again, `Pace.tries` times in all. The results do not depend on the number of workers.
+    photo, which is begun again, `BatchSettings.tries` times in all. The results do not depend on the number of workers.
 
     Args:
         source: a folder, a list file, a photo, or a URL; see `list_photos`.
@@ -198,7 +198,7 @@ class _Run:
                 self.tell(None)
                 for key, message in pool.wait(1.0) if self._stages else ():
                     self._hear(self._tasks[key], message)
-                if time.monotonic() - self._written > PACE.refresh:
+                if time.monotonic() - self._written > SETTINGS.refresh:
                     self.write()
         finally:
             pool.close()
@@ -234,14 +234,14 @@ class _Run:
             self._stages[task.id] = str(message.facts.get("stage", self._stages[task.id]))
             return
         facts, stage = message.facts, self._stages.pop(task.id)
-        if message.kind == LOST and self._tries[task.id] < PACE.tries:
+        if message.kind == LOST and self._tries[task.id] < SETTINGS.tries:
             self._waiting.appendleft(task)
             self.tell(f"{task.id}: {facts['reason']} It is begun again.")
             return
         if message.kind == FAILED:
             _stop_if_for_all(facts)
         if message.kind == LOST:
-            facts = {**facts, "reason": f"{facts['reason']} It was begun {PACE.tries} times.", "stage": stage}
+            facts = {**facts, "reason": f"{facts['reason']} It was begun {SETTINGS.tries} times.", "stage": stage}
         self._end(task, DONE if message.kind == DONE else FAILED, facts)
 
     def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:

@@ -41,19 +41,19 @@ def studio(
     from materialist.studio.server import check_host, check_port, first_target, new_studio, serve
     from materialist.studio.workspace import default_root
 
-    alone = check_host(host, password, everyone)
+    single_user = check_host(host, password, everyone)
     check_port(host, port)
     if device is not Device.auto:
         from materialist.render.variant import setup
 
         setup(device.value)
-    made = new_studio(work or default_root(), alone=alone, workers=workers, seed=seed, device=device.value)
+    made = new_studio(work or default_root(), single_user=single_user, workers=workers, seed=seed, device=device.value)
     made.start = first_target(made.work, target)
     if not as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")
 
-    def told(address: str) -> None:
+    def on_ready(address: str) -> None:
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
         report_success("studio", as_json, lines, address=address, work=str(made.work.root))
 
-    serve(made, host=host, port=port, password=password, told=told)
+    serve(made, host=host, port=port, password=password, on_ready=on_ready)

@@ -34,13 +34,13 @@ class EditList:
         return EditList((*self.steps[:index], step, *self.steps[index + 1 :]), index)
 
     def toggled(self, index: int) -> EditList:
-        """With a step switched off, which takes it out of hand, or on again; any other in hand stays there."""
+        """With a step switched off, which makes none current if it was, or on again; any other current one stays."""
         step = self.steps[index]
         after = self.put(index, with_options(step, skip=None if step.skipped else "true"))
         return after.chosen(None if after.steps[index].skipped and self.current == index else self.current)
 
     def moved(self, index: int, by: int) -> EditList:
-        """With a step further up (by = -1) or down (+1); the one in hand stays in hand, wherever it is then."""
+        """With a step further up (by = -1) or down (+1); the current one stays current, wherever it is then."""
         other = index + by
         if not 0 <= other < len(self.steps):
             return self
@@ -56,13 +56,13 @@ class EditList:
         return replace(self, current=index)
 
     @property
-    def in_hand(self) -> Step | None:
+    def current_step(self) -> Step | None:
         """The step that the sliders move."""
         return self.steps[self.current] if self.current is not None else None
 
     @property
     def light(self) -> int | None:
-        """The place of the light that its controls move: the one in hand, else the last that is switched on."""
+        """The place of the light that its controls move: the current one, else the last that is switched on."""
         places = [k for k, step in enumerate(self.steps) if step.kind == "relight"]
         if self.current in places:
             return self.current

@@ -26,16 +26,16 @@ MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("
 
 def last(session: Session) -> int | None:
     """The place of the object that is chosen, else of the last one in the list."""
-    if session.in_hand in KINDS:
+    if session.current_kind in KINDS:
         return session.edits.current
     return max((k for k, step in enumerate(session.edits.steps) if step.kind in KINDS), default=None)
 
 
 def place(session: Session, x: float, y: float) -> None:
-    """Stand the object in hand at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
+    """Stand the current object at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
     with session.lock:
         _, edits = session.scene, session.edits
-        if session.in_hand not in KINDS:
+        if session.current_kind not in KINDS:
             if "mesh" not in session.next_object:
                 raise InputError("Choose an object from the list, or upload one, first.")
             edits = edits.add(Step("insert", session.next_object, session.workspace))
@@ -43,17 +43,17 @@ def place(session: Session, x: float, y: float) -> None:
 
 
 def set_option(session: Session, name: str, value: str | None) -> None:
-    """Set or clear (None) an option of the object in hand, and of the next one. Raises InputError."""
+    """Set or clear (None) an option of the current object, and of the next one. Raises InputError."""
     with session.lock:
         if name == "mesh":  # another object is a new one
             session.edits = session.edits.chosen(None)
         session.next_object = {k: v for k, v in {**session.next_object, name: value}.items() if v is not None}
-        if session.in_hand == "insert" or (session.in_hand == "drop" and name in STEPS["drop"]):
+        if session.current_kind == "insert" or (session.current_kind == "drop" and name in STEPS["drop"]):
             session.put(session.edits, **{name: value})
 
 
 def let_fall(session: Session, height: float) -> list[str]:
-    """The object in hand, else the last one, falls where it stands and lies where it comes to rest.
+    """The current object, else the last one, falls where it stands and lies where it comes to rest.
 
     Each fall has another seed, so an object that is let fall again tumbles in another way. The fall takes seconds, in
     which the page goes on. Returns sentences on what did not go as expected.

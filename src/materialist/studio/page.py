@@ -145,11 +145,11 @@ def _undo(session: Session) -> None:
 
 
 def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:
-    """The tab with the controls of the step in hand."""
+    """The tab with the controls of the current step."""
     tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
-    tab = tabs.get(session.in_hand or "")
+    tab = tabs.get(session.current_kind or "")
     found = {context["tabs"]: gr.Tabs(selected=tab)} if tab else {}
-    return found | ({context["glass_part"]: gr.update(open=True)} if session.in_hand == "glass" else {})
+    return found | ({context["glass_part"]: gr.update(open=True)} if session.current_kind == "glass" else {})
 
 
 def _wire_final(context: PageContext) -> None:

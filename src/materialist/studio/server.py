@@ -19,7 +19,7 @@ from materialist.errors import InputError, SetupError
 from materialist.io.examples import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.studio import ALONE, Studio
+from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import Project, WorkFolder
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
@@ -63,7 +63,7 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
     if (path / "scene.json").is_file():
         resolved = path.resolve()
         known = next((p for p in work.projects() if p.scene == resolved), None)
-        return known or work.new(path.stem, ALONE, scene=resolved)
+        return known or work.new(path.stem, LOCAL_PERSON, scene=resolved)
     photo = example_path(target) if target.startswith(PREFIX) else path
     if not photo.is_file():
         raise InputError(f"There is no photo and no scene package at {target}.")
@@ -72,10 +72,10 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
 
 
 def serve(
-    studio: Studio, *, host: str, port: int, password: str | None = None, told: Callable[[str], None] | None = None,
+    studio: Studio, *, host: str, port: int, password: str | None = None, on_ready: Callable[[str], None] | None = None,
     stop: threading.Event | None = None,
 ) -> None:  # fmt: skip
-    """Show the studio until Ctrl-C, or until `stop` is set. `told` gets the address once the page answers."""
+    """Show the studio until Ctrl-C, or until `stop` is set. `on_ready` gets the address once the page answers."""
     # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
     os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
     try:
@@ -96,8 +96,8 @@ def serve(
             css=asset("style.css"), app_kwargs={"middleware": [_host_check(studio, host)]},
             js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
         )  # fmt: skip
-        if told is not None:
-            told(str(address))
+        if on_ready is not None:
+            on_ready(str(address))
         while stop is None or not stop.wait(0.5):
             if stop is None:
                 time.sleep(0.5)
@@ -109,11 +109,11 @@ def serve(
         shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 
-def new_studio(work: str | Path, *, alone: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
+def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
     if not 1 <= workers <= 64:
         raise InputError(f"--workers is a number from 1 to 64, not {workers}.")
-    return Studio(WorkFolder(work), JobQueue(workers), alone, seed=seed, device=device)
+    return Studio(WorkFolder(work), JobQueue(workers), single_user, seed=seed, device=device)
 
 
 def _login(password: str | None) -> Any:
@@ -126,7 +126,7 @@ def _login(password: str | None) -> Any:
 def _host_check(studio: Studio, host: str) -> Any:
     from starlette.middleware import Middleware
 
-    return Middleware(HostCheck, names=names_of(host) if studio.alone else None)
+    return Middleware(HostCheck, names=names_of(host) if studio.single_user else None)
 
 
 def _theme(gr: Any) -> Any:

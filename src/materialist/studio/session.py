@@ -23,7 +23,7 @@ from materialist.types import Scene
 
 EDITS = "edits.yaml"
 ENDING = ("final", "take")
-"""Kinds of jobs that end with the page that asked for them."""
+"""Kinds of jobs that end with the page that asked for them; an inversion runs on."""
 _SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
 """Values that sliders and colour pickers set: numbers and colours."""
 
@@ -62,9 +62,8 @@ class Session:
         """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.edits = EditList()
         self._past: list[tuple[str, EditList, Selection]] = []
-        self.running: dict[str, Job] = {}
-        """The last job of each kind (invert, final, take) that this page asked for."""
-        self._ending: list[Job] = []
+        self.running: list[Job] = []
+        """The jobs that this page asked for."""
         self.mark = secrets.token_hex(4)
         """Tells this page's path-traced pictures from those of other pages."""
         self._kept: bytes | None = None
@@ -87,24 +86,18 @@ class Session:
 
     def note_job(self, job: Job) -> None:
         """Note a job that this page asked for, to stop it by a button, or when the page is closed."""
-        self.running[job.kind] = job
-        if job.kind in ENDING:
-            self._ending = [*(one for one in self._ending if not one.over), job]
+        self.running = [*(one for one in self.running if not one.over), job]
 
-    def end(self, jobs: JobQueue) -> None:
-        """Stop the jobs that nobody can see any more when the page is gone; an inversion runs on."""
-        for job in self._ending:
-            jobs.stop(job)
-
-    def stop(self, jobs: JobQueue, kind: str) -> None:
-        """Stop the last job of a kind that this page asked for."""
-        if kind in self.running:
-            jobs.stop(self.running[kind])
+    def stop(self, jobs: JobQueue, *kinds: str) -> None:
+        """Stop the jobs of some kinds that this page asked for."""
+        for job in self.running:
+            if job.kind in kinds:
+                jobs.stop(job)
 
     @property
-    def in_hand(self) -> str | None:
+    def current_kind(self) -> str | None:
         """The kind of the step that sliders move, if there is one."""
-        step = self.edits.in_hand
+        step = self.edits.current_step
         return step.kind if step else None
 
     def open(self, project: Project) -> None:
@@ -151,10 +144,10 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            if after.mask is None or mode not in (ADD, REMOVE) or self.in_hand not in ("edit", "glass"):
+            if after.mask is None or mode not in (ADD, REMOVE) or self.current_kind not in ("edit", "glass"):
                 self.remember("select")
                 self.edits = self.edits.chosen(None)
-            else:  # the edit in hand grows or shrinks with its region, whatever that was given as
+            else:  # the current edit grows or shrinks with its region, whatever that was given as
                 self.put(self.edits, **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)})
             self.selection = after
 
@@ -167,13 +160,13 @@ class Session:
     # The list of edits
 
     def set(self, kind: str, **options: Any) -> None:
-        """Set or clear (None) options of the step in hand; a new one over the selection where it is of another kind.
+        """Set or clear (None) options of the current step; a new one over the selection where it is of another kind.
 
         Raises InputError, and changes nothing, for values that are not valid.
         """
         with self.lock:
             scene, mask, edits = self.scene, self.selection.mask, self.edits
-            if self.in_hand != kind:
+            if self.current_kind != kind:
                 if mask is None:
                     raise InputError("Click the object that you want to change first.")
                 if not (mask & (scene.depth > 0)).any():
@@ -191,11 +184,11 @@ class Session:
             )
 
     def put(self, edits: EditList, **options: Any) -> None:
-        """Take over a list of edits, with options of the step in hand set or cleared (None). Raises InputError.
+        """Take over a list of edits, with options of the current step set or cleared (None). Raises InputError.
 
         A slider (or colour) that moves on is one change in the undo history. A light without options goes.
         """
-        index, step = edits.current, edits.in_hand
+        index, step = edits.current, edits.current_step
         assert index is not None and step is not None
         new = with_options(step, **options)
         after = (
@@ -261,8 +254,8 @@ class Session:
         self.save()
 
     def _take_up_object(self) -> None:
-        """The next object is like the one in hand, as the controls show it."""
-        step = self.edits.in_hand
+        """The next object is like the current one, as the controls show it."""
+        step = self.edits.current_step
         if step is not None and step.kind in ("insert", "drop") and isinstance(step.options.get("mesh"), str):
             self.next_object = {k: step.options[k] for k in ("mesh", "scale", "turn", "material") if k in step.options}
 
@@ -274,8 +267,8 @@ class Session:
             self._past = [*self._past[-SETTINGS.undo_steps :], (what, self.edits, self.selection)]
 
     def _region_of(self, edits: EditList) -> Selection:
-        """The selection that the step in hand was made with."""
-        step = edits.in_hand
+        """The selection that the current step was made with."""
+        step = edits.current_step
         if step is None or not {*REGION} & {*step.options}:
             return Selection()
         try:

@@ -25,8 +25,8 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
 
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
     page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
-    reason on it. Glass in hand is asked for, and `waiting` says whether its picture is still to come. The page ignores
-    a picture with an older `serial` than the one it shows.
+    reason on it. The glass of the current step is asked for; `waiting` says whether its picture is still to come. The
+    page ignores a picture with an older `serial` than the one it shows.
     """
     serial = time()
     with session.lock:
@@ -38,13 +38,13 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
         return shown
     camera, steps = live.scene.camera, edits.active if with_edits else ()
     shown |= {"width": camera.width, "height": camera.height, "lamps": _lamps(edits)}
-    in_hand = edits.in_hand
-    off = "; the edit in hand is switched off" if in_hand is not None and in_hand.skipped else ""
+    current = edits.current_step
+    off = "; the current edit is switched off" if current is not None and current.skipped else ""
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel{off}"
         return {**shown, "picture": file_url(final.path.with_suffix(".jpg")), "badge": badge}
-    if in_hand is not None and client is not None and in_hand in steps and glass.is_traced(in_hand):
-        client.ask(_others(steps, in_hand), in_hand)
+    if current is not None and client is not None and current in steps and glass.is_traced(current):
+        client.ask(_others(steps, current), current)
     waiting = client is not None and with_edits and client.state.waiting
     if steps and not live.ready:
         del shown["picture"]

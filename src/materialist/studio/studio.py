@@ -15,10 +15,10 @@ from typing import Any
 from materialist.errors import InputError, OutputError
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
-from materialist.studio.session import Session
+from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import Project, WorkFolder
 
-ALONE = "me"
+LOCAL_PERSON = "me"
 """The person, where the studio serves this machine only."""
 LOST = "The page has lost its session; reload it."
 
@@ -29,7 +29,7 @@ class Studio:
 
     work: WorkFolder
     jobs: JobQueue
-    alone: bool = True
+    single_user: bool = True
     """Served on this machine only: everyone on it is the same person."""
     start: Project | Path | None = None
     """The scene to open first, or the photo to show on the opening tab."""
@@ -42,8 +42,8 @@ class Studio:
 
     def person(self, token: Any) -> str:
         """The person of a page, from the token that its browser keeps. Raises InputError for an invalid token."""
-        if self.alone:
-            return ALONE
+        if self.single_user:
+            return LOCAL_PERSON
         if not isinstance(token, str) or not re.fullmatch(r"[a-z0-9]{16,32}", token):
             raise InputError(LOST)
         return token
@@ -55,14 +55,14 @@ class Studio:
         with self._lock:
             known = self._sessions.get(page)
             if known is None or (person is not None and known.person != person):
-                if person is None and not self.alone:
+                if person is None and not self.single_user:
                     raise InputError(LOST)
-                known = self._sessions[page] = Session(person or ALONE)
+                known = self._sessions[page] = Session(person or LOCAL_PERSON)
             return known
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
-        every = self.work.projects(None if self.alone else person)
+        every = self.work.projects(None if self.single_user else person)
         start = self.start
         return every if not isinstance(start, Project) or start in every else [*every, start]
 
@@ -96,7 +96,7 @@ class Studio:
         with self._lock:
             session = self._sessions.pop(page or "", None)
         if session is not None:
-            session.end(self.jobs)
+            session.stop(self.jobs, *ENDING)
             session.close()
             del session
             gc.collect()

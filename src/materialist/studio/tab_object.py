@@ -85,7 +85,7 @@ def wire(context: PageContext) -> None:
         context.on(part.input, _made_of, [parts["made_of"], parts["thing_colour"]])
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
     context.on(parts["remove"].click, _remove, parts["shadow"], **slow)
-    # Sliders of glass change the glass in hand; without one they are for the next.
+    # Sliders of glass change the current glass; without one they are for the next.
     values = [parts[f"glass_{name}"] for name in _GLASS]
     context.on(parts["glass"].click, _make_glass, values, everything=True)
     for name, part in zip(_GLASS, values):
@@ -100,7 +100,7 @@ def _take_mesh(session: Session, file: Path) -> None:
     suffix = uploads.checked_mesh(file, file.name)
     kept = session.workspace / store(session.workspace, file, "mesh", suffix)
     try:
-        with uploads.called(kept, file.name):
+        with uploads.without_folders(kept, file.name):
             read_model(kept)
     except Exception:
         kept.unlink(missing_ok=True)
@@ -125,7 +125,7 @@ def _make_glass(session: Session, *values: Any) -> None:
 
 
 def _change_glass(name: str, session: Session, value: Any) -> bool:
-    if session.in_hand != "glass":
+    if session.current_kind != "glass":
         return False
     session.set("glass", **{name: _GLASS[name](value)})
     return True

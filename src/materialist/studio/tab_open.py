@@ -81,20 +81,20 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     ):
         session = studio.session(request.session_hash, studio.person(token))
         if file is not None and Path(file).suffix.lower() == ".zip":
-            project = _unpacked(context, session, Path(file))
+            project = _unpack(context, session, Path(file))
         else:
-            project, job = _begun(context, session, file, example, predictor, size, fov)
-            yield from _following(context, session, project, job)
+            project, job = _start_inversion(context, session, file, example, predictor, size, fov)
+            yield from _follow_inversion(context, session, project, job)
             if not project.ready:
                 return
-        yield from _opened(context, session, project)
+        yield from _show_project(context, session, project)
 
     @handler
     def resume(name: str | None, token: str, request: gr.Request):
         session = studio.session(request.session_hash, studio.person(token))
         if not name:
             raise InputError("Choose one of your photos in the list first.")
-        yield from _resumed(context, session, name)
+        yield from _resume(context, session, name)
 
     @handler
     def arrive(token: str, last: str, request: gr.Request):
@@ -103,9 +103,9 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         known = _projects(context, session)
         yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
         if any(value == last for _, value in known):
-            yield from _resumed(context, session, last)
+            yield from _resume(context, session, last)
         elif isinstance(studio.start, Project):
-            yield from _resumed(context, session, studio.start.name)
+            yield from _resume(context, session, studio.start.name)
         elif studio.start is not None:
             yield {parts["file"]: studio.public_copy(studio.start)}
 
@@ -123,7 +123,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **LONG)
 
 
-def _begun(
+def _start_inversion(
     context: PageContext, session: Session, file: str | None, example: str | None, predictor: str, size: int, fov: str
 ) -> tuple[Project, Job]:
     """A project with its photo in it, and the inversion in the queue."""
@@ -145,13 +145,13 @@ def _begun(
     return project, job
 
 
-def _unpacked(context: PageContext, session: Session, file: Path) -> Project:
+def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     from materialist.io.package import load_scene
 
     project = context.studio.work.new(file.stem, session.person)
     try:
         archives.unpack_scene(file, project.scene, file.name)
-        with uploads.called(project.scene, file.name):
+        with uploads.without_folders(project.scene, file.name):
             load_scene(project.scene)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
@@ -159,7 +159,7 @@ def _unpacked(context: PageContext, session: Session, file: Path) -> Project:
     return project
 
 
-def _following(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
+def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
     """Progress and first pictures of an inversion until it is over."""
     parts, studio = context.parts, context.studio
     session.note_job(job)
@@ -187,20 +187,20 @@ def _following(context: PageContext, session: Session, project: Project, job: Jo
     }  # fmt: skip
 
 
-def _resumed(context: PageContext, session: Session, name: str) -> Iterator[dict[Any, Any]]:
+def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[Any, Any]]:
     """Open a project, or follow its inversion if that still runs."""
     studio = context.studio
     project = studio.project(name, session.person)
     running = [j for j in studio.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
     if running:
-        yield from _following(context, session, project, running[0])
+        yield from _follow_inversion(context, session, project, running[0])
     if project.ready:
-        yield from _opened(context, session, project)
+        yield from _show_project(context, session, project)
     elif not running:
         raise InputError("That photo was not taken apart to the end; start again.")
 
 
-def _opened(context: PageContext, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
+def _show_project(context: PageContext, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
     """Show a project: its photo at once, the edits when the preview is ready."""
     parts = context.parts
     yield {parts["fit"]: box("Opening …")}

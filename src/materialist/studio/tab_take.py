@@ -73,7 +73,6 @@ def wire(context: PageContext) -> None:
             steps, final = session.edits.active, session.final
             job = _asked(context, session, what, file)
             if job is not None:
-                session.running["take"] = job
                 yield from context.following(job, "make_progress", "make_stop")
                 if job.state != "done":
                     return
@@ -90,7 +89,7 @@ def wire(context: PageContext) -> None:
         }
 
     parts["make"].click(make, parts["what"], outputs, **LONG)
-    context.stops("make_stop", "take")
+    context.stops("make_stop", "take", "final")
     context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})
 
 

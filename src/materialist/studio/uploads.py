@@ -103,7 +103,7 @@ def without_paths(text: str, path: str | Path, name: str) -> str:
 
 
 @contextmanager
-def called(path: Path, name: str) -> Iterator[None]:
+def without_folders(path: Path, name: str) -> Iterator[None]:
     """Pass errors about a file on `without_paths`."""
     try:
         yield

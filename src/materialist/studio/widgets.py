@@ -45,7 +45,7 @@ CONTROLS = (
     *NUMBERS, "colour", "sun_on", "azimuth", "elevation", "glass_tint", "glass_hollow", "thing", "made_of",
     "thing_colour", "height",
 )  # fmt: skip
-"""Components that show the step in hand."""
+"""Components that show the current step."""
 SUN = (45.0, 40.0)
 """Where a new sun stands: degrees right of ahead, and above the horizon."""
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
@@ -111,11 +111,11 @@ class PageContext:
         return {self["steps"]: steps(session), self["commands"]: commands(session)}
 
     def everything(self, session: Session) -> dict[Any, Any]:
-        """Updates after a change of the selection, of the step in hand, or of the scene."""
+        """Updates after a change of the selection, of the current step, or of the scene."""
         return {**self.picture(session), **self.controls(session)}
 
     def controls(self, session: Session) -> dict[Any, Any]:
-        """Sliders as the step in hand, or the selected object, has them; as they are where a step is not valid."""
+        """Sliders as the current step, or the selected object, has them; as they are where a step is not valid."""
         if session.live is None:
             return {}
         return {self[name]: value for name, value in control_values(session).items()}
@@ -161,12 +161,12 @@ class PageContext:
         for html in follow(self.studio.jobs, job):
             yield {self[words]: html, self[stop]: gr.update(visible=not job.over)}
 
-    def stops(self, button: str, kind: str) -> None:
-        """Let a button stop the last job of a kind that its page asked for."""
+    def stops(self, button: str, *kinds: str) -> None:
+        """Let a button stop the jobs of some kinds that its page asked for."""
 
         @handler
         def stop(request: gr.Request) -> None:
-            self.session(request).stop(self.studio.jobs, kind)
+            self.session(request).stop(self.studio.jobs, *kinds)
 
         self[button].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
@@ -192,12 +192,12 @@ def steps(session: Session) -> list[dict[str, Any]]:
 
 
 def control_values(session: Session) -> dict[str, Any]:
-    """Values of the controls as the step in hand, or the light, has them.
+    """Values of the controls as the current step, or the light, has them.
 
-    Without an edit in hand its controls show what was fitted under the selection; those of glass and of objects then
+    Without a current edit its controls show what was fitted under the selection; those of glass and of objects then
     stay as they are, for the next.
     """
-    step, light = session.edits.in_hand, session.edits.light
+    step, light = session.edits.current_step, session.edits.light
     kind, options = (step.kind, step.options) if step is not None else ("", {})
     given = {MaterialEdit: options if kind == "edit" else {}}
     given[Relight] = session.edits.steps[light].options if light is not None else {}
