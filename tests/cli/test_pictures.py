@@ -103,7 +103,7 @@ def test_relight_by_map_lamp_and_frames(run, folder, tmp_path, monkeypatch):
     """Of a film one scene is held at a time: each has an environment map of its own."""
     import weakref
 
-    from materialist.edits.light import frames
+    from materialist.edits.light import relight as frames
 
     relight, most = ["relight", folder / "a.scene", "--spp", 4], []
     assert run(*relight, "--envmap", folder / "sky.exr", "--gain", 1, "-o", tmp_path / "o.exr")[0] == 0

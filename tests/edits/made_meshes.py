@@ -20,6 +20,11 @@ def box_file(path: Path, extents=(1.0, 2.0, 0.5)) -> Path:
     return path
 
 
+def extent(bodies) -> float:
+    """Longest side of the box around bodies, camera frame, scene units."""
+    return float(np.ptp(np.concatenate([body.vertices for body in bodies]), axis=0).max())
+
+
 def textured_obj(folder: Path, *, mtl: str = "quad.mtl", texture: str = "quad.png") -> Path:
     """A quad in x and y with a texture: red top left, green top right, blue bottom left, white bottom right."""
     pixels = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from made_meshes import box_file, floor_scene
+from made_meshes import box_file, extent, floor_scene
 
 from materialist.edits.drop.convex import convex_pieces
 from materialist.edits.drop.drop import down, drop, upright
-from materialist.edits.drop.ground import Field, Surroundings, blocks
+from materialist.edits.drop.ground import Field, blocks
 from materialist.edits.drop.physics import GRAVITY, Thing, fall
-from materialist.edits.insert.insert import extent, insert
+from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import support_at
 from materialist.errors import InputError
@@ -92,18 +92,6 @@ def test_over_an_edge_it_falls_to_the_lower_floor():
     assert poses[-1][0].centre[2] < 0.2
 
 
-def test_blocks_follow_the_ground_and_are_large_where_it_is_plane():
-    x, y = np.meshgrid(np.arange(65), np.arange(65))
-    slope = Field(np.zeros(2), 0.1, 0.02 * x - 0.01 * y)
-    (one,) = blocks(slope, flat=1e-6, depth=1)
-    np.testing.assert_allclose(sorted(one[:4, 2]), sorted([0, 1.28, -0.64, 0.64]), atol=1e-9)
-    bumpy = Field(np.zeros(2), 0.1, np.where((x == 10) & (y == 10), 1.0, 0.0))
-    many = blocks(bumpy, flat=1e-3, depth=1)
-    assert 10 < len(many) < 60 and max(b[:4, 2].max() for b in many) == 1
-    hole = Field(np.zeros(2), 0.1, np.where(x > 32, np.nan, 0.0))
-    assert max(b[:, 0].max() for b in blocks(hole, flat=1e-3, depth=1)) == pytest.approx(3.2)
-
-
 def test_gravity(box):
     scene = floor_scene(96, 72)
     support = support_at(scene, (48.0, 50.0))
@@ -147,24 +135,6 @@ def test_inside_of_something_there_is_no_room(box):
         drop(floating(floor_scene(96, 72), box, 0.01, scale=8), [box], (48.0, 50.0), frames=2)
 
 
-def test_a_card_whose_faces_look_down_is_no_solid(box):
-    """A ray that begins over it comes onto its back; one that begins in a box stays where it begins."""
-    scene, to_up = floor_scene(96, 72), upright(-UP)
-    (solid,) = floating(scene, box, 0.1).bodies
-    points = solid.vertices @ to_up.T
-    low, high = points.min(0), points.max(0)
-    place = (low + high) / 2
-    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    vertices = (np.c_[corners, np.full(4, low[2] + 0.1)] @ to_up).astype(np.float32)
-    card = replace(
-        solid, vertices=vertices, normals=np.tile(np.float32(-UP), (4, 1)), uv=np.zeros((4, 2), np.float32),
-        faces=np.int32([[0, 2, 1], [0, 3, 2]]),
-    )  # fmt: skip
-    for body, expected in ((card, low[2] + 0.1), (solid, place[2])):
-        around = Surroundings.of(replace(scene, bodies=(body,)), to_up, 1.0)
-        assert around.meets(*(np.array([v]) for v in place))[0] == pytest.approx(expected, abs=1e-3)
-
-
 def test_it_spins_about_its_centre_of_mass():
     """Which falls straight down, wherever the middle of the box around the thing is."""
     off = np.array([0.15, 0.0, 0.05])
@@ -186,13 +156,6 @@ def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="smaller spin"):
         list(spun(1e12))
     assert not list(tmp_path.iterdir()), "no log of the simulation's"
-
-
-def test_small_things_move_smoothly_too(box):
-    """A frame stands still for less than a thousandth of the thing's size, whatever that is taken for."""
-    film = drop(floor_scene(96, 72), [box], (48.0, 50.0), frames=8, fps=240, spin=0, metres=0.002)
-    height = np.array([float((frame.bodies[0].vertices @ UP).min()) for frame in film])
-    assert (np.diff(height[1:]) < 0).all()
 
 
 def test_several_start_clear_of_each_other(box):

@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_meshes import box_file, floor_scene
+from made_meshes import box_file, extent, floor_scene
 
 from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.physics import Pose
-from materialist.edits.insert.insert import extent
 from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
 from materialist.errors import InputError
 

@@ -60,12 +60,6 @@ def test_a_plus_sign_is_a_shift_in_yaml_too(folder):
     assert (shifted.materials.roughness[MASK] == 0.75).all() and (level.materials.roughness[MASK] == 0.25).all()
 
 
-def test_click_box_and_sun(folder):
-    got = replay(folder, "- edit: {click: [17, 17], albedo: [0.1, 0.2, 0.3]}\n- relight: {sun: '30,40', sun_power: 2}")
-    assert (got.materials.albedo[17, 17] == np.float32([0.1, 0.2, 0.3])).all()
-    np.testing.assert_array_equal(got.envmap, relight(SCENE, sun=(30, 40), sun_power=2).envmap)
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -131,27 +125,6 @@ def test_tints_are_spelled_as_on_the_command_line(folder):
 def read_step(folder, text):
     (folder / "one.yaml").write_text(text)
     return read_recipe(folder / "one.yaml")[0]
-
-
-def test_missing_list(folder):
-    with pytest.raises(InputError, match="cannot be read"):
-        read_recipe(folder / "none.yaml")
-
-
-def test_a_given_background_is_seen_in_the_light_of_the_photo(tmp_path):
-    """Dimmed first or removed first, the wall behind is the same wall."""
-    from edit_scenes import rendered_scene
-
-    scene = rendered_scene(block=2.0)
-    background = np.full((36, 48, 3), 90, np.uint8)
-    Image.fromarray(background).save(tmp_path / "behind.png")
-    Image.fromarray((block_mask(36, 48) * 255).astype(np.uint8)).save(tmp_path / "block.png")
-    light, remove = "- relight: {ambient: 0.4}\n", "- remove: {mask: block.png, background: behind.png}\n"
-    found = []
-    for k, text in enumerate((light + remove, remove + light, remove)):
-        (tmp_path / f"{k}.yaml").write_text(text)
-        found.append(apply(scene, read_recipe(tmp_path / f"{k}.yaml")).materials.albedo[block_mask(36, 48)].mean())
-    assert found[0] == pytest.approx(found[1], rel=0.02) and found[1] == pytest.approx(found[2], rel=0.02)
 
 
 @pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",

@@ -44,11 +44,3 @@ def test_normals_take_away_the_noise_of_the_depth():
     front = smooth_front(noisy, normal, inside, RAYS, smooth=0.0)
     error = lambda z: np.sqrt(np.mean(np.log(z / depth)[inside] ** 2))  # noqa: E731
     assert error(front) < 0.15 * error(noisy)
-
-
-def test_a_part_that_hides_another_stays_in_front_of_it():
-    depth = np.full((64, 64), 3.0)
-    depth[:, 32:] = 4.0
-    front = smooth_front(depth, -RAYS / np.linalg.norm(RAYS, axis=-1, keepdims=True), np.ones((64, 64), bool), RAYS)
-    steps = np.diff(np.log(front[32]))
-    assert np.argmax(steps) == 31 and steps[31] > 0.8 * np.log(4 / 3)

@@ -5,7 +5,7 @@ import pytest
 from solid_scenes import AXIS, CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, turned, view, volume
 
 from materialist.bench.glass_scenes import is_closed
-from materialist.solids.finder import surface_of_revolution, upright
+from materialist.solids.finder import surface_of_revolution
 from materialist.solids.revolution import Revolution, profile_of, vessel
 
 POT = lines((0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.0, 0.7))
@@ -48,13 +48,6 @@ def test_a_ball_comes_out_whole(ball):
     assert is_closed(hollow) and volume(hollow) < 0.6 * volume(shell)
     inner = np.linalg.norm(hollow.vertices[len(shell.vertices) :] - (FOOT + 0.4 * UP), axis=1)
     assert 0.4 - inner.mean() == pytest.approx(0.08, rel=0.15)
-
-
-def test_it_stays_above_the_ground():
-    high = GROUND * 0.97
-    body, _, inside = revolved(turned(arc((0, 0.4), 0.4)), high)
-    lowest = ((body.body(CAMERA).vertices - FOOT) @ UP).min()
-    assert lowest > np.percentile((RAYS * high[..., None] - FOOT)[inside & (high > 0)] @ UP, 2)
 
 
 def test_the_hole_of_a_ring_stays_open():
@@ -115,10 +108,3 @@ def test_boxes_and_half_balls_are_none(ball):
     _, front, mask = ball
     half = mask & (np.indices(mask.shape)[1] < np.median(np.nonzero(mask)[1]))
     assert surface_of_revolution(front.depth, front.normal, half, CAMERA, up=UP) is None
-
-
-def test_upright_is_across_the_largest_plane_that_faces_up():
-    label = np.where(GROUND > 0, 0, -1)
-    normal = np.broadcast_to(UP, (*label.shape, 3))
-    assert upright(normal, label) @ UP > 0.9999
-    assert upright(-normal, label) is None

@@ -5,7 +5,7 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.silhouette import border_distance, object_size
+from materialist.geometry.silhouette import object_size
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 
@@ -50,12 +50,6 @@ def test_a_plate_seen_face_on_is_neither_flat_nor_endless():
     found = symmetric_thickness(depth, normal, mask, camera)
     size = object_size(mask, depth, pixel_rays(camera))
     assert 0.05 * size < np.median(found[mask]) < size
-
-
-def test_the_picture_border_is_no_silhouette():
-    inside = np.zeros((20, 30), bool)
-    inside[5:15, 20:] = True
-    assert border_distance(inside)[10, [20, 29]] == pytest.approx([0.5, 4.5])
 
 
 def test_bad_input_is_refused():

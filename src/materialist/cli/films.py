@@ -70,7 +70,7 @@ def relight(
     marked = chosen_region(loaded, lights, run) if lights.named else None
     wanted = Relight.given(options, sun_power=sun_power, lights=marked)
     if frames is not None:
-        from materialist.edits.light.frames import moving_light
+        from materialist.edits.light.relight import moving_light
 
         start, film = time.monotonic(), moving_light(loaded, frames, wanted, suns=tuple(suns))
         last, _ = _written(loaded, film, output, rendering, run, frames=frames, fps=fps)

@@ -16,6 +16,7 @@ from materialist.errors import InputError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
+from materialist.solids.front import DEFAULT as FRONT
 from materialist.solids.front import smooth_front
 from materialist.solids.shell import DEFAULT as SHELL
 from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined, region
@@ -41,7 +42,7 @@ NOTHING = 1e9
 
 
 def closed_proxy(
-    depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *, smooth: float = 0.01,
+    depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *,
     wall: float | None = None, behind: Array | None = None, back: Array | None = None,
 ) -> Shell:  # fmt: skip
     """The closed object behind a mask.
@@ -51,7 +52,6 @@ def closed_proxy(
         normal: [H, W, 3] unit; the front follows them (see `front.smooth_front`).
         mask: [H, W] bool or weights. Its parts become bodies of their own, its holes stay open (unless a pixel wide).
         thickness: [H, W] length of the camera ray inside the solid object, scene units >= 0.
-        smooth: blur of the normals of front and back, as a part of the object's size (the root of its area); 0: none.
         wall: the object is hollow: thickness of its wall, scene units. A second surface is added inside.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
         back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
@@ -68,12 +68,12 @@ def closed_proxy(
     if back is not None and back.shape != normal.shape:
         raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
     view = _window(depth, normal, inside, thickness, behind, back, camera)
-    front = smooth_front(view.depth, view.normal, view.inside, view.rays, smooth=smooth)
+    front = smooth_front(view.depth, view.normal, view.inside, view.rays)
     thick = _thickness(view, front)  # [h, w]
-    shell = _closed(view, front, thick, smooth, camera)
+    shell = _closed(view, front, thick, camera)
     if wall is None:
         return shell
-    inner = _cavity(view, front, thick, wall, smooth, camera)
+    inner = _cavity(view, front, thick, wall, camera)
     return shell if inner is None else joined([shell, inside_out(inner)])
 
 
@@ -140,7 +140,7 @@ def _thickness(view: _View, front: Array) -> Array:
     return np.where(view.inside, np.maximum(thick, least), 0)
 
 
-def _cavity(view: _View, front: Array, thick: Array, wall: float, smooth: float, camera: Camera) -> Shell | None:
+def _cavity(view: _View, front: Array, thick: Array, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     length = np.linalg.norm(view.rays, axis=-1)
     facing = np.abs((view.normal * view.rays).sum(-1)) / length
@@ -151,10 +151,10 @@ def _cavity(view: _View, front: Array, thick: Array, wall: float, smooth: float,
     if room.sum() < 16:
         return None
     inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
-    return _closed(inner, front + through / length, np.where(room, left, 0), smooth, camera)
+    return _closed(inner, front + through / length, np.where(room, left, 0), camera)
 
 
-def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Camera) -> Shell:
+def _closed(view: _View, front: Array, thick: Array, camera: Camera) -> Shell:
     """Front and back, [h, w] planar depth and the way between them along the rays, over one triangulated region."""
     import cv2
 
@@ -174,7 +174,7 @@ def _closed(view: _View, front: Array, thick: Array, smooth: float, camera: Came
     through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
     own = np.exp(at(middle)) - through / (2 * at(length))
     through = np.maximum(np.minimum(through, at(_room(view, front))), DEFAULT.least * own)
-    sigma = smooth * view.size
+    sigma = FRONT.smooth * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:

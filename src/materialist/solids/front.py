@@ -21,12 +21,13 @@ class FrontSettings:
     jump: float = 1.5  # a step steeper than `steepest` by this factor joins no surface
     rim: float = 1.5  # pixels from the silhouette whose depth is a mixture with what is behind, and hardly counts
     rim_weight: float = 0.02  # weight of that depth
+    smooth: float = 0.01  # standard deviation of the blur of the normals, part of the object's size; tuned by eye
 
 
 DEFAULT = FrontSettings()
 
 
-def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smooth: float = 0.01) -> Array:
+def smooth_front(depth: Array, normal: Array, inside: Array, rays: Array, *, smooth: float = DEFAULT.smooth) -> Array:
     """Planar depth of the object's front, with the slopes of the normals.
 
     Solves min over z of |grad log z - g|^2 + |log z - log depth|^2 / (reach size)^2 inside the mask. g is the slope of

@@ -151,7 +151,7 @@ def _exported(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, w
 def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
     """`materialist relight --rotate 360`: the light once round, over the edits."""
     from materialist.edits.composite.composite import pictures
-    from materialist.edits.light.frames import moving_light
+    from materialist.edits.light.relight import moving_light
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)

@@ -14,7 +14,6 @@ from materialist.edits.insert.insert import insert, put
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import picture_width, support_at
 from materialist.errors import InputError
-from materialist.types import Materials
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
 
@@ -75,22 +74,6 @@ def test_bad_places_and_numbers(box):
             insert(scene, box, place, **options)
 
 
-def test_running_into_the_photo_is_told(box):
-    from edit_scenes import flat_scene
-
-    scene = floor_scene(96, 72)
-    assert not insert(scene, box, (40.0, 50.0)).report.warnings
-    beside = insert(flat_scene(), box, (26.0, 18.0), scale=4)  # grows out of the wall, past the front of the block
-    assert any("runs into" in note for note in beside.report.warnings)
-    assert not insert(flat_scene(), box, (40.0, 20.0)).report.warnings
-
-
-@pytest.mark.parametrize("turn", [0, 30, 45])
-def test_the_longest_side_is_the_model_s_whichever_way_it_is_turned(box, turn):
-    edited = insert(floor_scene(96, 72), box, (40.0, 50.0), size=0.5, turn=turn)
-    assert edited.provenance["edits"][-1]["size"] == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize("native", [1, 4])
 def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     scene = floor_scene(native=native)
@@ -121,16 +104,6 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box):
     assert soft.sum() < 2.2 * ConvexHull(place * 4).area  # one native pixel wide
 
 
-def test_nothing_of_the_background_is_in_a_body(box):
-    scene = floor_scene(native=2)
-    bright = replace(scene.materials, albedo=np.ones_like(scene.materials.albedo))
-    scene = replace(scene, materials=Materials(bright.albedo, bright.roughness, bright.metallic))
-    edited = insert(scene, box, (24.0, 26.0), material="0,0,0")
-    body = native_layer(EditRenderer(scene), edited, spp=16, seed=0, clean=False)
-    rim = (body.share > 0.05) & (body.share < 0.95)
-    assert rim.any() and np.median(body.picture[rim]) < 0.2  # black but for its gloss; the floor is 1
-
-
 def test_a_body_looks_as_in_the_plain_rendering(box):
     """Its radiance at native size is that of the scene's own light and surfaces."""
     scene = floor_scene()
@@ -142,22 +115,3 @@ def test_a_body_looks_as_in_the_plain_rendering(box):
     plain = studio.pair(edited)[1](256, 3)
     inside = body.share > 0.999
     np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)
-
-
-def test_what_stands_where_something_was_removed_or_glows_has_its_own_outline(box):
-    """Only what the photo shows has the photo's outline: its lights, and its glass."""
-    from edit_scenes import block_mask, rendered_scene
-
-    from materialist.edits.composite.native_layer import new_bodies
-    from materialist.edits.glass.glass import glass
-    from materialist.edits.remove.remove import remove
-
-    scene = rendered_scene()
-    mask = block_mask(36, 48)
-    assert new_bodies(scene, glass(scene, mask, thickness="symmetry")) == []
-    gone = remove(scene, mask)
-    there = insert(gone, box, (18.0, 20.0), scale=2)
-    assert new_bodies(scene, there) == ["body0"]
-    (body,) = there.bodies
-    lamp = replace(body, surface=replace(body.surface, emission=(5.0, 5.0, 5.0)))
-    assert new_bodies(scene, replace(there, bodies=(lamp,))) == ["body0"]

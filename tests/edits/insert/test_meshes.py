@@ -36,12 +36,6 @@ def test_a_box_of_every_format(tmp_path, suffix):
     np.testing.assert_allclose(np.linalg.norm(body.normals, axis=1), 1, atol=1e-5)
 
 
-def test_stl_stands_on_z(tmp_path):
-    path = box_file(tmp_path / "box.stl", (1.0, 0.5, 2.0))
-    np.testing.assert_allclose(np.ptp(read_model(path).vertices, axis=0), [1, 2, 0.5], atol=1e-5)
-    np.testing.assert_allclose(np.ptp(read_model(path, up="y").vertices, axis=0), [1, 0.5, 2], atol=1e-5)
-
-
 def test_edges_of_a_box_stay_and_a_ball_is_smooth(tmp_path):
     (body,) = read_model(box_file(tmp_path / "box.stl")).parts
     assert np.allclose(np.abs(body.normals).max(1), 1, atol=1e-6)
@@ -133,14 +127,6 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     assert not read("d 1\nTr 0\nKe 0 0 0").warnings
 
 
-@pytest.mark.parametrize("lines", ["", "mtllib none.mtl\nusemtl a\n", "mtllib plain.mtl\nusemtl b\n"])
-def test_coordinates_without_a_texture_are_the_usual_grey(tmp_path, lines):
-    """trimesh makes up a dark picture there."""
-    write(tmp_path / "plain.mtl", "newmtl a\nKd 1 0 0\n")
-    write(tmp_path / "a.obj", TRIANGLE + lines + "f 1/1 2/2 3/3\n")
-    assert np.unique(read_model(tmp_path / "a.obj").parts[0].surface.albedo) == 0.5
-
-
 def test_greys_of_16_bits_keep_their_values_and_large_textures_shrink(tmp_path):
     values = np.linspace(0, 65535, 40).astype(np.uint16)[None].repeat(4, 0)
     Image.fromarray(values).save(tmp_path / "colour.png")
@@ -210,18 +196,6 @@ def test_other_materials(tmp_path):
     np.testing.assert_allclose(repainted(model, "0.1,0.2,0.3").parts[0].surface.albedo[0, 0], [0.1, 0.2, 0.3])
     with pytest.raises(InputError, match="as-is, glass, mirror"):
         repainted(model, "wood")
-
-
-def test_a_face_without_an_area_and_a_vertex_of_no_face_are_nowhere(tmp_path):
-    ball = trimesh.creation.icosphere(2)
-    vertices = np.concatenate([ball.vertices, [[50.0, 50.0, 50.0]]])
-    faces = np.concatenate([ball.faces, [[0, 0, 1]]])
-    colours = np.tile(np.array([255, 0, 0, 255], np.uint8), (len(vertices), 1))
-    trimesh.Trimesh(vertices, faces, vertex_colors=colours, process=False).export(tmp_path / "ball.ply")
-    model = read_model(tmp_path / "ball.ply")
-    assert len(model.parts[0].faces) == 320
-    np.testing.assert_allclose(np.ptp(model.vertices, axis=0), [2, 2, 2], atol=0.1)
-    np.testing.assert_allclose(model.parts[0].surface.albedo.reshape(-1, 3)[:320], np.tile(RED, (320, 1)), atol=1e-6)
 
 
 def test_a_mesh_far_from_its_origin_keeps_its_shape(tmp_path):

@@ -10,9 +10,8 @@ from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.emitters import in_photo
-from materialist.edits.core.emitters import KEY, base_of, emitting
+from materialist.edits.core.emitters import KEY, emitting
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
-from materialist.edits.light.frames import moving_light
 from materialist.edits.light.relight import relight
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
@@ -188,49 +187,3 @@ def test_dimmed_lights_keep_what_is_seen_in_them():
     before = np.zeros((30, 40), np.float32)
     before[7, 20:28] = 1  # something that was inserted stands before it
     np.testing.assert_array_equal(in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
-
-
-def spot(rows=slice(22, 26), columns=slice(14, 20)):
-    """[H, W] bool: a part of the floor, far from the window."""
-    mask = np.zeros((30, 40), bool)
-    mask[rows, columns] = True
-    return mask
-
-
-def test_lights_glass_and_removals_meet():
-    """Dimmed once, whatever stands in the photo; not over glass; not where the light was taken away."""
-    from materialist.edits.glass.glass import glass
-    from materialist.edits.remove.remove import remove
-
-    _, fit = rooms()
-    window, core = spot(slice(2, 14), slice(6, 34)), (slice(5, 10), slice(12, 28))
-    removed = remove(fit, spot(), shadow=0)
-    plain = composite(fit, relight(fit, dim=0.1), spp=16)[core]
-    np.testing.assert_allclose(composite(fit, relight(removed, dim=0.1, fitted=fit), spp=16)[core], plain, rtol=0.02)
-    bare = remove(fit, window, shadow=0)
-    with pytest.raises(InputError, match="taken away"):
-        relight(bare, dim=0.0, fitted=fit)
-    with pytest.raises(InputError, match="dim afterwards"):
-        remove(relight(fit, dim=0.3), window, fitted=fit)
-    pane = spot(slice(5, 20), slice(10, 20))
-    before = glass(fit, pane, roughness=0.5, tint=(0.2, 0.9, 0.2), thickness="symmetry")
-    shown = composite(fit, relight(before, dim=0.5, fitted=fit), spp=16)[7:9, 13:17]
-    assert shown.max() < 0.2 and shown[..., 1].mean() > 1.2 * shown[..., 0].mean(), "green glass, and no window on it"
-
-
-def test_lights_of_known_radiance_keep_their_own():
-    _, fit = rooms()
-    shown = np.minimum(fit.photo.linear, 0.1)
-    left, right = LIGHT & (np.arange(40) < 18), LIGHT & (np.arange(40) > 22)
-    shown[left], shown[right] = 50.0, 5.0
-    scene = replace(fit, photo=replace(fit.photo, hdr=True, linear=shown, original=shown))
-    found = sorted(body.surface.emission[0] for body in dimmed(scene, 1.0, lights=left | right).bodies)
-    np.testing.assert_allclose(found, [5, 50], rtol=1e-3)
-    with pytest.raises(InputError, match="whole light"):
-        dimmed(fit, 0.5, lights=spot(slice(5, 6), slice(9, 11)))
-    with pytest.raises(InputError, match="give dim"):
-        list(moving_light(fit, 3, lights=left))
-    old = dimmed(fit, 0.5)
-    old = replace(old, provenance={**old.provenance, KEY: {**old.provenance[KEY]}})
-    del old.provenance[KEY]["emission"]  # as an earlier version saved it
-    assert base_of(fit, old).bodies[0].surface.emission[0] == pytest.approx(2 * old.bodies[0].surface.emission[0])

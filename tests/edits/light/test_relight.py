@@ -7,8 +7,7 @@ import pytest
 from edit_scenes import flat_scene
 
 from materialist.edits.core.renderer import EditRenderer
-from materialist.edits.light.frames import moving_light
-from materialist.edits.light.relight import kelvin_colour, lamp, read_envmap, relight, rotated, with_sun
+from materialist.edits.light.relight import kelvin_colour, lamp, moving_light, read_envmap, relight, rotated, with_sun
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.types import Materials

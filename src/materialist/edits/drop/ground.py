@@ -135,25 +135,20 @@ class Surroundings:
     def meets(self, x: Array, y: Array, z: Array, upwards: bool = False) -> Array:
         """z [n] of what rays down (or up) from (x, y, z) [n] meet first, NaN for nothing.
 
-        A ray down that begins in a solid, which rays up and down meet from behind, meets it at its start.
+        A ray down that meets a back face first begins in a solid: it meets that at its start.
         """
-        start = np.stack([x, y, z], -1) / self.factor @ self.to_up  # back in the camera frame
-        distance, behind = self._trace(start, 1.0 if upwards else -1.0)
-        if not upwards and behind.any():  # or it comes on the back of an open surface
-            distance[behind & self._trace(start, 1.0)[1]] = 0
-        return z + (distance if upwards else -distance)
-
-    def _trace(self, start: Array, sign: float) -> tuple[Array, Array]:
-        """(metres to what rays up (1) or down (-1) from [n, 3] meet first, NaN for nothing; whether from behind)."""
         from materialist.buffers import floats
 
-        mi = self.target.mi
+        mi, sign = self.target.mi, 1.0 if upwards else -1.0
+        start = np.stack([x, y, z], -1) / self.factor @ self.to_up  # back in the camera frame
         origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
         direction = mi.Vector3f(*(float(sign * v) for v in self.to_up[2]))
         hit = self.target.mi_scene.ray_intersect(mi.Ray3f(origin, direction))
         met = np.array(hit.is_valid())
         distance = np.where(met, np.array(hit.t, np.float64) * self.factor, np.nan)
-        return distance, met & (np.array(hit.n, np.float64).T @ (sign * self.to_up[2]) > BEHIND)
+        if not upwards:
+            distance[met & (np.array(hit.n, np.float64).T @ self.to_up[2] < -BEHIND)] = 0
+        return z + sign * distance
 
     def room_over(self, points: Array, metres: float) -> float:
         """How far a thing that stands with its points [n, 3] can be lifted before it meets what hangs over it.

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support, picture_width, support_at
@@ -19,20 +18,14 @@ from materialist.types import Array, Body, Scene
 
 @dataclass(frozen=True)
 class InsertSettings:
-    """Size of an inserted mesh, and its check for intersections."""
+    """Size of an inserted mesh."""
 
     width: float = 1 / 6
     """Longest side at scale 1, share of the width that the picture shows at its depth (tuned by eye)."""
     nearest: float = 0.02
     """Depth that nothing may come nearer than, share of the depth of its place (tuned by eye)."""
     samples: int = 6000
-    """Points of its surface that are looked at for intersections (tuned by eye)."""
-    foot: float = 0.12
-    """Share of its height that may run into the surface it stands on (tuned by eye)."""
-    band: float = 0.03
-    """Distance from the visible surface, share of its size, at which both sides mean an intersection (by eye)."""
-    share: float = 0.003
-    """Share of the points on both sides that makes an intersection (tuned by eye)."""
+    """Points that stand for its surface where it falls (tuned by eye)."""
 
 
 SETTINGS = InsertSettings()
@@ -59,17 +52,12 @@ def insert(
     """
     wanted = Insertion.given(options, **values)
     model = repainted(mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material)
-    placed, support, longest = put(scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size)
-    warnings = [*model.warnings]
-    if _crosses(scene, placed, support):
-        warnings.append(
-            f"{model.name} runs into the surface behind or beside it; choose another place, or a smaller scale."
-        )
+    placed, _, longest = put(scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size)
     what: dict[str, Any] = {
         "mesh": model.name, "at": [float(v) for v in at], "scale": wanted.scale, "turn": wanted.turn,
         "material": wanted.material, "size": longest, "triangles": sum(len(body.faces) for body in placed),
     }  # fmt: skip
-    return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *warnings), "insert", what)
+    return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *model.warnings), "insert", what)
 
 
 def put(
@@ -128,30 +116,6 @@ def moved(body: Body, linear: Array, shift: Array) -> Body:
     vertices = (body.vertices.astype(np.float64) @ linear.T + shift).astype(np.float32)
     normals = (body.normals.astype(np.float64) @ (linear / factor).T).astype(np.float32)
     return replace(body, vertices=vertices, normals=normals)
-
-
-def extent(bodies: tuple[Body, ...]) -> float:
-    """Longest side of the box around bodies, camera frame, scene units."""
-    return float(np.ptp(np.concatenate([body.vertices for body in bodies]), axis=0).max())
-
-
-def _crosses(scene: Scene, bodies: tuple[Body, ...], support: Support) -> bool:
-    """Whether the bodies pass through the visible surface, off the plane that they stand on.
-
-    Told by points of their surface just before and just behind it; what stands apart behind an object is hidden by
-    more than that.
-    """
-    points = np.concatenate([surface_points(body) for body in bodies])  # [n, 3]
-    above = (points - support.point) @ support.normal
-    points = points[above > SETTINGS.foot * max(float(above.max()), 1e-12)]
-    place, depth = project(points, scene.camera)
-    column, row = np.floor(place[:, 0]).astype(int), np.floor(place[:, 1]).astype(int)
-    seen = (depth > 0) & (column >= 0) & (column < scene.camera.width) & (row >= 0) & (row < scene.camera.height)
-    surface = scene.depth[row[seen], column[seen]]
-    before = np.where(surface > 0, surface - depth[seen], np.inf)  # > 0: the point is before the surface
-    band = SETTINGS.band * extent(bodies)
-    least = SETTINGS.share * max(len(points), 1)
-    return bool(((before > 0) & (before < band)).sum() > least and ((before < 0) & (before > -band)).sum() > least)
 
 
 def surface_points(body: Body) -> Array:
