@@ -71,7 +71,7 @@ def inpainted_background(
     from scipy.ndimage import binary_dilation
 
     from materialist.edits.remove.behind import SKY, behind
-    from materialist.edits.remove.filling import filled, filling_plan
+    from materialist.edits.remove.filling import find_filling
 
     hole = binary_dilation(scene.mask, np.ones((3, 3), bool))  # with the rim of mixed pixels
     depth = np.where(hole, 0, scene.behind.depth)
@@ -84,8 +84,8 @@ def inpainted_background(
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
         things = {"object": mitsuba_mesh(_body(scene, found, depth), painted(scene.item.albedo))}
     albedo = _albedo(scene, depth, normal, photo, envmap, ends, things)
-    plan = filling_plan(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
-    exposed, albedo = (filled(plan, x, hole) for x in (photo * gain, albedo))
+    filling = find_filling(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
+    exposed, albedo = filling.radiance(photo * gain), filling.radiance(albedo)
     return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
 
 

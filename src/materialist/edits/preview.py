@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import into_photo, onto_working
-from materialist.edits.composite.layers import Layers, changed_pixels, texture_held
+from materialist.edits.composite.layers import Layers, changed_pixels
 from materialist.edits.core.emitters import dimmed_emitters
 from materialist.edits.core.renderer import is_relit
 from materialist.envmap import environment
@@ -81,9 +81,8 @@ class Preview:
         base = self._base_picture
         relit = is_relit(self.scene, edited)
         differs = (picture != base).any(-1)
-        held = texture_held(self.scene.materials.albedo, edited.materials.albedo)
         changed = changed_pixels(self.scene, edited) & differs
-        return Layers(base, picture, differs, changed, relit, held=held)
+        return Layers(base, picture, differs, changed, relit)
 
     def picture(self, edited: Scene, *, quick: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""

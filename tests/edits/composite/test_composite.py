@@ -10,12 +10,12 @@ from materialist.camera import project
 from materialist.edits.composite import composite as composites
 from materialist.edits.composite.composite import composite, developed, pictures
 from materialist.edits.composite.into_photo import DEFAULT, into_photo
-from materialist.edits.composite.layers import Layers, difference, significance, texture_held
+from materialist.edits.composite.layers import Layers, difference, significance, without_fireflies
+from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
-from materialist.types import Camera, Photo
 
 MASK = block_mask(36, 48)
 
@@ -157,51 +157,6 @@ def test_developed_scenes_start_from_the_composite(tmp_path):
     assert back.report.stages[-1]["edits"] == back.provenance["edits"]
 
 
-def test_the_rim_of_a_pattern_goes_with_the_pattern():
-    """Dots on a white thing that becomes blue leave no rings; other detail, and what is not edited, stays."""
-    rows, columns = np.mgrid[:40, :60]
-    dot = np.hypot(rows - 20, columns - 20) < 5
-    own = (np.abs(rows - 20) < 15) & (np.abs(columns - 22) < 18)
-    albedo = np.where(dot, 0.05, np.where(own, 0.8, 0.3))[..., None] * np.ones(3)
-    uniform = np.where(own[..., None], [0.1, 0.2, 0.6], albedo)
-    darker = np.where(own[..., None], 0.5 * albedo, albedo)
-    rim = np.abs(np.hypot(rows - 20, columns - 20) - 5) < 1.5
-    held = texture_held(albedo, uniform)
-    assert held[rim].max() < 0.01
-    away = own & (np.hypot(rows - 20, columns - 20) > 9)
-    assert (held[~own] == 1).all() and (held[away] == 1).all()
-    assert texture_held(albedo, darker)[rim].min() > 0.9
-    assert (texture_held(albedo, albedo) == 1).all()
-    base = albedo.astype(np.float32)
-    photo = np.where(rim[..., None], base + 0.1, base).astype(np.float32)  # the fit misses the rim
-    scene = replace(flat_scene().photo, linear=photo, original=photo)
-    layers = replace(layers_of(base, uniform.astype(np.float32), own), held=held)
-    out = into_photo(scene, layers)
-    np.testing.assert_allclose(out[rim], uniform[rim], atol=1e-5)
-    assert np.abs(into_photo(scene, replace(layers, held=None)) - uniform)[rim].min() > 0.005
-
-
-@pytest.mark.parametrize("hdr", [False, True])
-def test_the_rim_of_what_is_brighter_than_white_is_as_soft_as_the_photo_s(hdr):
-    """A highlight of radiance 20 fills no pixel of which it has a tenth, but in an HDR photo."""
-    left, right = np.array([0.6, 0.3, 0.1]), np.array([0.05, 0.1, 0.3])
-    share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)[None, :, None]  # a border six native pixels wide
-    original = (share * left + (1 - share) * right).repeat(60, 0).astype(np.float32)
-    small = original.reshape(15, 4, 15, 4, 3).mean((1, 3))
-    changed = np.zeros((15, 15), bool)
-    changed[:, :8] = True
-    edited = np.where(changed[..., None], 20, small).astype(np.float32)
-    photo = Photo(small, Camera(15, 15, 40.0), original, hdr=hdr)
-    out = into_photo(photo, Layers(small, edited, changed, changed))
-    rim = np.s_[20:40, 31:34]
-    if hdr:
-        assert out[rim].min() > 2
-    else:
-        expected = share * 1 + (1 - share) * right
-        assert np.abs(out[20:40] - expected)[:, 31:34].max() < 0.25 and (out[20:40, :26] > 1).all()
-    np.testing.assert_array_equal(out[:, 44:], original[:, 44:])
-
-
 def test_frames_that_are_alike_are_rendered_once(monkeypatch):
     asked = []
     scene = flat_scene()
@@ -227,3 +182,35 @@ def test_the_plain_rendering_goes_through_a_super_resolution():
     ):
         with pytest.raises(InputError, match=words):
             composite(scene, edited, **{"spp": 4, **options})
+
+
+def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
+    """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
+    photo = rendered_scene(4).photo
+    shape = photo.linear.shape[:2]
+    grey = replace(photo, linear=np.full_like(photo.linear, 0.6), original=np.full_like(photo.original, 0.6))
+    changed, inside, everywhere = np.zeros(shape, bool), np.zeros(shape, np.float32), np.ones(shape, bool)
+    changed[:21] = True
+    inside[10:20, 14:34] = 1
+    inside[20, 14:34] = 0.25
+    changed[20, :14] = changed[20, 34:] = False
+    share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
+    base = np.full_like(grey.linear, 0.6)
+    edited = np.where(inside[..., None] > 0, 5, 0.3).astype(np.float32)  # all in shade, but for the body
+    layers = Layers(base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original))
+    out = into_photo(grey, layers)
+    np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
+
+
+def test_a_lone_bright_pixel_is_brought_down_and_a_highlight_stays():
+    picture = np.full((9, 9, 3), 0.5, np.float32)
+    picture[2, 2] = (40, 20, 10)
+    picture[6, 5:7] = 30
+    clean = without_fireflies(picture)
+    assert clean[2, 2].max() < 3 and clean[2, 2, 0] / clean[2, 2, 2] == pytest.approx(4, rel=1e-5)
+    assert (clean[6, 5:7] > 1.4).all() and (clean <= picture + 1e-6).all()
+    highlight = np.full((9, 9, 3), 0.5, np.float32)
+    highlight[5:7, 5:7] = 30
+    np.testing.assert_array_equal(without_fireflies(highlight), highlight)
+    where = np.zeros((9, 9), bool)
+    np.testing.assert_array_equal(without_fireflies(picture, where), picture)

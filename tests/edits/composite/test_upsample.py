@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.composite import upsample
 from materialist.edits.composite.upsample import GuidedUpsample, matte, window
 
 
@@ -83,22 +82,6 @@ def test_without_a_colour_edge_the_mask_decides():
     alpha = matte(mask, np.full((60, 60, 3), 0.4, np.float32))
     assert (alpha[:, :26] == 1).all() and (alpha[:, 36:] == 0).all()
     assert np.all(np.diff(alpha[30]) <= 0)
-
-
-def disc(height, width, radius=15):
-    rows, columns = np.mgrid[:height, :width]
-    return np.hypot(rows - height / 2, columns - 1.5 * radius) < radius
-
-
-def test_a_matte_made_in_parts_is_the_matte_made_at_once():
-    small = disc(90, 120)
-    large = np.kron(small, np.ones((5, 5)))[..., None] * [0.5, 0.2, 0.1] + 0.1
-    large = (large * np.random.default_rng(0).uniform(0.8, 1, large.shape)).astype(np.float32)
-    soft = np.clip(upsample.matte(small, np.full_like(large, 0.5)), 0, 1)  # of one colour: the enlarged mask
-    whole = upsample._shares(soft, large, 5.0)
-    assert ((whole > 0.05) & (whole < 0.95)).sum() > 100
-    np.testing.assert_allclose(matte(small, large), whole, atol=0.05)
-    assert np.abs(matte(small, large) - whole).mean() < 1e-4
 
 
 @pytest.mark.parametrize("factor", [1, 3])

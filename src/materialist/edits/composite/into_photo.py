@@ -59,19 +59,15 @@ def into_photo(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAU
     def laid(rows: slice) -> None:
         here, share = out[rows, columns], alpha[rows, columns]
         large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
-        above = np.zeros_like(here)
         for part, members in ((share, changed & clear), (1 - share, ~changed & clear)):
             where = np.flatnonzero((part > 0).any(0))
             if where.size:
                 own = slice(int(where[0]), int(where[-1]) + 1)
                 there = slice(columns.start + own.start, columns.start + own.stop)
-                side = upsample(stack, members, rows, there)
-                large[:, own] += part[:, own, None] * side
-                if part is share and not photo.hdr:
-                    above[:, own] = _above_white(here[:, own], side, share[:, own, None])
+                large[:, own] += part[:, own, None] * upsample(stack, members, rows, there)
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
         held = here if photo.hdr or layers.relit else _unclipped(here, reference)
-        moved = np.maximum(held + change + excess * (held - reference) - above, 0)
+        moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
     with ThreadPoolExecutor(min(settings.threads, os.cpu_count() or 1)) as threads:
@@ -105,12 +101,9 @@ def _same_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> tu
     """out = edited + factor (photo - base).
 
     The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
-    factor = edited / base, and does not grow (a ratio above 1 is taken as 1). Where an edit takes a pattern away
-    (`layers.held`), the residual at its rim goes, too.
+    factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
     """
     factor = np.minimum((layers.edited + settings.floor) / (layers.base + settings.floor), 1)
-    if layers.held is not None:
-        factor = factor * layers.held[..., None]
     return layers.edited - layers.base, factor - 1, layers.base
 
 
@@ -148,21 +141,11 @@ def _under_bodies(stack: Array, layers: Layers, settings: CompositeSettings) -> 
     return stack[row, column], away <= settings.rim
 
 
-def _above_white(photo: Array, side: Array, share: Array) -> Array:
-    """[h, w, 3] excess over white that a surface brighter than white would bring into mixed pixels.
-
-    White is mixed in, as a photo's pixels would be enlarged, lest a few hundredths of a highlight fill a pixel.
-    """
-    change, excess, reference = side[..., :3], side[..., 3:6], side[..., 6:]
-    own = photo + change + excess * (photo - reference)
-    return np.where((share > 0) & (share < 1), share * np.maximum(own - np.maximum(photo, 1), 0), 0)
-
-
 def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:
     """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share.
 
-    At the rim of bodies brighter than an ordinary photo's white, white is mixed in, as a photo's pixels would be
-    enlarged: a few hundredths of a lamp's radiance would fill a pixel, and its outline would be ragged.
+    At the rim of bodies brighter than an ordinary photo's white, white is mixed in: a few hundredths of a lamp's
+    radiance would fill a pixel, and its outline would be ragged.
     """
     if native is None:
         return picture

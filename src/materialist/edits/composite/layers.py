@@ -6,18 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.edits.composite.fireflies import without_fireflies
+from materialist.color import luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit
 from materialist.errors import InputError
-from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
 
 @dataclass(frozen=True)
 class LayerSettings:
-    """What counts as a difference, and as a pattern of the albedo."""
+    """What counts as a difference, and as a firefly."""
 
     window: int = 9
     """Pixels across, over which a difference and its noise are measured; larger sees fainter light (tuned by eye)."""
@@ -25,12 +24,10 @@ class LayerSettings:
     """Standard errors by which a mean difference must stand out (derived: 1 in 400 by chance)."""
     least_gain: float = 0.25
     """Gain below which a difference is none (tuned by eye)."""
-    darkest: float = 0.02
-    """Added to albedo before its logarithm (tuned by eye)."""
-    pattern: tuple[float, float] = (0.3, 0.8)
-    """Contrast of albedo, logarithms: none of a pattern, and certainly of one (tuned by eye)."""
-    rim: int = 2
-    """Pixels within which that contrast is taken (derived: mixed pixels)."""
+    bright: float = 1.0
+    """Radiance up to which nothing is a firefly: below white a sparkle does no harm (derived)."""
+    times: float = 3.0
+    """Multiple of the second brightest of the eight neighbours from which a pixel is a firefly (tuned by eye)."""
 
 
 DEFAULT = LayerSettings()
@@ -54,8 +51,6 @@ class Layers:
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
     covered: Array | None = None
     """[H, W] bool: glass in place of a surface of the photo: the rendering alone is seen; part of `changed`."""
-    held: Array | None = None
-    """[H, W] in [0, 1]: how much of what the photo has beyond the fit stays; None for all of it."""
 
 
 def render_layers(
@@ -82,41 +77,9 @@ def render_layers(
             albedo, normal = renderer.body_guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(
-        base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress, focused=focused(edited),
+        base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress,
     )  # fmt: skip
-    held = texture_held(scene.materials.albedo, edited.materials.albedo)
-    return replace(layers, relit=relit, native=alone, covered=covered, held=held)
-
-
-def texture_held(albedo: Array, edited: Array, settings: LayerSettings = DEFAULT) -> Array:
-    """[H, W] float32 in [0, 1]: the part of the contrast of an albedo [H, W, 3] that an edit of it leaves.
-
-    The photo's residual at the rim of a pattern goes with the pattern. 1 where there was none.
-    """
-    import cv2
-
-    own = (albedo != edited).any(-1)
-    if not own.any():
-        return np.ones(own.shape, np.float32)
-    kernel = np.ones((2 * settings.rim + 1,) * 2, np.uint8)
-
-    def contrast(values: Array) -> Array:
-        """[H, W] largest difference of logarithms nearby, inside the edit."""
-        log = np.log(values + settings.darkest).mean(-1)
-        high, low = (np.where(own, log, far).astype(np.float32) for far in (-1e3, 1e3))
-        return np.where(own, np.asarray(cv2.dilate(high, kernel)) - np.asarray(cv2.erode(low, kernel)), 0)
-
-    level = albedo[own].mean() / max(float(edited[own].mean()), 1e-3)  # a darker pattern is one all the same
-    before, after = contrast(albedo), contrast(level * edited)
-    low, high = settings.pattern
-    patterned = np.clip((before - low) / (high - low), 0, 1)
-    return (1 - patterned * (1 - np.clip(after / np.maximum(before, 1e-6), 0, 1))).astype(np.float32)
-
-
-def focused(scene: Scene) -> bool:
-    """Whether small lights of the scene's own stand beside glass, through which no path can aim at them."""
-    lit = bool(scene.lamps) or any(is_glowing(body.surface) for body in scene.bodies)
-    return lit and any(is_transparent(body.surface) for body in scene.bodies)
+    return replace(layers, relit=relit, native=alone, covered=covered)
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
@@ -131,7 +94,7 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 def difference(
     base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
-    clean: bool = True, progress=None, focused: bool = False,
+    clean: bool = True, progress=None,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
 
@@ -144,7 +107,6 @@ def difference(
         guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
             another one, of the edited scene.
         clean: denoise both pictures before they are compared, where the denoiser is installed.
-        focused: whether small lights stand beside glass, so that lone bright pixels are what lights the rest.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
@@ -165,7 +127,7 @@ def difference(
     gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
     if clean:
         b = denoised(b, guides[0], guides[2])
-        e = denoised(without_fireflies(e, changed, spread=focused), guides[1], guides[-1])
+        e = denoised(without_fireflies(e, changed), guides[1], guides[-1])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
@@ -191,3 +153,19 @@ def significance(d0: Array, d1: Array, settings: LayerSettings = DEFAULT) -> Arr
             variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / settings.window**2
         gain = np.maximum(gain, 1 - settings.sigmas**2 * variance / np.maximum(m2, 1e-30))
     return np.where(gain > settings.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
+
+
+def without_fireflies(picture: Array, where: Array | None = None, settings: LayerSettings = DEFAULT) -> Array:
+    """[H, W, 3] linear with lone bright pixels brought down, their colour kept; a highlight of two pixels stays.
+
+    They come from single paths, as where glass focuses small lights. `where` [H, W] bool: pixels that may change, all
+    by default.
+    """
+    from scipy.ndimage import rank_filter
+
+    light = luminance(picture)
+    around = np.ones((3, 3), bool)
+    around[1, 1] = False
+    limit = np.maximum(settings.times * rank_filter(light, -2, footprint=around, mode="nearest"), settings.bright)
+    found = (light > limit) & (True if where is None else where)
+    return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(np.float32)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from threading import Lock
-
 import numpy as np
 
 from materialist.edits.core.renderer import EditRenderer
@@ -47,22 +45,7 @@ def checked_region(scene: Scene, mask: Array) -> Array:
 
 def body_coverage(scene: Scene) -> Array:
     """[H, W] share of each pixel in which something is seen that was put into the scene, or made glass."""
-    asked = (scene.geometry, *scene.bodies)
-    key = tuple(map(id, asked))
-    with _LOCK:
-        known = _answered.get(key)
-    if known is None:
-        known = asked, EditRenderer(scene).body_coverage(scene)
-        with _LOCK:
-            _answered[key] = known
-            while len(_answered) > _KEPT:
-                del _answered[next(iter(_answered))]
-    return known[1]
-
-
-_LOCK, _KEPT = Lock(), 8
-_answered: dict[tuple[int, ...], tuple[tuple, Array]] = {}
-"""Latest answers of `body_coverage`; each holds the objects whose ids are its key, so that no id is used again."""
+    return EditRenderer(scene).body_coverage(scene)
 
 
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:

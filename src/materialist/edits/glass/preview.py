@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.composite.fireflies import without_fireflies
-from materialist.edits.composite.layers import focused
+from materialist.edits.composite.layers import without_fireflies
 from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
 from materialist.options import Glass
@@ -74,7 +73,7 @@ class GlassPreview:
         target = self._dressed(surface)
         paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
         seen = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
-        calm = without_fireflies(spread(seen), spread=focused(self._edited))
+        calm = without_fireflies(spread(seen))
         guide = self._guides[size]
         return self._in_photo(denoised(calm, guide.albedo, guide.normal), surface)
 

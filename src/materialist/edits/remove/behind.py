@@ -27,11 +27,9 @@ class ContinuationSettings:
     beyond: float = 0.5  # unless this part of what is no plane stands where no plane goes on: the background
     farthest: float = 1.1  # a plane ends at this multiple of the depth up to which it is seen
     nearer: float = 0.9  # a plane is not where it would come before this part of the depth that is seen
-    small: float = 2.0  # a plane inside the frame of fewer holes is a face of a thing, which ends ...
-    beside: float = 0.45  # ... unless it is seen around this part of the hole
-    lines: float = 0.4  # width, in sizes, of the ring that tells along which lines surfaces part
-    fades: float = 0.2  # distance from the hole, in sizes, at which a pixel counts 1 / e for these lines
-    straight: float = 0.9  # least part of the ring that such lines must sort rightly; else a membrane does
+    window: float = 0.4  # width, in sizes, of the surroundings that are looked at
+    fades: float = 0.2  # distance from the hole, in sizes, at which a pixel counts 1 / e for lines between surfaces
+    straight: float = 0.9  # least part of the surroundings that such lines must sort rightly; else a membrane does
     gap: float = 1e-3  # least part of the depth between what was hidden and what hid it
 
 
@@ -53,7 +51,7 @@ def behind(
 ) -> Behind:  # fmt: skip
     """Continue the surfaces around a hole into it.
 
-    Planes part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the
+    Surfaces part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the
     surface whose share, spanned over the hole as a membrane, is largest. On a plane inverse depth goes on linearly,
     corrected by a membrane to meet the depth around.
 
@@ -65,39 +63,21 @@ def behind(
     """
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
     out = Behind(depth.astype(np.float32), normal.astype(np.float32), known)
-    seen = np.where(hole | (depth <= 0), LOOSE, plane)
     ends = {
-        int(k): settings.farthest * float(np.percentile(depth[seen == k], 99))
-        for k in np.unique(seen[seen >= 0]) if not _is_face(seen == k, hole, settings)
-    }  # fmt: skip
-    window = _Window(depth, normal, known, hole, pixel_rays(camera), settings)
+        int(k): settings.farthest * float(np.percentile(depth[~hole & (known == k)], 99))
+        for k in np.unique(known[~hole & (known >= 0)])
+    }
+    margin = max(8, round(settings.window * float(np.sqrt(hole.sum()))) + 1)
+    (top, bottom), (left, right) = (np.flatnonzero(hole.any(axis))[[0, -1]] for axis in (1, 0))
+    box = np.s_[max(top - margin, 0) : bottom + margin + 1, max(left - margin, 0) : right + margin + 1]
+    window = _Window(depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float), settings)
     label = window.labels(ends)
     for k in np.unique(label[window.hole]):
         here = window.hole & (label == k)
-        new_depth, new_normal = window.surface(int(k), here, front[window.box])
-        out.depth[window.box][here], out.normal[window.box][here] = new_depth, new_normal
-    out.label[window.box] = label
+        new_depth, new_normal = window.surface(int(k), here, front[box])
+        out.depth[box][here], out.normal[box][here] = new_depth, new_normal
+    out.label[box] = label
     return out
-
-
-def _is_face(own: Array, hole: Array, settings: ContinuationSettings) -> bool:
-    """Whether the plane of the pixels `own` [H, W] bool is of a thing beside a hole, and not its background."""
-    if own[[0, -1]].any() or own[:, [0, -1]].any() or own.sum() >= settings.small * hole.sum():
-        return False
-    rows, columns = np.nonzero(own & _ring(hole, settings.ring))
-    if not len(rows):
-        return False
-    y, x = (v.mean() for v in np.nonzero(hole))
-    seen = np.histogram(np.arctan2(rows - y, columns - x), 36, (-np.pi, np.pi))[0] > 0
-    return bool(seen.mean() < settings.beside)
-
-
-def _ring(hole: Array, width: float) -> Array:
-    """[H, W] bool: pixels beside the hole, within `width` of its size."""
-    import cv2
-
-    reach = max(2, round(width * float(np.sqrt(hole.sum()))))
-    return (cv2.dilate(hole.astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0) & ~hole
 
 
 class _Window:
@@ -106,35 +86,46 @@ class _Window:
     def __init__(
         self, depth: Array, normal: Array, known: Array, hole: Array, rays: Array, settings: ContinuationSettings
     ):
-        margin = max(8, round(settings.lines * float(np.sqrt(hole.sum()))) + 1)
-        rows, columns = np.flatnonzero(hole.any(1)), np.flatnonzero(hole.any(0))
-        top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
-        self.box = np.s_[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
-        self.depth, self.normal, self.known = depth[self.box], normal[self.box], known[self.box]
-        self.hole, self.rays, self.settings = hole[self.box], rays[self.box].astype(np.float64), settings
-        surface = self.depth > 0
-        self.inverse = np.where(surface, 1 / np.where(surface, self.depth, 1), 0).astype(np.float64)
-        around = ~self.hole & surface
-        self.spanned = membrane(self.inverse, around) if around.any() else self.inverse
+        self.normal, self.known, self.hole, self.rays, self.settings = normal, known, hole, rays, settings
+        surface = depth > 0
+        self.inverse = np.where(surface, 1 / np.where(surface, depth, 1), 0).astype(np.float64)
+        self.spanned = membrane(self.inverse, ~hole & surface)
+        self.ring = _ring(hole, settings.ring)
 
     def labels(self, ends: dict[int, float]) -> Array:
-        """[h, w] int: the labels around, carried into the hole; `ends`: planes that go on, and at which depth."""
-        settings, ring = self.settings, _ring(self.hole, self.settings.ring)
+        """[h, w] int: the labels around, carried into the hole; `ends`: the depth at which each plane ends."""
         kinds, count = np.unique(self.known[~self.hole], return_counts=True)
-        shares = np.array([np.mean(self.known[ring] == k) if ring.any() else 0.0 for k in kinds])
-        shown = shares >= settings.share
-        goes_on = shown & ((kinds < 0) | np.isin(kinds, list(ends)))
-        kept = kinds[goes_on] if goes_on.any() else kinds[shown] if shown.any() else kinds[count.argmax()][None]
-        loose = LOOSE in kept
-        planes = shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= settings.firm
-        background = loose and self._is_background({k: ends[k] for k in map(int, kept) if k in ends})
-        if planes and not background:
-            kept, loose = kept[kept != LOOSE], False
-        chosen = self._parted(kept) if len(kept) > 1 and (background or not loose) else None
+        shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(self.ring.sum(), 1)
+        kept = kinds[shares >= self.settings.share] if self.ring.any() else kinds[count.argmax()][None]
+        firm = shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= self.settings.firm
+        background = LOOSE in kept and self._is_background({k: ends[k] for k in map(int, kept) if k >= 0})
+        if firm and not background:
+            kept = kept[kept != LOOSE]
+        chosen = None if LOOSE in kept and not background else self._parted(kept)
         if chosen is None:
             indicator = np.stack([self.known == k for k in kept], -1).astype(np.float32)
             chosen = kept[membrane(indicator, ~self.hole & np.isin(self.known, kept)).argmax(-1)]
         return np.where(self.hole, chosen, self.known)
+
+    def _parted(self, kinds: Array) -> Array | None:
+        """[h, w] labels parted by straight lines: a linear classifier (softmax) of the places of the pixels around.
+
+        Pixels count less the farther from the hole they are. None where lines do not sort them well.
+        """
+        from scipy.ndimage import distance_transform_edt
+
+        size = float(np.sqrt(self.hole.sum()))
+        rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, self.settings.window))
+        if not len(rows):
+            return None
+        wanted = self.known[rows, columns][:, None] == kinds  # [N, K]
+        y, x = (v / size for v in np.indices(self.hole.shape, float))
+        basis = np.stack([np.ones_like(y), y - y[rows, 0].mean(), x - x[0, columns].mean()], -1)
+        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / self.settings.fades)
+        balance = near / np.maximum(near @ wanted, 1e-12)[wanted.argmax(1)]
+        scores = basis @ _softmax(basis[rows, columns], wanted, balance / balance.sum())
+        right = scores[rows, columns].argmax(-1) == wanted.argmax(-1)
+        return kinds[scores.argmax(-1)] if right @ near >= self.settings.straight * near.sum() else None
 
     def surface(self, label: int, here: Array, front: Array) -> tuple[Array, Array]:
         """Depth [P] and normals [P, 3] of one surface at the pixels `here` [h, w] bool of the hole."""
@@ -150,34 +141,12 @@ class _Window:
 
     def _is_background(self, ends: dict[int, float]) -> bool:
         """Whether what lies on no plane around the hole stands where planes have ended, and not on them."""
-        loose = _ring(self.hole, self.settings.ring) & (self.known == LOOSE)
+        loose = self.ring & (self.known == LOOSE)
         beyond = np.ones(loose.sum(), bool)
         for k, end in ends.items():
             going_on = self.rays[loose] @ self._plane(~self.hole & (self.known == k))  # above the horizon not positive
             beyond &= (going_on < 1 / end) | (going_on > self.inverse[loose] / self.settings.nearer)
         return bool(loose.any() and beyond.mean() > self.settings.beyond)
-
-    def _parted(self, kinds: Array) -> Array | None:
-        """[h, w] labels parted by straight lines: a linear classifier (softmax) of the places of the pixels around.
-
-        Pixels count less the farther from the hole they are. None where lines do not sort them well.
-        """
-        from scipy.ndimage import distance_transform_edt
-
-        settings, size = self.settings, float(np.sqrt(self.hole.sum()))
-        rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, settings.lines))
-        stride = max(1, len(rows) // 4000)
-        rows, columns = rows[::stride], columns[::stride]
-        if not len(rows):
-            return None
-        wanted = self.known[rows, columns][:, None] == kinds  # [N, K]
-        y, x = (v / size for v in np.indices(self.hole.shape, float))
-        basis = np.stack([np.ones_like(y), y - y[rows, 0].mean(), x - x[0, columns].mean()], -1)
-        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / settings.fades)
-        balance = near / np.maximum(near @ wanted, 1e-12)[wanted.argmax(1)]
-        scores = basis @ _softmax(basis[rows, columns], wanted, balance / balance.sum())
-        right = scores[rows, columns].argmax(-1) == wanted.argmax(-1)
-        return kinds[scores.argmax(-1)] if (right * near).sum() >= settings.straight * near.sum() else None
 
     def _on_plane(self, own: Array) -> Array:
         """[h, w] inverse depth of the plane through the pixels `own` [h, w] bool, bent to meet them at the hole."""
@@ -190,6 +159,14 @@ class _Window:
         """[3] whose product with a ray is the inverse depth of the plane through the pixels `own` [h, w] bool."""
         scaled = self.rays[own] / np.maximum(self.inverse[own], 1e-12)[:, None]  # the relative error of depth counts
         return np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
+
+
+def _ring(hole: Array, width: float) -> Array:
+    """[H, W] bool: pixels beside the hole, within `width` of its size."""
+    import cv2
+
+    reach = max(2, round(width * float(np.sqrt(hole.sum()))))
+    return (cv2.dilate(hole.astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0) & ~hole
 
 
 def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:

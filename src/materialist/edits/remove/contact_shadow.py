@@ -58,13 +58,13 @@ def contact_shadow(
         if (on & (away > settings.clear)).sum() >= settings.fewest:
             found |= near & on & _unlike(logs, on, away > settings.clear, np.median(logs[own], 0), settings)
     radius = max(1, round(settings.thin * size))
-    found = _morphed(cv2.MORPH_DILATE, _morphed(cv2.MORPH_ERODE, found | gone, radius), radius) & near
+    found = morphed(cv2.MORPH_DILATE, morphed(cv2.MORPH_ERODE, found | gone, radius), radius) & near
     foot = gone.copy()
     rows = np.flatnonzero(gone.any(1))
     foot[: round(rows[-1] - settings.foot * np.ptp(rows))] = False
     parts, _ = label(found, np.ones((3, 3)))
-    found &= np.isin(parts, np.unique(parts[_morphed(cv2.MORPH_DILATE, foot, radius)]))
-    return _morphed(cv2.MORPH_DILATE, found, radius + settings.rim) & ground if found.any() else found
+    found &= np.isin(parts, np.unique(parts[morphed(cv2.MORPH_DILATE, foot, radius)]))
+    return morphed(cv2.MORPH_DILATE, found, radius + settings.rim) & ground if found.any() else found
 
 
 def _unlike(logs: Array, on: Array, clear: Array, colour: Array, settings: ShadowSettings) -> Array:
@@ -113,10 +113,11 @@ def _edges(logs: Array, gone: Array, settings: ShadowSettings) -> Array:
     beside = logs[tuple(distance_transform_edt(gone, return_distances=False, return_indices=True))]
     soft = cv2.GaussianBlur(np.asarray(beside, np.float32), (0, 0), max(0.7, 0.002 * max(gone.shape)))
     down, right = np.gradient(soft, axis=(0, 1))
-    return _morphed(cv2.MORPH_DILATE, np.hypot(down, right).max(-1) > settings.edge, 1)
+    return morphed(cv2.MORPH_DILATE, np.hypot(down, right).max(-1) > settings.edge, 1)
 
 
-def _morphed(how: int, mask: Array, radius: int) -> Array:
+def morphed(how: int, mask: Array, radius: int) -> Array:
+    """[H, W] bool: a mask after an operation of cv2.morphologyEx with a disc of `radius` pixels."""
     import cv2
 
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.core.region import body_coverage, checked_region
-from materialist.edits.remove.contact_shadow import contact_shadow
+from materialist.edits.core.region import checked_region
+from materialist.edits.remove.contact_shadow import contact_shadow, morphed
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -35,23 +35,28 @@ class Hole:
     gone: Array
     """[H, W] bool: the object and a rim of mixed pixels, wide where it is out of focus; depth and normals end here."""
     painted: Array
-    """[H, W] bool: where materials and photo are filled: `gone`, and its shadow and reflection on the ground."""
+    """[H, W] bool: where materials and photo are filled: `gone`, its shadow and reflection on the ground, no bodies."""
 
 
 def make_hole(
-    scene: Scene, mask: Array, *, grow: float, shadow: float | None, settings: HoleSettings = HoleSettings()
-) -> Hole:
+    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array | None = None,
+    settings: HoleSettings = HoleSettings(),
+) -> Hole:  # fmt: skip
     """The pixels that a removal concerns; `grow` and `shadow` as of `materialist.Removal`.
+
+    `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay; None for nowhere.
 
     Raises:
         InputError: a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
+    import cv2
     from skimage.morphology import remove_small_holes
 
     own = checked_region(scene, mask) > 0.5
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
-    gone = _grown(own, round(grow * max(own.shape))) | _defocused(scene, own, settings)
+    bodies = np.zeros_like(own) if bodies is None else bodies
+    gone = morphed(cv2.MORPH_DILATE, own, round(grow * max(own.shape))) | _defocused(scene, own, bodies, settings)
     surface = scene.depth > 0
     if (gone & surface).sum() > settings.most * surface.sum() or (gone | ~surface).all():
         if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
@@ -68,19 +73,19 @@ def make_hole(
     if shadow is None:
         painted = gone | contact_shadow(scene.photo.linear, plane, ground, own, gone)
     else:
-        painted = gone | (ground & _grown(gone, round(shadow * float(np.sqrt(own.sum())))))
-    return Hole(own, gone, remove_small_holes(painted, max_size=int(settings.island * own.sum())))
+        painted = gone | (ground & morphed(cv2.MORPH_DILATE, gone, round(shadow * float(np.sqrt(own.sum())))))
+    return Hole(own, gone, remove_small_holes(painted, max_size=int(settings.island * own.sum())) & ~bodies)
 
 
-def _defocused(scene: Scene, own: Array, settings: HoleSettings) -> Array:
+def _defocused(scene: Scene, own: Array, bodies: Array, settings: HoleSettings) -> Array:
     """[H, W] bool: the object as far as it colours its surroundings, but for what stands before it."""
+    import cv2
     from scipy.ndimage import distance_transform_edt
 
-    body = body_coverage(scene) > 0 if scene.bodies else np.zeros_like(own)
-    bare = own & ~body
+    bare = own & ~bodies
     if not bare.any():
         return own
-    rim = _grown(bare, defocus_width(scene.photo.linear, bare, ~body, settings)) & ~body
+    rim = morphed(cv2.MORPH_DILATE, bare, defocus_width(scene.photo.linear, bare, ~bodies, settings)) & ~bodies
     depth = scene.depth[tuple(distance_transform_edt(~own, return_distances=False, return_indices=True))]
     return rim & ((scene.depth == 0) | (scene.depth > settings.before * depth) | own)
 
@@ -112,10 +117,3 @@ def defocus_width(linear: Array, own: Array, usable: Array, settings: HoleSettin
         if ring.sum() < 20 or np.median(share[ring]) <= settings.mixture:
             return pixels - 1
     return reach
-
-
-def _grown(mask: Array, pixels: int) -> Array:
-    import cv2
-
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * max(pixels, 1) + 1,) * 2)
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0 if pixels > 0 else mask

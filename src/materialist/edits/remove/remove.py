@@ -9,12 +9,12 @@ import numpy as np
 
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import body_coverage
-from materialist.edits.core.renderer import EditRenderer, denoised
+from materialist.edits.core.renderer import denoised
+from materialist.edits.remove.background import given_picture, matched, with_picture
 from materialist.edits.remove.behind import Behind, behind
-from materialist.edits.remove.filling import filled, filled_materials, filling_plan
-from materialist.edits.remove.given import given_picture, matched, with_picture
+from materialist.edits.remove.filling import find_filling
 from materialist.edits.remove.hole import Hole, make_hole
-from materialist.edits.remove.native import laid, with_hole
+from materialist.edits.remove.native import with_hole
 from materialist.options import Removal
 from materialist.types import Array, Geometry, Scene
 
@@ -37,31 +37,29 @@ def remove(
             photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
     """
     options, fitted = Removal.given(options, **values), fitted or scene
-    hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow)
+    photographed = replace(scene, bodies=fitted.bodies)  # the photo does not show what edits since then put there
+    bodies = body_coverage(photographed) > 0 if photographed.bodies else np.zeros(scene.depth.shape, bool)
+    hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera)
-    photographed = replace(scene, bodies=fitted.bodies)  # what an edit puts there is not in the photo
-    usable = body_coverage(photographed) == 0 if photographed.bodies else None
-    plan = filling_plan(
+    filling = find_filling(
         scene.materials.albedo, scene.photo.linear, hole.painted, found.label, found.depth, scene.camera,
-        seed=options.seed, usable=usable,
+        seed=options.seed, usable=~bodies,
     )  # fmt: skip
-    picture, warnings = given_picture(scene, options, hole)
+    picture, warnings = given_picture(scene, options, hole.painted)
     if picture is not None:
-        materials, photo, rerender = with_picture(scene, plan, hole, picture)
+        materials, photo, rerender = with_picture(scene, filling, picture)
     else:
         shown = denoised(scene.rerender, scene.materials.albedo, scene.normal)
-        materials = filled_materials(plan, scene.materials, hole.painted)
-        photo = with_hole(scene.photo, filled(plan, scene.photo.linear, hole.painted), hole.painted, plan, found.label)
-        rerender = filled(plan, shown, hole.painted).astype(np.float32)
+        materials = filling.materials(scene.materials)
+        photo = with_hole(scene.photo, filling.radiance(scene.photo.linear), hole.painted, filling.source)
+        rerender = filling.radiance(shown)
     removed = replace(
         scene, materials=materials, depth=found.depth, normal=found.normal, geometry=_geometry(scene, found),
         photo=photo, rerender=rerender,
     )  # fmt: skip
-    if photographed.bodies:
-        removed = _with_bodies(removed, photographed, hole)
     if picture is not None:
-        removed = matched(removed, hole, picture, fitted)
+        removed = matched(removed, hole.painted, picture, fitted)
     how = "background" if options.background is not None else ("inpainter" if options.inpaint else "patches")
     what = {
         "filled_by": how, "pixels": int(hole.object.sum()), "grow": options.grow,
@@ -90,25 +88,3 @@ def _geometry(scene: Scene, found: Behind) -> Geometry:
         completion=completion_of(scene.geometry, options.get("completion")), extents=read_extents(options),
         seed=int(options.get("seed", 0) or 0),
     )  # fmt: skip
-
-
-def _with_bodies(removed: Scene, scene: Scene, hole: Hole) -> Scene:
-    """The scene with its bodies in the filled photo and re-rendering again: they stand before what was taken away."""
-    share = body_coverage(scene)
-    before = hole.painted & (share > 0)
-    if not before.any():
-        return removed
-    photo, native = scene.photo, scene.photo.original.shape[:2]
-    large = share
-    if native != share.shape:
-        rows, columns = (
-            (max(0, int((v[0] - 1) * n / m)), min(n, int(np.ceil((v[-1] + 2) * n / m))))
-            for v, n, m in zip((np.flatnonzero(before.any(1)), np.flatnonzero(before.any(0))), native, share.shape)
-        )
-        large = np.zeros(native, np.float32)
-        large[slice(*rows), slice(*columns)] = EditRenderer(scene).body_coverage_in(scene, native, (*rows, *columns))
-    filled_photo = replace(
-        removed.photo, linear=laid(photo.linear, share, removed.photo.linear),
-        original=laid(photo.original, large, removed.photo.original),
-    )  # fmt: skip
-    return replace(removed, photo=filled_photo, rerender=laid(scene.rerender, share, removed.rerender))

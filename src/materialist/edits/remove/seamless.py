@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.edits.remove.patches import Plan
+from materialist.edits.remove.patches import copied
 from materialist.types import Array
 
 
@@ -25,86 +25,70 @@ class BlendSettings:
     exact: float = 1.0  # the same where a symmetric plane gives the level, which the border knows less well
 
 
-def seamless(plan: Plan, radiance: Array, settings: BlendSettings = BlendSettings()) -> Array:
-    """Radiance or albedo [H, W, C] with the plan's hole filled by its pieces, their levels as the hole's borders say.
+def seamless(
+    radiance: Array, hole: Array, source: Array, label: Array, exact: Array | None = None,
+    settings: BlendSettings = BlendSettings(),
+) -> Array:  # fmt: skip
+    """Radiance or albedo [H, W, C] with a hole filled by pieces, their levels as the hole's borders say; float32.
 
     Gradients are those of logarithms, so that light changes a pattern as a factor. None is kept where two surfaces
-    meet. float32, the rest as it was.
+    meet.
+
+    Args:
+        hole: [H, W] bool. source, label: [H, W] int row-major sources and surfaces (see `patches.patch_sources`).
+        exact: [H, W] bool: sources that a symmetry gives; None for nowhere.
     """
-    hole = plan.hole
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import splu
+
     values = np.log(np.maximum(np.asarray(radiance, np.float64), 0) + settings.floor)
-    filled = plan.fill(values).astype(np.float64)
-    where = np.full(hole.shape, -1)
-    where[plan.rows, plan.columns] = plan.source
-    where[~hole] = -1
-    pairs = [_pairs(plan, values, filled, where, along, settings.alike) for along in (0, 1)]
-    first, second, step = (np.concatenate([pair[i] for pair in pairs]) for i in range(3))
-    held = np.full(hole.shape, settings.held)
-    held[plan.rows[: plan.exact], plan.columns[: plan.exact]] = settings.exact
-    solved = _solved(hole, filled, held[hole], first, second, step)
-    off = np.clip(solved - filled[hole], -settings.most, settings.most)
+    pieces = copied(values, source)[hole].astype(np.float64)
+    first, second, step = _steps(values, hole, source, label, settings.alike)
+    # Differences of unknowns, `matrix` [N, P], are the steps less what is known of them.
+    number = np.where(hole, np.cumsum(hole).reshape(hole.shape) - 1, -1).ravel()
+    rows, columns, signs = [], [], []
+    for pixels, sign in ((second, 1.0), (first, -1.0)):
+        inside = number[pixels] >= 0
+        rows, columns = [*rows, np.flatnonzero(inside)], [*columns, number[pixels[inside]]]
+        signs.append(np.full(int(inside.sum()), sign))
+        step = step - sign * np.where(inside[:, None], 0, values.reshape(hole.size, -1)[pixels])
+    places = np.concatenate(rows), np.concatenate(columns)
+    matrix = coo_matrix((np.concatenate(signs), places), (len(first), len(pieces))).tocsr()
+    held = (
+        np.full(len(pieces), settings.held) if exact is None else np.where(exact[hole], settings.exact, settings.held)
+    )
+    normal = (matrix.T @ matrix + diags(held, dtype=float)).tocsc()
+    solver = splu(normal, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    solved = solver.solve(matrix.T @ step + held[:, None] * pieces)
+    levels = np.clip(solved - pieces, -settings.most, settings.most)
     out = np.asarray(radiance, np.float32).copy()
-    out[hole] = np.maximum(np.exp(filled[hole] + off) - settings.floor, 0)
+    out[hole] = np.maximum(np.exp(pieces + levels) - settings.floor, 0)
     return out
 
 
-def _pairs(
-    plan: Plan, values: Array, filled: Array, where: Array, along: int, alike: float
-) -> tuple[Array, Array, Array]:
+def _steps(values: Array, hole: Array, source: Array, label: Array, alike: float) -> tuple[Array, Array, Array]:
     """Neighbours of which one at least is in the hole: row-major first [N] and second [N], and second - first [N, C].
 
-    `where` [H, W]: the source of each pixel of the hole, -1 elsewhere; `along`: the axis; `alike`: of `BlendSettings`.
+    A hidden pixel expects to its neighbour the step that its source has there; two hidden ones take the mean.
     """
-    hole, width = plan.hole.ravel(), plan.hole.shape[1]
-    label = np.zeros(hole.size, int) if plan.label is None else plan.label.ravel()
-    flat, own, where = values.reshape(hole.size, -1), filled.reshape(hole.size, -1), where.ravel()
-    grid = np.arange(hole.size).reshape(plan.hole.shape)
-    first, second = (grid[:-1], grid[1:]) if along == 0 else (grid[:, :-1], grid[:, 1:])
-    first, second = first.ravel(), second.ravel()
-    near = (hole[first] | hole[second]) & (label[first] == label[second])
+    flat, inside = values.reshape(hole.size, -1), hole.ravel()
+    own, label, source = copied(values, source).reshape(hole.size, -1), label.ravel(), source.ravel()
+    grid = np.arange(hole.size).reshape(hole.shape)
+    first = np.concatenate([grid[:-1].ravel(), grid[:, :-1].ravel()])
+    second = np.concatenate([grid[1:].ravel(), grid[:, 1:].ravel()])
+    near = (inside[first] | inside[second]) & (label[first] == label[second])
     first, second = first[near], second[near]
-    total, count = np.zeros((len(first), flat.shape[1])), np.zeros(len(first))
-    off = np.zeros(len(first))
-    for here, there, stride in ((first, second, width ** (1 - along)), (second, first, -(width ** (1 - along)))):
-        source = where[here]
-        beside = source + stride
-        sound = (source >= 0) & (beside >= 0) & (beside < hole.size)
-        if along == 1:
-            sound &= source // width == beside // width
-        source, beside = np.where(sound, source, 0), np.where(sound, beside, 0)
-        sound &= ~hole[source] & ~hole[beside] & (label[source] == label[here]) & (label[beside] == label[here])
-        gradient = (flat[beside] - flat[source]) * np.sign(stride)
-        total += np.where(sound[:, None], gradient, 0)
-        count += sound
-        expected = np.where(sound[:, None], flat[beside], own[here])
-        off = np.where(hole[here] & ~hole[there], np.abs(expected - flat[there]).max(-1), off)
-    step = np.where(count[:, None] > 0, total / np.maximum(count, 1)[:, None], own[second] - own[first])
+    total, count, off = np.zeros((len(first), flat.shape[1])), np.zeros((len(first), 1)), np.zeros(len(first))
+    for here, there, sign in ((first, second, 1), (second, first, -1)):
+        beside = np.clip(source[here] + there - here, 0, hole.size - 1)
+        # A source at the frame has its neighbour beyond it: in a row-major picture that is far away.
+        together = np.abs(beside % hole.shape[1] - source[here] % hole.shape[1]) <= 1
+        told = inside[here] & ~inside[beside] & together & (label[source[here]] == label[here])
+        told = (told & (label[beside] == label[here]))[:, None]
+        total += np.where(told, sign * (flat[beside] - flat[source[here]]), 0)
+        count += told
+        expected = np.where(told, flat[beside], own[here])
+        off = np.where(inside[here] & ~inside[there], np.abs(expected - flat[there]).max(-1), off)
+    step = np.where(count > 0, total / np.maximum(count, 1), own[second] - own[first])
     same = off <= alike  # what differs more is another thing, and says nothing about the level
     return first[same], second[same], step[same]
-
-
-def _solved(hole: Array, filled: Array, held: Array, first: Array, second: Array, step: Array) -> Array:
-    """[P, C] values of the hole's pixels, row-major, whose differences are `step` in the sense of least squares.
-
-    `held` [P] is how much they are kept to `filled` [H, W, C].
-    """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.linalg import splu
-
-    number = np.where(hole, np.cumsum(hole).reshape(hole.shape) - 1, -1).ravel()
-    flat = filled.reshape(hole.size, -1)
-    right = held[:, None] * flat[hole.ravel()]
-    rows, columns, entries = [], [], []
-    for here, there, wanted in ((first, second, -step), (second, first, step)):
-        inside = number[here] >= 0
-        here, there, wanted = number[here[inside]], there[inside], wanted[inside]
-        border = number[there] < 0
-        np.add.at(right, here, wanted + np.where(border[:, None], flat[there], 0))
-        rows += [here, here[~border]]
-        columns += [here, number[there[~border]]]
-        entries += [np.ones(len(here)), np.full(int((~border).sum()), -1.0)]
-    every = np.arange(len(right))
-    entries, rows, columns = [*entries, held], [*rows, every], [*columns, every]
-    places = np.concatenate(rows), np.concatenate(columns)
-    matrix = coo_matrix((np.concatenate(entries), places), (len(every),) * 2).tocsc()
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(right)

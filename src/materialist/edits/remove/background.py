@@ -1,0 +1,139 @@
+"""A picture of what is behind the object, given or made by a diffusion model (paper, Background Inpainting)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist.color import srgb_levels, srgb_to_linear
+from materialist.edits.core.renderer import EditRenderer, denoised
+from materialist.edits.remove.filling import Filling
+from materialist.edits.remove.native import laid, outline, resized
+from materialist.errors import InputError, SetupError, WeightsError
+from materialist.io.image import same_aspect
+from materialist.options import Removal
+from materialist.predict.weights import INSTEAD
+from materialist.types import Array, Materials, Photo, Scene
+
+Inpaint = Callable[[Array, Array], Array]
+"""inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
+DEFAULT = "stable-diffusion-v1-5/stable-diffusion-inpainting"
+PROMPT = "empty background, nothing there"
+LONGEST = 768
+"""Longer side at which the model works; it was trained at 512."""
+
+
+def given_picture(scene: Scene, options: Removal, hole: Array) -> tuple[Array | None, list[str]]:
+    """([h, w, 3] linear picture of what is behind a hole [H, W] bool, None for none; warnings of its file).
+
+    Raises InputError for a picture that is none of this view; see `inpainter`.
+    """
+    background, inpaint = options.background, options.inpaint
+    notes: list[str] = []
+    if background is not None and inpaint is not None:
+        raise InputError("Give a background or an inpainter, not both.")
+    if inpaint is not None:
+        if isinstance(inpaint, str):
+            inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
+        return np.asarray(inpaint(scene.photo.linear, hole), np.float32), notes
+    if background is None:
+        return None, notes
+    if isinstance(background, str | Path):
+        from materialist.io.photo import decode_photo
+
+        decoded = decode_photo(Path(background))
+        notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
+        background = decoded.over(1.0) * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
+    picture = np.asarray(background, np.float32)
+    if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, hole.shape):
+        raise InputError(
+            f"The background is {' x '.join(map(str, picture.shape[1::-1]))} pixels, the photo {hole.shape[1]} x "
+            f"{hole.shape[0]} at working size; give the same view at the same proportions."
+        )
+    if not (np.isfinite(picture).all() and picture.min() >= 0):
+        raise InputError("The background has negative or infinite values; give a linear or sRGB picture.")
+    return picture, notes
+
+
+def with_picture(scene: Scene, filling: Filling, picture: Array) -> tuple[Materials, Photo, Array]:
+    """Materials, photo and re-rendering with a picture [h, w, 3] linear in the hole.
+
+    A picture says nothing about shine: what it shows is matt. The albedo is a first guess, see `matched`.
+    """
+    hole, old = filling.hole, filling.materials(scene.materials)
+    rough = np.where(hole, np.maximum(old.roughness, 0.6), old.roughness).astype(np.float32)
+    metal = np.where(hole, 0, old.metallic).astype(np.float32)
+    albedo = np.where(hole[..., None], np.maximum(old.albedo, 0.05), old.albedo).astype(np.float32)
+    linear = np.where(hole[..., None], resized(picture, hole.shape), scene.photo.linear).astype(np.float32)
+    share = outline(hole, scene.photo.original.shape[:2])
+    original = laid(resized(picture, share.shape), share, scene.photo.original)
+    return Materials(albedo, rough, metal), replace(scene.photo, linear=linear, original=original), linear
+
+
+def matched(removed: Scene, hole: Array, picture: Array, fitted: Scene, *, spp: int = 24) -> Scene:
+    """The scene with the albedo in a hole [H, W] bool that makes it look like a picture [h, w, 3] in the fitted light.
+
+    A rendering says how far a guess is off; for a matt surface the radiance goes with the albedo.
+    """
+    known = replace(removed, envmap=fitted.envmap, lamps=fitted.lamps, bodies=fitted.bodies)
+    wanted = resized(picture, hole.shape)
+    for _ in range(3):
+        render, _ = EditRenderer(known).pair(known)
+        seen = denoised(render(spp, 1), removed.materials.albedo, removed.normal)
+        factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.1, 10)
+        albedo = np.where(hole[..., None], known.materials.albedo * factor, known.materials.albedo)
+        albedo = np.clip(albedo, 0.005, 1).astype(np.float32)
+        known = replace(known, materials=replace(known.materials, albedo=albedo))
+    return replace(removed, materials=known.materials)
+
+
+def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30) -> Inpaint:
+    """The inpainter that an option names: `sd:FOLDER` or `sd:owner/name`, or `sd` for the usual model.
+
+    Raises InputError for any other name; SetupError or WeightsError when the library or the model is not there.
+    """
+    kind, _, where = text.partition(":")
+    if kind != "sd":
+        raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
+    from materialist.predict import hub
+    from materialist.predict.device import on_gpu
+
+    gpu = on_gpu(device)
+    try:
+        folder, _ = hub.locate(where, DEFAULT)
+        pipeline = hub.pipeline(
+            "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",
+            safety_checker=None, requires_safety_checker=False,
+        )  # fmt: skip
+    except SetupError as error:
+        raise SetupError(
+            f"Inpainting by diffusion needs diffusers and transformers; install them with: {hub.INSTALL}, or leave "
+            "--inpaint out."
+        ) from error
+    except WeightsError as error:
+        # The hub's own sentence ends with advice about predictors.
+        raise WeightsError(str(error).replace(INSTEAD, "leave --inpaint out")) from error
+    return lambda photo, hole: _diffused(pipeline, photo, hole, seed=seed, steps=steps)
+
+
+def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int) -> Array:
+    """[H, W, 3] linear: a photo [H, W, 3] with the hole [H, W] bool filled by an inpainting pipeline of diffusers."""
+    import torch
+    from PIL import Image
+
+    height, width = hole.shape
+    unit = 8 * max(1, getattr(pipeline, "vae_scale_factor", 8) // 8)
+    scale = min(1.0, LONGEST / max(height, width))
+    w, h = (max(unit, round(n * scale / unit) * unit) for n in (width, height))
+    image = Image.fromarray(srgb_levels(photo)).resize((w, h), Image.Resampling.LANCZOS)
+    mask = Image.fromarray(hole.astype(np.uint8) * 255).resize((w, h), Image.Resampling.NEAREST)
+    out = pipeline(
+        prompt=PROMPT, image=image, mask_image=mask, height=h, width=w, num_inference_steps=steps,
+        generator=torch.Generator("cpu").manual_seed(seed), output_type="np",
+    ).images[0]  # fmt: skip
+    large = srgb_to_linear(np.clip(resized(np.asarray(out, np.float32), hole.shape), 0, 1))
+    return np.where(hole[..., None], large, photo).astype(np.float32)
