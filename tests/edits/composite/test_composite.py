@@ -161,7 +161,7 @@ def test_frames_that_are_alike_are_rendered_once(monkeypatch):
     asked = []
     scene = flat_scene()
     monkeypatch.setattr(composites, "render_layers", lambda _, edited, **__: asked.append(edited))
-    monkeypatch.setattr(composites, "_finished", lambda *_, **__: len(asked))
+    monkeypatch.setattr(composites, "into_photo", lambda *_: len(asked))
     a, b, c = (relight(scene, rotate=angle) for angle in (10, 20, 30))
     assert list(pictures(scene, [a, a, b, b, b, c])) == [1, 1, 2, 2, 2, 3]
     assert len(asked) == 3

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.composite.upsample import GuidedUpsample, matte, window
+from materialist.edits.composite.upsample import GuidedUpsample, matte
 
 
 def photo_of(mask, inside, outside):
@@ -93,10 +93,3 @@ def test_a_window_is_a_part_of_the_whole(factor):
     rows, columns = slice(4, 9), slice(7, 20)
     whole = guided(layer, members, slice(0, 20 * factor))
     np.testing.assert_array_equal(guided(layer, members, rows, columns), whole[rows, columns])
-
-
-def test_windows_hold_the_pixels_and_their_margin():
-    mask = np.zeros((10, 10), bool)
-    mask[3:5, 8] = True
-    assert window(mask, (40, 35)) == (slice(12, 20), slice(28, 32))
-    assert window(mask, (40, 35), 2) == (slice(4, 28), slice(21, 35))

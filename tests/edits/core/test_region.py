@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from made_meshes import box_file, floor_scene
 
-from materialist.edits.composite.composite import developed
 from materialist.edits.core.region import body_coverage
-from materialist.edits.core.renderer import EditRenderer, rendered
+from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.material.material import edit
@@ -59,12 +58,3 @@ def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
         edit(with_box, share > 0.5, hue=90)
     wide = np.ones(share.shape, bool)  # the floor around it, of which it hides a little
     assert edit(with_box, wide, hue=90) is not with_box
-
-
-def test_a_developed_scene_keeps_a_rendering_of_itself(scenes):
-    scene, _ = scenes
-    dark = replace(scene, envmap=0.25 * scene.envmap)
-    picture = rendered(dark, spp=16, seed=3)
-    found = developed(scene, dark, picture)
-    assert found.rerender.mean() == pytest.approx(0.25 * rendered(scene, spp=16).mean(), rel=0.02)
-    assert found.report.metrics["rerender_psnr_path"] > 25

@@ -80,15 +80,6 @@ def test_a_shadow_goes_with_the_object_unless_it_is_to_stay():
     assert found.painted[beside & ~found.gone].mean() > 0.7 and not kept.painted[beside & ~kept.gone].any()
 
 
-def test_a_small_part_that_is_surrounded_goes_and_a_handles_hole_stays():
-    mask = block_mask(120, 160)
-    holed = mask.copy()
-    holed[60:61, 60:62] = False
-    holed[45:55, 45:55] = False
-    found = make_hole(flat_scene(120, 160), holed, grow=0.0, shadow=0.0)
-    assert found.painted[60:61, 60:62].all() and not found.painted[48:52, 48:52].any()
-
-
 class TestContactShadow:
     """An orange box on a grey table that falls off to one side, with its shadow and its reflection."""
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from materialist.edits.remove.filling import find_filling
 from materialist.edits.remove.patches import copied, patch_sources
 from materialist.edits.remove.seamless import BlendSettings, seamless
-from materialist.types import Camera
 
 SHAPE = (40, 80)
 HOLE = np.zeros(SHAPE, bool)
@@ -114,18 +112,6 @@ def test_what_no_patch_fits_takes_what_is_next_to_it():
     assert found[hole].max() < 0.85, "nothing of the object is left"
 
 
-def test_parts_of_a_plane_that_do_not_reach_the_hole_are_other_surfaces():
-    """A strip behind the wall has the wall's label by accident, and is not copied."""
-    rng = np.random.default_rng(0)
-    picture = rng.uniform(0.4, 0.6, (64, 80, 3)).astype(np.float32)
-    label = np.zeros((64, 80), int)
-    label[:, 50:56] = 1
-    picture[:, 50:] = [0.9, 0.1, 0.1]
-    hole = hole_in(label.shape, 20, 26, 22, 20)
-    filling = find_filling(picture, picture, hole, label, np.full(label.shape, 2.0), Camera(80, 64, 40.0))
-    assert np.abs(copied(picture, filling.source)[hole] - 0.5).max() < 0.15
-
-
 def sources_from(shift):
     """Every pixel of the hole takes what is `shift` (rows, columns) away."""
     own = np.arange(HOLE.size).reshape(SHAPE)
@@ -137,14 +123,6 @@ ONE = np.zeros(SHAPE, int)
 
 def colours(picture):
     return np.repeat(np.asarray(picture, float)[..., None], 3, -1)
-
-
-def test_flat_pieces_take_the_level_of_the_border():
-    picture = np.full(SHAPE, 0.6)
-    picture[:, 41:] = 0.5
-    found = seamless(colours(picture), HOLE, sources_from((0, 22)), ONE)  # its pieces are 0.5
-    np.testing.assert_allclose(found[HOLE], 0.6, atol=0.01)
-    np.testing.assert_array_equal(found[~HOLE], colours(picture).astype(np.float32)[~HOLE])
 
 
 def test_light_that_falls_off_is_a_factor_of_the_pattern():

@@ -98,15 +98,6 @@ def test_what_does_not_repeat_gives_no_source():
         assert (sources(noisy, depth) < 0).all()
 
 
-def test_each_plane_has_its_own_pattern_and_loose_things_have_none():
-    depth, picture = slanted(chequers)
-    label = np.where(COLUMNS < 62, 0, 1)
-    found = sources(picture, depth, label=label)
-    told = found >= 0
-    assert told[HOLE].mean() > 0.8 and (label.ravel()[found[told]] == label[told]).all()
-    assert (sources(picture, depth, label=FLAT - 1) < 0).all()
-
-
 @pytest.mark.parametrize("size", [(1, 1), (1, 40), (96, 3), (90, 114)])
 def test_holes_of_any_shape_are_borne(size):
     depth, picture = slanted(chequers)

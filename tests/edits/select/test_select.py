@@ -28,12 +28,6 @@ def test_several_clicks_and_the_other_object(table):
     assert overlap(select(scene, click=[(50, 50), (60, 80)]), first) > 0.9
 
 
-def test_box(table):
-    scene, _, second = table
-    found = select(scene, box=(110, 65, 150, 105))
-    assert overlap(found, second) > 0.85 and not found[:60].any()
-
-
 def test_equal_calls_give_equal_masks(table):
     scene, *_ = table
     np.testing.assert_array_equal(select(scene, click=(50, 50)), select(scene, click=(50, 50)))
@@ -103,25 +97,9 @@ def test_the_network_is_believed_where_it_is_certain(table, monkeypatch, certain
     likely = np.where(half, 0.95 if certain else 0.55, 0.02 if certain else 0.4).astype(np.float32) * (first | half)
     assert (objects.certainty(likely) > 0.7) == certain
     monkeypatch.setattr(objects, "clicknet", lambda scene, points: likely)
-    monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: first)
-    monkeypatch.setattr(objects, "refined", lambda scene, rough, points, likely: rough)
+    monkeypatch.setattr(objects, "grabcut", lambda scene, label, **_: first)
     for found in (select(scene, box=around(half, 2)), select(scene, click=(45, 50))):
         assert overlap(found, half if certain else first) > 0.9
-
-
-def test_an_object_that_ends_outside_of_the_box_is_not_meant(table, monkeypatch):
-    scene, first, _ = table
-    monkeypatch.setattr(objects, "clicknet", lambda scene, points: np.ones(first.shape, np.float32))
-    box = around(first, 6)
-    np.testing.assert_array_equal(select(scene, box=box), select(scene, box=box, method="grabcut"))
-
-
-def test_an_object_that_does_not_fill_the_box_is_not_meant(table, monkeypatch):
-    scene, first, _ = table
-    speck = np.zeros(first.shape, np.float32)
-    speck[50:53, 50:53] = 1
-    monkeypatch.setattr(objects, "clicknet", lambda scene, points: speck)
-    assert overlap(select(scene, box=around(first, 0)), first) > 0.85
 
 
 def test_a_box_on_nothing_says_what_to_do(table, monkeypatch):

@@ -10,7 +10,7 @@ import numpy as np
 from materialist import metrics
 from materialist.edits.composite.emitters import in_photo
 from materialist.edits.composite.into_photo import into_photo
-from materialist.edits.composite.layers import Layers, render_layers
+from materialist.edits.composite.layers import render_layers
 from materialist.edits.composite.output import is_deep
 from materialist.edits.core.emitters import base_of, dimmed_emitters
 from materialist.edits.core.notes import PICTURED, is_pictured
@@ -58,13 +58,12 @@ def composite(
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
-    _check_rendered(edited, full_render)
     renderer = EditRenderer(compared(scene, edited), device=device)
-    if full_render:
-        picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
-        return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
-    layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
-    return _finished(renderer, edited, layers, dimmed_emitters(scene, edited))
+    options = {"spp": spp, "seed": seed, "denoise": denoise}
+    if not full_render:
+        return _in_photo(renderer, scene, edited, **options, progress=progress)
+    picture = full_rendering(renderer, edited, **options)
+    return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
 
 
 def pictures(
@@ -83,14 +82,13 @@ def pictures(
     for k, edited in enumerate(edits):
         tick("frames", k, total)
         if edited is not before:
-            _check_rendered(edited, full_render)
             if before is None or not _same_base(scene, before, edited):
                 renderer = EditRenderer(compared(scene, edited), device=device)
+            options = {"spp": spp, "seed": seed, "denoise": denoise}
             if full_render:
-                picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
+                picture = full_rendering(renderer, edited, **options)
             else:
-                layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise)
-                picture = _finished(renderer, edited, layers, dimmed_emitters(scene, edited))
+                picture = _in_photo(renderer, scene, edited, **options)
         before = edited
         yield picture
     tick("frames", total, total)
@@ -126,9 +124,12 @@ def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
     return one.photo is scene.photo or (one.geometry is other.geometry and one.materials is other.materials)
 
 
-def _finished(renderer: EditRenderer, edited: Scene, layers: Layers, dimmed: dict | None) -> Array:
-    """[H0, W0, 3] the composite of layers; `dimmed`: the entry of the provenance of in-photo emitters."""
-    photo = renderer.scene.photo
+def _in_photo(
+    renderer: EditRenderer, scene: Scene, edited: Scene, *, spp: int, seed: int, denoise: bool, progress=None
+) -> Array:
+    """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims."""
+    layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
+    photo, dimmed = renderer.scene.photo, dimmed_emitters(scene, edited)
     picture = into_photo(photo, layers)
     if not dimmed:
         return picture
@@ -136,13 +137,13 @@ def _finished(renderer: EditRenderer, edited: Scene, layers: Layers, dimmed: dic
     return in_photo(picture, photo, renderer.emitter_pixels(edited), dimmed, before)
 
 
-def _check_rendered(edited: Scene, full_render: bool) -> None:
-    if full_render and is_pictured(edited):
-        raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
-
-
 def full_rendering(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
-    """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo."""
+    """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo.
+
+    Raises InputError for glass of the two-interface model, which only the photo shows.
+    """
+    if is_pictured(edited):
+        raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
     picture = renderer.pair(edited)[1](spp, seed)
     return denoised(picture, *renderer.guides(edited)) if denoise else picture
 

@@ -74,7 +74,7 @@ def render_layers(
         changed = changed | covered
         covered = covered & ~renderer.emitter_pixels(edited)  # `emitters.in_photo` lays them on the photo
         if clean:
-            albedo, normal = renderer.body_guides(edited, anything)
+            albedo, normal = renderer.guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
     layers = difference(
         base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress,

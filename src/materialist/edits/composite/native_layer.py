@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.composite.upsample import matte
+from materialist.edits.composite.upsample import matte, nearest
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
 from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
 from materialist.types import Array, Body, Scene
@@ -64,70 +64,45 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
     every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
     """
+    from materialist.render.coverage import first_hits
+    from materialist.render.native import only, radiance
+
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
     if not is_relit(scene, edited):
         lamps = new_lamps(scene, edited)
     names = new_bodies(scene, edited) + lamps
-    return (
-        _traced(renderer.render_scene(renderer.lit(edited, edited)), scene, edited, names, spp, seed, clean)
-        if names
-        else None
-    )
-
-
-def _traced(
-    target: Any, scene: Scene, edited: Scene, names: list[str], spp: int, seed: int, clean: bool
-) -> NativeLayer | None:
-    """The named bodies of a `RenderScene` as a layer."""
-    from materialist.render.coverage import first_hits
-    from materialist.render.native import only, radiance
-
-    camera, native = scene.camera, scene.photo.original.shape[:2]
-    working = (camera.height, camera.width)
-    bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
-    bodies |= {f"lamp{k}": LAMP for k in range(len(edited.lamps))}
-    chosen = {name: bodies[name] for name in names}
-    small = first_hits(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1]))
-    if not small.share.any():
+    if not names:
         return None
-    box = _box(small.share, native)
+    target = renderer.render_scene(renderer.lit(edited, edited))
+    camera, native, working = scene.camera, scene.photo.original.shape[:2], scene.depth.shape
+    shapes = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+    chosen = {name: shapes.get(name, LAMP) for name in names}
+    small = first_hits(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1])).share
+    if not small.any():
+        return None
+    box = _box(small, native)
     sight = first_hits(target.mi_scene, camera, chosen, native, box)
     alone = first_hits(only(target.mi_scene, names), camera, chosen, native, box)
-    factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
-    size = (max(2, round(native[0] * factor)), max(2, round(native[1] * factor)))
-    part = _scaled(box, native, size)
+    # A lamp that touches a surface is cut by it, not hidden by a thing before it.
+    gap = (SETTINGS.lamp_contact if names == lamps else SETTINGS.contact) * _extent(alone)
+    size, part = _traced_size(native, box)
     # As many paths as a picture of working size has, on the part that the bodies take.
     pixels = (part[1] - part[0]) * (part[3] - part[2])
-    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * working[0] * working[1] // pixels))
-    # A lamp that touches a surface is cut by it, not hidden by a thing before it.
-    contact = SETTINGS.lamp_contact if all(name.startswith("lamp") for name in names) else SETTINGS.contact
-    gap = contact * _extent(alone)
+    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // pixels))
     depth = path_depth(edited)
-    options: dict[str, Any] = {"spp": paths, "seed": seed, "max_depth": depth, "names": names, "gap": gap}
-    picture = radiance(target, size, part, **options)
-    guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
-    picture = spread(picture)
+    picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names, gap=gap))
     if clean:
+        guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
         picture = denoised(picture, guide.albedo, guide.normal)
-    picture = _enlarged(picture, sight.share.shape)
-    share = np.zeros(native, np.float32)
-    whole = np.zeros((*native, 3), np.float32)
-    rows, columns = slice(*box[:2]), slice(*box[2:])
-    share[rows, columns] = _behind_things(sight, alone, scene, box, gap)
-    whole[rows, columns] = np.where(share[rows, columns, None] > 0, picture, 0)
-    bright = any(max(bodies[name].surface.emission) > 1 or name.startswith("lamp") for name in names)
-    return NativeLayer(_around(small.share) if bright else small.share, share, whole)
+    share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
+    there = slice(*box[:2]), slice(*box[2:])
+    share[there] = _behind_things(sight, alone, scene, there, gap)
+    whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
+    return NativeLayer(small, share, whole)
 
 
-def _around(share: Array) -> Array:
-    """Its largest value within a pixel: a corner of what glows, too small to be looked up, outshines its pixel."""
-    import cv2
-
-    return np.asarray(cv2.dilate(share, np.ones((3, 3), np.uint8)))
-
-
-def _box(share: Array, native: tuple[int, int]) -> tuple[int, int, int, int]:
+def _box(share: Array, native: tuple[int, ...]) -> tuple[int, int, int, int]:
     """The native rows and columns around what is covered at working size."""
     edges = []
     for axis in (0, 1):
@@ -140,46 +115,41 @@ def _box(share: Array, native: tuple[int, int]) -> tuple[int, int, int, int]:
     return edges[0], edges[1], edges[2], edges[3]
 
 
-def _scaled(box: tuple[int, int, int, int], native: tuple[int, int], size: tuple[int, int]):
-    """The box in a picture of another size."""
-    y, x = size[0] / native[0], size[1] / native[1]
+def _traced_size(native: tuple[int, ...], box: tuple[int, int, int, int]):
+    """Size of the picture that is traced, and the native box in it."""
+    factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
+    height, width = (max(2, round(n * factor)) for n in native)
+    y, x = height / native[0], width / native[1]
     top, left = int(box[0] * y), int(box[2] * x)
     bottom, right = max(top + 1, round(box[1] * y)), max(left + 1, round(box[3] * x))
-    return top, min(bottom, size[0]), left, min(right, size[1])
+    return (height, width), (top, min(bottom, height), left, min(right, width))
 
 
-def _enlarged(picture: Array, shape: tuple[int, int]) -> Array:
+def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Array:
     import cv2
 
-    if picture.shape[:2] == shape:
-        return picture
-    return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+    return np.asarray(cv2.resize(values, shape[1::-1], interpolation=getattr(cv2, f"INTER_{how}")))
 
 
-def _behind_things(
-    sight: Any, alone: Any, scene: Scene, box: tuple[int, int, int, int], gap: float
-) -> Array:  # fmt: skip
+def _behind_things(sight: Any, alone: Any, scene: Scene, there: tuple[slice, slice], gap: float) -> Array:
     """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands `gap` before them.
 
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
     """
     import cv2
 
-    native = scene.photo.original.shape[:2]
-    rows, columns = slice(*box[:2]), slice(*box[2:])
-    enlarge = lambda v: cv2.resize(v, native[::-1], interpolation=cv2.INTER_NEAREST)[rows, columns]  # noqa: E731
-    nearer = alone.depth - enlarge(scene.depth)
+    native, working = scene.photo.original.shape[:2], scene.depth.shape
+    nearer = alone.depth - _resized(scene.depth, native, "NEAREST")[there]
     hidden = (alone.share > sight.share + 0.05) & (nearer > gap)
     if not hidden.any():
         return sight.share
-    scale = max(native[0] / scene.depth.shape[0], 1.0)
-    kernel = np.ones((2 * int(np.ceil(2 * scale)) + 1,) * 2, np.uint8)
+    kernel = np.ones((2 * int(np.ceil(2 * max(native[0] / working[0], 1.0))) + 1,) * 2, np.uint8)
     near = cv2.dilate(hidden.astype(np.uint8), kernel) > 0
     whole = np.zeros(native, np.float32)
-    whole[rows, columns] = spread(alone.depth)
-    depth = spread(cv2.resize(whole, scene.depth.shape[::-1], interpolation=cv2.INTER_NEAREST))
+    whole[there] = spread(alone.depth)
+    depth = spread(_resized(whole, working, "NEAREST"))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
-    cut = alone.share * (1 - matte(thing, scene.photo.original)[rows, columns])
+    cut = alone.share * (1 - matte(thing, scene.photo.original)[there])
     return np.where(near, cut, sight.share).astype(np.float32)
 
 
@@ -193,9 +163,5 @@ def _extent(alone: Any) -> float:
 
 def spread(values: Array) -> Array:
     """[h, w] or [h, w, 3] with every 0 replaced by the nearest other value."""
-    from scipy import ndimage
-
-    none = values == 0 if values.ndim == 2 else (values == 0).all(-1)
-    if none.all():
-        return values
-    return values[tuple(ndimage.distance_transform_edt(none, return_distances=False, return_indices=True))]
+    known = values.reshape(*values.shape[:2], -1).any(-1)
+    return values[nearest(known)] if known.any() else values

@@ -24,8 +24,6 @@ class MatteSettings:
     """Working pixels from the mask's border up to which a matte may reach (derived: `near` and the mask's error)."""
     near: float = 2.5
     """Standard deviation of the windows of mean colours, working pixels; larger averages texture (tuned by eye)."""
-    coarse: float = 0.2
-    """Pixel of the grid of mean colours, in units of `near` (derived: a Gaussian is smooth over it)."""
     grain: float = 0.03
     """Standard deviation of an even surface's colour, sRGB-encoded, channels added (tuned by eye)."""
     apart: tuple[float, float] = (2.0, 5.0)
@@ -65,6 +63,14 @@ def window(mask: Array, native: tuple[int, int], margin: int = 0) -> tuple[slice
     return sides[0], sides[1]
 
 
+def nearest(mask: Array) -> tuple[Array, Array]:
+    """[H, W] row and column of the nearest pixel of a mask [H, W] bool, which is not empty."""
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    return rows, columns
+
+
 class GuidedUpsample:
     """Joint bilateral upsampling (Kopf et al. 2007), a strip of native rows at a time.
 
@@ -83,14 +89,10 @@ class GuidedUpsample:
     def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
         """[h, w, C] float32: `layer` [H, W, C] in a native window, from the working pixels `members` [H, W] bool.
 
-        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value, and the next ones take the
-        mean of those around.
+        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value, and others take the nearest.
         """
-        if self.same and members.all():
-            return layer[rows, columns].astype(np.float32)
         if self.same:
-            near = _blurred(layer, members)[rows, columns]
-            return np.where(members[rows, columns][..., None], layer[rows, columns], near).astype(np.float32)
+            return (layer[nearest(members)] if members.any() else 0 * layer)[rows, columns].astype(np.float32)
         here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
         native, working = self.large.shape[:2], members.shape
         y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], self.settings.radius)
@@ -154,8 +156,8 @@ def _shares(soft: Array, large: Array, scale: float, settings: MatteSettings = M
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     sure_in, sure_out = cv2.erode(soft, kernel) >= 0.999, cv2.dilate(soft, kernel) <= 0.001
     encoded = linear_to_srgb(large)
-    front, front_variance, known_front = _mean_of(encoded, sure_in, settings.near * scale, settings.coarse)
-    back, back_variance, known_back = _mean_of(encoded, sure_out, settings.near * scale, settings.coarse)
+    front, front_variance, known_front = _mean_of(encoded, sure_in, settings.near * scale)
+    back, back_variance, known_back = _mean_of(encoded, sure_out, settings.near * scale)
     line = front - back
     length = np.sqrt(np.maximum((line**2).sum(-1), 1e-6))
     place = ((encoded - back) * line).sum(-1) / length**2  # on the line: 0 is back, 1 front
@@ -174,37 +176,16 @@ def _ramp(values: Array, low: float, high: float) -> Array:
     return np.clip((values - low) / (high - low), 0, 1)
 
 
-def _mean_of(picture: Array, members: Array, sigma: float, coarse: float) -> tuple[Array, Array, Array]:
+def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
     """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
     import cv2
 
-    height, width = members.shape
-    # Means so wide are as good on a coarser grid, of pixels a fifth of sigma wide.
-    small = tuple(max(1, round(v / max(1.0, coarse * sigma))) for v in (width, height))
-    sigmas = [float(np.sqrt(max(sigma**2 / (v / s) ** 2 - (v > s) / 12, 0.1))) for v, s in zip((width, height), small)]
-    sizes = [2 * int(np.ceil(3 * v)) + 1 for v in sigmas]
-
-    def blurred(values: Array) -> Array:
-        shrunk = cv2.resize(values, small, interpolation=cv2.INTER_AREA)
-        shrunk = cv2.GaussianBlur(shrunk, sizes, sigmas[0], sigmaY=sigmas[1], borderType=cv2.BORDER_REFLECT)
-        return np.asarray(cv2.resize(shrunk, (width, height), interpolation=cv2.INTER_LINEAR))
-
+    blurred = lambda values: cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)
     mean = blurred(picture * weight[..., None]) / norm[..., None]
     square = blurred((picture**2).sum(-1) * weight) / norm
     return mean, np.maximum(square - (mean**2).sum(-1), 0), norm > 1e-5
-
-
-def _blurred(layer: Array, members: Array) -> Array:
-    """[H, W, C] mean of the members within two pixels; 0 where there is none."""
-    import cv2
-
-    weight = members.astype(np.float32)
-    parts = [
-        cv2.GaussianBlur(np.ascontiguousarray(c, np.float32) * weight, (5, 5), 1.0) for c in np.moveaxis(layer, -1, 0)
-    ]
-    return np.stack(parts, -1) / np.maximum(cv2.GaussianBlur(weight, (5, 5), 1.0), 1e-6)[..., None]
 
 
 def _taps(index: Array, native: int, working: int, radius: float) -> tuple[Array, Array]:

@@ -75,21 +75,14 @@ class EditRenderer:
         names = [f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(PHOTO_LIGHT)]
         return self._seen(edited, names) > 0.5 if names else np.zeros(edited.depth.shape, bool)
 
-    def body_coverage_in(self, scene: Scene, size: tuple[int, int], box: tuple[int, int, int, int]) -> Array:
-        """`body_coverage` in a box (top, bottom, left, right) of a picture of another size (H, W)."""
+    def guides(self, edited: Scene, covered: Array | None = None) -> tuple[Array, Array]:
+        """Albedo and normal [H, W, 3] of the edited scene for the denoiser.
+
+        Where `covered` [H, W] bool, by default wherever its bodies are seen, they are those of the bodies.
+        """
         from materialist.render.coverage import first_hits
 
-        bodies = {f"body{k}": body for k, body in enumerate(scene.bodies)}
-        return first_hits(self.render_scene(scene).mi_scene, scene.camera, bodies, size, box).share
-
-    def guides(self, edited: Scene) -> tuple[Array, Array]:
-        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, with those of its bodies."""
-        return self.body_guides(edited, self.body_coverage(edited) > 0)
-
-    def body_guides(self, edited: Scene, covered: Array) -> tuple[Array, Array]:
-        """Albedo and normal [H, W, 3] of the edited scene for the denoiser, where `covered` those of its bodies."""
-        from materialist.render.coverage import first_hits
-
+        covered = self.body_coverage(edited) > 0 if covered is None else covered
         if not covered.any():
             return edited.materials.albedo, edited.normal
         bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.edits.composite.upsample import nearest
 from materialist.types import Array
 
 
@@ -108,9 +109,8 @@ def _blurred(values: Array, known: Array, settings: ShadowSettings) -> Array:
 def _edges(logs: Array, gone: Array, settings: ShadowSettings) -> Array:
     """[H, W] bool: sharp steps of log radiance [H, W, 3], but for the outline of what is `gone`."""
     import cv2
-    from scipy.ndimage import distance_transform_edt
 
-    beside = logs[tuple(distance_transform_edt(gone, return_distances=False, return_indices=True))]
+    beside = logs[nearest(~gone)]
     soft = cv2.GaussianBlur(np.asarray(beside, np.float32), (0, 0), max(0.7, 0.002 * max(gone.shape)))
     down, right = np.gradient(soft, axis=(0, 1))
     return morphed(cv2.MORPH_DILATE, np.hypot(down, right).max(-1) > settings.edge, 1)

@@ -56,21 +56,5 @@ def find_filling(
     paint = linear_to_srgb(albedo)
     features = np.concatenate([paint, linear_to_srgb(photo)], -1)
     known = repeated_sources(paint, features, hole, usable, label, depth, camera)
-    label = _joined(label, hole)
     source = patch_sources(features, hole, usable, label, known=known, seed=seed)
     return Filling(hole, label, source, hole & (known >= 0))
-
-
-def _joined(label: Array, hole: Array) -> Array:
-    """Labels [H, W] int where parts of a plane that do not reach the hole [H, W] bool are surfaces of their own.
-
-    One plane may hold two things: the face of a die, and by accident a strip of the board behind it.
-    """
-    from skimage.measure import label as parts_of
-
-    out = label.copy()
-    for number in np.unique(label[hole & (label >= 0)]):
-        parts = parts_of(label == number, connectivity=2)
-        others = (parts > 0) & ~np.isin(parts, parts[hole])
-        out[others] = out.max() + parts[others]
-    return out

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edits.composite.upsample import nearest
 from materialist.edits.core.region import checked_region
 from materialist.edits.remove.contact_shadow import contact_shadow, morphed
 from materialist.errors import InputError
@@ -80,13 +81,12 @@ def make_hole(
 def _defocused(scene: Scene, own: Array, bodies: Array, settings: HoleSettings) -> Array:
     """[H, W] bool: the object as far as it colours its surroundings, but for what stands before it."""
     import cv2
-    from scipy.ndimage import distance_transform_edt
 
     bare = own & ~bodies
     if not bare.any():
         return own
     rim = morphed(cv2.MORPH_DILATE, bare, defocus_width(scene.photo.linear, bare, ~bodies, settings)) & ~bodies
-    depth = scene.depth[tuple(distance_transform_edt(~own, return_distances=False, return_indices=True))]
+    depth = scene.depth[nearest(own)]
     return rim & ((scene.depth == 0) | (scene.depth > settings.before * depth) | own)
 
 
@@ -107,9 +107,7 @@ def defocus_width(linear: Array, own: Array, usable: Array, settings: HoleSettin
     sides = distance_transform_edt(own) > settings.inside * longest, away > reach + 2
     if not (sides[0].any() and sides[1].any()):
         return 0
-    inner, outer = (
-        smooth[tuple(distance_transform_edt(~side, return_distances=False, return_indices=True))] for side in sides
-    )
+    inner, outer = (smooth[nearest(side)] for side in sides)
     length = ((inner - outer) ** 2).sum(-1)
     share = ((encoded - outer) * (inner - outer)).sum(-1) / np.maximum(length, 1e-6)
     for pixels in range(1, reach + 1):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.edits.composite.upsample import nearest
 from materialist.geometry.membrane import membrane
 from materialist.types import Array
 
@@ -55,8 +56,7 @@ def patch_sources(
     if not (found >= 0).any():
         return None
     # A piece may stick out of what may be copied: such pixels take the source of the nearest one.
-    nearest = _nearest(found >= 0)
-    return np.where(hole, found[nearest], np.arange(hole.size).reshape(hole.shape))
+    return np.where(hole, found[nearest(found >= 0)], np.arange(hole.size).reshape(hole.shape))
 
 
 def copied(maps: Array, source: Array) -> Array:
@@ -188,18 +188,11 @@ def _enlarged(source: Array, shape: tuple[int, ...], factor: float) -> Array:
         np.minimum((rows / factor).astype(int), source.shape[0] - 1),
         np.minimum((columns / factor).astype(int), source.shape[1] - 1),
     )
-    middle = tuple(v[small] for v in _nearest(source >= 0))
+    middle = tuple(v[small] for v in nearest(source >= 0))
     row, column = np.divmod(source[middle], source.shape[1])
     row = np.round((row - middle[0]) * factor).astype(int) + rows
     column = np.round((column - middle[1]) * factor).astype(int) + columns
     return np.clip(row, 0, shape[0] - 1) * shape[1] + np.clip(column, 0, shape[1] - 1)
-
-
-def _nearest(mask: Array) -> tuple[Array, ...]:
-    """[H, W] row and column of the nearest pixel of a mask [H, W] bool."""
-    from scipy.ndimage import distance_transform_edt
-
-    return tuple(distance_transform_edt(~mask, return_distances=False, return_indices=True))
 
 
 def _shrunk(maps: Array, factor: int) -> Array:

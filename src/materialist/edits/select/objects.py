@@ -1,4 +1,4 @@
-"""The object at clicks or in a box: ClickNet where it is certain, GrabCut alone elsewhere."""
+"""The object at clicks or in a box: ClickNet where it is certain, else GrabCut (Rother et al. 2004)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.color import linear_to_srgb
-from materialist.edits.select.grabcut import CERTAIN, POSSIBLE, PROBABLE, grabcut, overlap, refined, tidy
+from materialist.color import linear_to_srgb, srgb_levels
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
 """(x0, y0, x1, y1), the latter two beyond it."""
+POSSIBLE, PROBABLE, CERTAIN = 2, 3, 1
+"""GrabCut's labels (cv2.GC_PR_BGD, cv2.GC_PR_FGD, cv2.GC_FGD); 0 is background."""
 
 
 @dataclass(frozen=True)
@@ -21,20 +22,16 @@ class SelectSettings:
 
     certain: float = 0.7
     """Certainty (`certainty`) of ClickNet from which it decides; larger trusts it less (tuned on 125 clicks)."""
-    places: tuple[tuple[float, float], ...] = ((0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7))
-    """Places in a box, shares of its sides, at which ClickNet is asked for the object there (tuned by eye)."""
-    within: float = 0.8
-    """Share of an object that must lie in the box: a table's does not (tuned by eye)."""
     fills: float = 0.6
     """Overlap of an object's own box with the given one from which ClickNet's is taken (tuned by eye)."""
-    growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)
-    """Margins around a box that are tried until its object fills it, shares of its shorter side (tuned by eye)."""
     core: float = 0.01
     """Radius around a click that is certainly of the object, share of the longer side (tuned by eye)."""
     probable: float = 0.08
     """Radius around a click that GrabCut takes for the object at first; larger finds larger objects (54 clicks)."""
     possible: float = 0.24
     """Radius around a click beyond which GrabCut does not look (54 clicks)."""
+    gap: float = 0.015
+    """Half of the gap across which two parts are one, share of the longer side (tuned by eye)."""
 
 
 DEFAULT = SelectSettings()
@@ -47,7 +44,7 @@ def object_at(
     if network:
         likely = clicknet(scene, points)
         if certainty(likely) >= settings.certain:
-            return refined(scene, tidy(likely > 0.5, points), points, likely)
+            return tidy(likely > 0.5, points)
     return tidy(grabcut(scene, _around(scene, points, settings), rounds=5), points)
 
 
@@ -56,30 +53,21 @@ def object_in(scene: Scene, box: Box, *, network: bool = True, settings: SelectS
 
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
-    likely = _in_box(scene, box, settings) if network else np.zeros(scene.depth.shape, np.float32)
-    known = tidy(likely > 0.5, ())
-    if box_overlap(known, box) >= settings.fills and certainty(likely) >= settings.certain:
-        return known
-    best = known
-    for share in settings.growth:
-        more = round(share * min(box[2] - box[0], box[3] - box[1]))
-        label = np.zeros(scene.depth.shape, np.uint8)
-        label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = PROBABLE
-        best = max(tidy(grabcut(scene, label, rounds=5), ()), best, key=lambda mask: box_overlap(mask, box))
-        if box_overlap(best, box) >= settings.fills:
-            break
-    return best
+    x0, y0, x1, y1 = box
+    inside = np.zeros(scene.depth.shape, bool)
+    inside[y0:y1, x0:x1] = True
+    middle = ((x0 + x1) // 2, (y0 + y1) // 2)
+    if network and scene.depth[middle[::-1]] > 0:
+        likely = clicknet(scene, [middle])
+        known = tidy((likely > 0.5) & inside, [middle])
+        if certainty(likely) >= settings.certain and _overlap_of_boxes(likely > 0.5, inside) >= settings.fills:
+            return known
+    return tidy(grabcut(scene, np.where(inside, PROBABLE, 0).astype(np.uint8), rounds=5), ())
 
 
-def box_overlap(mask: Array, box: Box) -> float:
-    """Intersection over union of the bounding box of a mask [H, W] bool with a box; 0 for an empty mask."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    if not rows.size:
-        return 0.0
-    own, given = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
-    own[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = True
-    given[box[1] : box[3], box[0] : box[2]] = True
-    return overlap(own, given)
+def _overlap_of_boxes(mask: Array, box: Array) -> float:
+    """Intersection over union of the bounding box of a mask [H, W] bool with a box [H, W] bool; 0 for no mask."""
+    return overlap(np.outer(mask.any(1), mask.any(0)), box)
 
 
 def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
@@ -108,16 +96,49 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]], settings: SelectSet
     return label
 
 
-def _in_box(scene: Scene, box: Box, settings: SelectSettings) -> Array:
-    """[H, W] in [0, 1], 0 outside of the box: ClickNet's likelihood that a pixel is of an object in the box."""
-    x0, y0, x1, y1 = box
-    inside = np.zeros(scene.depth.shape, bool)
-    inside[y0:y1, x0:x1] = True
-    found = np.zeros(scene.depth.shape, np.float32)
-    for across, down in settings.places:
-        x, y = int(x0 + across * (x1 - x0)), int(y0 + down * (y1 - y0))
-        if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of an object that was found already
-            likely = clicknet(scene, [(x, y)])
-            if (likely * inside).sum() > settings.within * likely.sum():
-                found = np.maximum(found, likely * inside)
-    return found
+def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
+    """[H, W] bool from labels [H, W] uint8 (POSSIBLE, PROBABLE, CERTAIN or 0)."""
+    import cv2
+
+    ours = (label == CERTAIN) | (label == PROBABLE)
+    if not ours.any() or (label != CERTAIN).sum() < 16:
+        return ours
+    picture = np.ascontiguousarray(srgb_levels(scene.photo.linear[..., ::-1]))
+    labels = np.ascontiguousarray(label)
+    cv2.setRNGSeed(0)
+    try:
+        model = np.zeros((1, 65)), np.zeros((1, 65))  # GrabCut's colour models, filled by it
+        cv2.grabCut(picture, labels, (0, 0, 0, 0), *model, rounds, cv2.GC_INIT_WITH_MASK)
+    except cv2.error:  # too few pixels on one side for its colour model
+        return ours
+    return (labels == CERTAIN) | (labels == PROBABLE)
+
+
+def tidy(mask: Array, points: Sequence[tuple[int, int]], settings: SelectSettings = DEFAULT) -> Array:
+    """[H, W] bool: the parts of a mask that hold a point (column, row), with holes below 2 % filled.
+
+    Without points, or where no part holds one, all parts are kept that are not crumbs.
+    """
+    import cv2
+    from scipy import ndimage
+
+    radius = max(2, round(settings.gap * max(mask.shape)))
+    kernel, disc = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * r + 1,) * 2) for r in (1, radius))
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+    # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
+    closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0
+    parts, count = ndimage.label(opened | closed)
+    if count == 0:
+        return mask
+    sizes = np.bincount(parts.ravel())[1:]
+    keep = {int(parts[y, x]) for x, y in points if parts[y, x]}
+    keep = keep or set((np.flatnonzero(sizes >= 0.1 * sizes.max()) + 1).tolist())
+    kept = np.isin(parts, list(keep))
+    holes, count = ndimage.label(~kept)
+    sizes = np.bincount(holes.ravel())[1:]
+    return kept | np.isin(holes, np.flatnonzero(sizes < 0.02 * kept.sum()) + 1)
+
+
+def overlap(a: Array, b: Array) -> float:
+    """Intersection over union of two masks [H, W]."""
+    return float((a & b).sum() / max((a | b).sum(), 1))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.errors import SetupError
+from materialist.errors import SetupError, WeightsError
 from materialist.types import Array
 
 REPO = "facebook/sam2.1-hiera-tiny"
@@ -36,9 +36,16 @@ def segment(
     """
     import torch
 
+    from materialist.predict import hub
     from materialist.predict.device import on_gpu
 
-    model = load(where)
+    try:
+        from transformers import Sam2Model
+    except ImportError as error:
+        raise SetupError(
+            f"SAM 2 needs transformers ({error}); install it with: {hub.INSTALL}, or leave --with sam2 out."
+        ) from error
+    model = hub.load(Sam2Model, folder_of(where))
     target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
     side = int(model.config.vision_config.backbone_config.image_size[0])
@@ -57,23 +64,8 @@ def segment(
     return _best(output, height, width)
 
 
-def load(where: str) -> Any:
-    """The model, whole. Its own image processor needs a library that this project cannot have; see `_pixels`."""
-    from materialist.predict.hub import INSTALL
-    from materialist.predict.hub import load as whole
-
-    try:
-        from transformers import Sam2Model
-    except ImportError as error:
-        raise SetupError(
-            f"SAM 2 needs transformers ({error}); install it with: {INSTALL}, or leave --with sam2 out."
-        ) from error
-    return whole(Sam2Model, folder_of(where))
-
-
 def folder_of(where: str) -> Any:
     """The folder of a model or of a downloaded hub id. Raises WeightsError that says how to get it."""
-    from materialist.errors import WeightsError
     from materialist.predict.hub import locate
 
     try:
@@ -86,7 +78,10 @@ def folder_of(where: str) -> Any:
 
 
 def _pixels(linear: Array, side: int):
-    """[1, 3, side, side] normalised picture; stretched to a square, as the model was trained."""
+    """[1, 3, side, side] normalised picture; stretched to a square, as the model was trained.
+
+    The model's own image processor needs torchvision, which this project cannot have.
+    """
     import torch
 
     encoded = torch.from_numpy(linear_to_srgb(linear)).permute(2, 0, 1)[None]

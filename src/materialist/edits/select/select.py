@@ -41,8 +41,12 @@ def select(
         raise InputError("Give exactly one of a click, a box or a mask.")
     if method not in METHODS:
         raise InputError(f"The method is '{method}'; choose one of {', '.join(METHODS)}.")
+    if isinstance(mask, str | Path):
+        from materialist.io.image import read_mask
+
+        mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
     if mask is not None:
-        return _given(scene, mask)
+        return checked_region(scene, mask) > 0.5
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
     if method == "sam2":
@@ -58,14 +62,6 @@ def select(
         other = "draw the box a little larger" if frame is not None else "click another place on the object"
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
     return found
-
-
-def _given(scene: Scene, mask: Array | str | Path) -> Array:
-    if isinstance(mask, str | Path):
-        from materialist.io.image import read_mask
-
-        mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
-    return checked_region(scene, mask) > 0.5
 
 
 def _points(scene: Scene, click) -> list[tuple[int, int]]:
@@ -86,17 +82,14 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
 
 
 def _box(scene: Scene, box: Sequence[float]) -> Box:
+    """The box cut to the photo."""
     try:
         x0, y0, x1, y1 = (float(v) for v in box)
     except (TypeError, ValueError) as error:
         raise InputError(f"The box must be (x0, y0, x1, y1), not {box!r}.") from error
     width, height = scene.camera.width, scene.camera.height
-    left, right, top, bottom = (
-        max(0.0, min(x0, x1)),
-        min(width, max(x0, x1)),
-        max(0.0, min(y0, y1)),
-        min(height, max(y0, y1)),
-    )
+    left, right = np.clip(sorted((x0, x1)), 0, width)
+    top, bottom = np.clip(sorted((y0, y1)), 0, height)
     if not (right - left >= 3 and bottom - top >= 3):
         raise InputError(
             f"The box {x0:g},{y0:g},{x1:g},{y1:g} covers less than 3 x 3 pixels of the photo ({width} x {height})."
