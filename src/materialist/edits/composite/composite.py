@@ -59,10 +59,9 @@ def composite(
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     renderer = EditRenderer(compared(scene, edited), device=device)
-    options = {"spp": spp, "seed": seed, "denoise": denoise}
     if not full_render:
-        return _in_photo(renderer, scene, edited, **options, progress=progress)
-    picture = full_rendering(renderer, edited, **options)
+        return _in_photo(renderer, scene, edited, spp=spp, seed=seed, denoise=denoise, progress=progress)
+    picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
     return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
 
 
@@ -84,11 +83,10 @@ def pictures(
         if edited is not before:
             if before is None or not _same_base(scene, before, edited):
                 renderer = EditRenderer(compared(scene, edited), device=device)
-            options = {"spp": spp, "seed": seed, "denoise": denoise}
             if full_render:
-                picture = full_rendering(renderer, edited, **options)
+                picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
             else:
-                picture = _in_photo(renderer, scene, edited, **options)
+                picture = _in_photo(renderer, scene, edited, spp=spp, seed=seed, denoise=denoise)
         before = edited
         yield picture
     tick("frames", total, total)

@@ -64,6 +64,8 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
     every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
     """
+    import cv2
+
     from materialist.render.coverage import first_hits
     from materialist.render.native import only, radiance
 
@@ -99,6 +101,9 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     there = slice(*box[:2]), slice(*box[2:])
     share[there] = _behind_things(sight, alone, scene, there, gap)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
+    if lamps or any(max(body.surface.emission) > 1 for body in chosen.values()):
+        # A corner of what glows that is too small to be met by a ray outshines its pixel.
+        small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
     return NativeLayer(small, share, whole)
 
 
@@ -163,5 +168,5 @@ def _extent(alone: Any) -> float:
 
 def spread(values: Array) -> Array:
     """[h, w] or [h, w, 3] with every 0 replaced by the nearest other value."""
-    known = values.reshape(*values.shape[:2], -1).any(-1)
+    known = np.asarray(values.reshape(*values.shape[:2], -1).any(-1))
     return values[nearest(known)] if known.any() else values

@@ -46,7 +46,9 @@ def seamless(
     first, second, step = _steps(values, hole, source, label, settings.alike)
     # Differences of unknowns, `matrix` [N, P], are the steps less what is known of them.
     number = np.where(hole, np.cumsum(hole).reshape(hole.shape) - 1, -1).ravel()
-    rows, columns, signs = [], [], []
+    rows: list[Array] = []
+    columns: list[Array] = []
+    signs: list[Array] = []
     for pixels, sign in ((second, 1.0), (first, -1.0)):
         inside = number[pixels] >= 0
         rows, columns = [*rows, np.flatnonzero(inside)], [*columns, number[pixels[inside]]]
