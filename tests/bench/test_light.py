@@ -38,17 +38,8 @@ def test_without_materials_the_paper_s_neutral_ones_are_given(sample, monkeypatc
 
 
 def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
-    out = bench.run(
-        "light",
-        output=tmp_path / "out",
-        scenes=1,
-        lights=1,
-        size=24,
-        spp=16,
-        methods="default",
-        relight=False,
-        device="cpu",
-    )
+    options = {"scenes": 1, "lights": 1, "size": 24, "spp": 16, "methods": "default", "relight": False}
+    out = bench.run("light", output=tmp_path / "out", device="cpu", **options)
     rows = json.loads((out / "report.json").read_text())["rows"]
     assert [r["method"] for r in rows] == ["default"]
     assert {c.key for c in light.LightBench.columns} - set(rows[0]) == {"relit_psnr", "albedo_l1"}

@@ -9,7 +9,7 @@ import torch
 
 from materialist import bench
 from materialist.bench import materials
-from materialist.bench.predictor import forward, milliseconds
+from materialist.bench.predictor import forward
 from materialist.bench.report import Report
 from materialist.color import linear_to_srgb
 from materialist.io.exr import write_exr
@@ -84,13 +84,6 @@ def test_lpips_is_left_out_where_it_is_not_installed():
     assert found is None or found == pytest.approx(0, abs=1e-4)
 
 
-def test_times_of_a_known_wait():
-    calls = []
-    found = milliseconds(lambda: calls.append(sum(range(2000))), warmups=3, runs=5)
-    assert len(calls) == 8
-    assert 0 < found["fastest_ms"] <= found["median_ms"] and found["fastest_ms"] <= found["mean_ms"]
-
-
 def test_the_forward_pass_alone():
     tiny = BundledArchitecture((8, 8, 16, 32), (1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
     seen = []
@@ -104,4 +97,4 @@ def test_the_forward_pass_alone():
 def test_the_benchmark_of_time(tmp_path):
     bench.run("predictor", output=tmp_path / "report", predictor="constant", size=48, warmups=1, runs=2)
     rows = json.loads((tmp_path / "report" / "report.json").read_text())["rows"]
-    assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["median_ms"] > 0
+    assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["mean_ms"] >= rows[0]["fastest_ms"] > 0

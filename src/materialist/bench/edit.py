@@ -1,7 +1,5 @@
 """`bench edit`: the fidelity of edits on synthetic photographs whose true edited picture is known.
 
-The paper shows its edits (sections "Material Editing", "Object insertion and relighting") without such figures.
-
 Synthetic photographs are fitted, edited and compared with the true scene, rendered after the same edit; PSNR on
 sRGB-encoded, clipped pictures. `hue` turns the largest object's albedo by 120 degrees, `metal` makes it copper
 (roughness 0.3), `relight` shows the photo under another light, `insert` puts a cup on the floor. Inside is the edited

@@ -1,8 +1,8 @@
 """`bench materials`: how good a predictor's maps are (paper, Table 1).
 
-Data: a set of `materialist train data`, InteriorVerse, or any folder of photos with true maps. Pictures are given to
-the predictor as photographs (clipped to [0, 1]; the procedural ones with tone, noise, blur and JPEG, unless
-`photographic` is off), with their true field of view.
+Data: a set of `materialist train data`, InteriorVerse, or a folder with photo.* and true maps in maps/, or of such
+folders. Pictures are given to the predictor as photographs (clipped to [0, 1]; the procedural ones with tone, noise,
+blur and JPEG, unless `photographic` is off), with their true field of view.
 
 Pixels with a true surface count. Albedo: sRGB-encoded, clipped to [0, 1], after one factor a picture (least squares of
 linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]; `pooled` is the PSNR of the mean
