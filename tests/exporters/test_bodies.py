@@ -11,7 +11,7 @@ from export_scenes import load_xml, room
 
 from materialist.edits.core.surfaces import uniform_surface
 from materialist.exporters.glb import glb_bytes
-from materialist.exporters.parts import body_parts, one_roughness, scene_parts
+from materialist.exporters.parts import body_parts, scene_parts
 from materialist.exporters.run import export
 from materialist.io.exr import read_exr
 from materialist.types import Body, Lamp, Scene, Surface
@@ -71,38 +71,6 @@ def test_glass_of_a_glb_has_the_mean_way_through_it():
     assert thick == pytest.approx(0.8, rel=0.02) and "KHR_materials_volume" in content["extensionsUsed"]
 
 
-def test_glb_colours_coated_glass_by_the_mean_of_tint_and_albedo():
-    glass = uniform_surface(0.2, 0.2, 0.0, transmission=0.75, ior=1.4, tint=(1.0, 0.6, 0.2))
-    material = document(with_bodies(glass))["materials"][-1]
-    expected = 0.25 * 0.2 + 0.75 * np.array([1.0, 0.6, 0.2])
-    np.testing.assert_allclose(material["pbrMetallicRoughness"]["baseColorFactor"][:3], expected, rtol=1e-5)
-
-
-def test_clear_glass_keeps_no_texture_of_what_it_was():
-    clear = replace(CHECKS, transmission=1.0, tint=(0.5, 1.0, 0.5))
-    content = document(with_bodies(clear))
-    assert content["materials"][-1]["pbrMetallicRoughness"]["baseColorFactor"][:3] == [0.5, 1.0, 0.5]
-    assert len(content["images"]) == len(document(room())["images"])
-
-
-def test_the_page_shows_bodies_without_the_continued_planes():
-    from materialist.exporters.page import _packed
-
-    scene = with_bodies(CHECKS)
-    parts = [*scene_parts(scene), *body_parts(scene)]
-    packed = _packed(scene.camera, scene.depth, parts)
-    assert len(parts) > 2 and packed["surface"] == 3 * (len(parts[0].mesh.faces) + 2) < packed["all"]
-
-
-@pytest.mark.parametrize("to", ["mitsuba", "usd", "blend"])
-def test_numbers_of_numpy_are_numbers(tmp_path, to):
-    lamp = Lamp(tuple(np.float32([0, 0.5, -2])), tuple(np.float32([1, 2, 3])), np.float32(0.05))
-    scene = replace(room(), lamps=(lamp,), camera=replace(room().camera, fov=np.float64(40.0)))
-    done = export(scene, tmp_path / "a", to=to)
-    if to == "mitsuba":
-        assert "np." not in done.path.read_text()
-
-
 def test_trimesh_reads_the_bodies_back(tmp_path):
     import trimesh
 
@@ -116,12 +84,6 @@ def test_trimesh_reads_the_bodies_back(tmp_path):
 
 
 GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
-
-
-def test_glb_has_light_that_is_given_off():
-    material = document(with_bodies(GLOW))["materials"][-1]
-    np.testing.assert_allclose(material["emissiveFactor"], [1, 0.5, 0.25])
-    assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 3
 
 
 @pytest.mark.parametrize(
@@ -192,15 +154,6 @@ def test_usd_gets_textures_and_says_that_nothing_refracts(tmp_path):
     assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(1.4)
 
 
-def test_the_page_has_a_texture_s_colours_at_the_vertices():
-    from materialist.exporters.page import _vertices
-
-    (part,) = body_parts(with_bodies(CHECKS))
-    inside = replace(part.mesh, uv=np.float32([[0.25, 0.25], [0.75, 0.25], [1.25, -0.25], [0.75, 0.75]]))
-    colours = _vertices(replace(part, mesh=inside))["colour"]
-    np.testing.assert_array_equal(colours / 255, [[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]])
-
-
 LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)
 
 
@@ -246,13 +199,6 @@ def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
     assert caught(saved, "b") == ["body0"]
     older = replace(scene, report=replace(scene.report, stages=({"name": "edit", "edits": []},)))
     assert caught(older, "c") == ["body0", "body1"]
-
-
-def test_glass_and_its_film_share_one_roughness_where_a_format_has_one():
-    coated = replace(CHECKS, roughness=np.full((1, 1), 0.8, np.float32), transmission=0.75, glass_roughness=0.0)
-    (part,) = body_parts(with_bodies(coated))
-    np.testing.assert_allclose(part.materials.roughness, 0.8)
-    np.testing.assert_allclose(one_roughness(part).roughness, 0.2, atol=1e-6)
 
 
 def test_maps_of_several_sizes_are_brought_to_one():

@@ -27,15 +27,6 @@ def test_parts_are_the_whole_mesh():
         )
 
 
-def test_a_plane_without_pixels_is_neutral():
-    scene = room()
-    label = np.where(scene.geometry.plane_label == 0, -1, scene.geometry.plane_label).astype(np.int8)
-    from dataclasses import replace
-
-    plane = scene_parts(replace(scene, geometry=Geometry(scene.geometry.mesh, label)))[1]
-    assert plane.materials.albedo[0, 0].tolist() == [0.5, 0.5, 0.5] and plane.materials.metallic[0, 0] == 0
-
-
 @pytest.mark.parametrize("most", [400, 1500, 5000])
 def test_fewer_triangles_on_the_same_frame(most):
     scene = room()
@@ -50,12 +41,6 @@ def test_fewer_triangles_on_the_same_frame(most):
     assert np.abs(pixels.min(0)).max() < 0.01 and np.abs(pixels.max(0) - (64, 40)).max() < 0.01
     distance = np.abs(pixels - surface.uv * (64, 40)).max(1)
     assert np.median(distance) < 0.01
-
-
-def test_enough_triangles_change_nothing():
-    scene = room()
-    same = scene_parts(scene, len(scene.geometry.mesh.faces))[0].mesh
-    np.testing.assert_array_equal(same.vertices, scene_parts(scene)[0].mesh.vertices)
 
 
 def test_bad_input():

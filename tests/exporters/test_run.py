@@ -1,9 +1,6 @@
 """The public function and the command."""
 
 import json
-import subprocess
-import sys
-from dataclasses import replace
 
 import pytest
 from export_scenes import room
@@ -12,7 +9,6 @@ import materialist as mt
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
 from materialist.io.package import save_scene
-from materialist.types import Lamp
 
 
 @pytest.fixture(scope="module")
@@ -38,21 +34,6 @@ def test_formats(tmp_path, name, to, message):
     with pytest.raises(mt.InputError, match=message):
         mt.export(room(), tmp_path / name, to=to)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_options_of_blender_go_with_blender(tmp_path):
-    with pytest.raises(mt.InputError, match="format glb"):
-        mt.export(room(), tmp_path / "a.glb", shadow_catcher=True)
-
-
-def test_lamps_that_a_format_lacks_are_told(tmp_path):
-    lit = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (3.0, 2.0, 1.0), 0.05),))
-    assert any("none of the scene's 1 lamp" in note for note in mt.export(lit, tmp_path / "a.html").notes)
-    assert not any("none of the scene" in note for note in mt.export(lit, tmp_path / "b", to="mitsuba").notes)
-
-
-def test_a_folder_may_have_a_dot_in_its_name(tmp_path):
-    assert mt.export(room(), tmp_path / "room.v2", to="mitsuba").path == tmp_path / "room.v2" / "scene.xml"
 
 
 def test_only_an_earlier_export_is_replaced(tmp_path):
@@ -83,12 +64,6 @@ def test_the_page_is_reduced_unless_asked_otherwise(tmp_path, monkeypatch):
     assert small < whole - 20_000
 
 
-def test_the_public_name_after_an_import_of_the_package():
-    code = "import materialist.exporters.parts, materialist as mt; mt.export(None, 'x.obj')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert "InputError: x.obj does not say its format" in done.stderr
-
-
 def test_command(package, tmp_path, capsys):
     target = tmp_path / "room.glb"
     arguments = ["export", str(package), "--to", "glb", "-o", str(target), "--json"]
@@ -110,6 +85,7 @@ def test_command_with_bad_input(package, tmp_path, capsys):
         ["export", str(package), "--to", "html", "-o", out, "--max-triangles", "5"],
         ["export", str(package), "--to", "glb", "-o", out],
         ["export", str(package), "--to", "vrml", "-o", out],
+        ["export", str(package), "--to", "html", "-o", out, "--shadow-catcher"],
     ):
         assert run_to_exit_code(app, arguments) == 2
         assert capsys.readouterr().err

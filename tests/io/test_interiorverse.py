@@ -84,11 +84,6 @@ def test_one_part_alone_and_what_is_wrong(folder):
         InteriorVerse(folder).read(0)
 
 
-def test_procedural_sets_are_still_told_apart(folder):
-    made_samples.write_set(folder, 1)
-    assert len(open_source(folder)) == 1
-
-
 def test_what_is_lost_is_told(folder):
     (folder / "dataset_85" / "L3D1" / "001_albedo.exr").unlink()
     source = InteriorVerse(folder)

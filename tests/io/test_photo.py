@@ -237,13 +237,6 @@ def test_matrix_profile_agrees_with_lcms(shared):
     assert np.abs(linear_to_srgb(photo.linear) - np.asarray(twin) / 255).mean() < 0.004
 
 
-def test_grey_profile_and_unusable_profile(tmp_path):
-    pixels = picture()
-    photo = read_photo(save(tmp_path / "a.png", pixels, icc_profile=b"nonsense" * 40))
-    np.testing.assert_allclose(photo.linear, linear8(pixels), atol=1e-6)
-    assert any("profile" in warning for warning in photo.warnings)
-
-
 def test_fov_option_wins_and_must_make_sense(tmp_path):
     path = save(tmp_path / "a.png", picture())
     photo = read_photo(path, fov=71.5)
@@ -379,18 +372,6 @@ def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(39.598, abs=0.01)
 
 
-def test_places_that_cannot_be_asked_for(tmp_path):
-    from materialist.errors import InputError, SceneError
-    from materialist.io.package import load_scene
-    from materialist.io.photo import read_photo
-
-    name = tmp_path / ("x" * 300)
-    with pytest.raises(InputError, match="cannot be read: file name too long"):
-        read_photo(str(name))
-    with pytest.raises(SceneError, match="cannot be read: file name too long"):
-        load_scene(name)
-
-
 @pytest.mark.parametrize("mode", ["L", "RGBA", "CMYK", "RGB"])
 def test_turned_tiffs_are_upright(tmp_path, mode):
     """Pillow maps some of them into memory, and gets the rows of turned ones wrong."""
@@ -424,15 +405,6 @@ def test_float_tiffs_with_channels_apart_are_refused(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", np.zeros((3, 12, 16), np.float32), photometric="rgb", planarconfig="separate")
     with pytest.raises(InputError, match="one after the other"):
         decode_photo(tmp_path / "a.tif")
-
-
-def test_a_part_of_a_frame_is_told(tmp_path):
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, "pixelAspectRatio": 2.0,
-              "displayWindow": (np.array([0, 0], np.int32), np.array([99, 49], np.int32))}  # fmt: skip
-    with OpenEXR.File(header, {"RGB": np.full((20, 30, 3), 0.5, np.float32)}) as file:
-        file.write(str(tmp_path / "a.exr"))
-    told = " ".join(decode_photo(tmp_path / "a.exr").warnings)
-    assert "a part of its frame" in told and "not square" in told
 
 
 @pytest.mark.parametrize("size", [16, 48, 400])

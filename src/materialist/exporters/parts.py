@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -88,11 +90,10 @@ def _one_size(surface: Surface) -> Materials:
 
 def _mean(materials: Materials, members: Array) -> Materials:
     """[1, 1] mean of the maps over the pixels [H, W] of a plane."""
-    values = _NEUTRAL
+    values: Iterable[Any] = _NEUTRAL
     if members.any():
         values = [maps[members].mean(0, dtype=np.float64) for maps in vars(materials).values()]
-    albedo, roughness, metallic = (np.float32(value)[None, None] for value in values)
-    return Materials(albedo, roughness, metallic)
+    return Materials(*(np.asarray(value, np.float32)[None, None] for value in values))
 
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:

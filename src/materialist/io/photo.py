@@ -41,7 +41,7 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
     """
     wanted = InvertOptions(size=size, fov="auto" if fov is None else fov)
-    angle = None if wanted.fov == "auto" else float(wanted.fov)
+    angle = None if wanted.fov == "auto" else float(wanted.fov)  # type: ignore[arg-type]
     name = str(path)
     file = example_path(name) if name.startswith(PREFIX) else Path(path)
     decoded = decode_photo(file)
