@@ -230,29 +230,24 @@ def levelled(envmap: Array) -> Array:
 def sky(rng: np.random.Generator) -> Array:
     """[ROWS, 2 ROWS, 3]: clear, cloudy, overcast or dusk, with or without a sun, over ground."""
     d = directions(ROWS)
-    y = d[..., 1:2]
-    elevation, azimuth = np.radians(rng.uniform(4, 70)), rng.uniform(-np.pi, np.pi)
+    y, up = d[..., 1:2], np.clip(d[..., 1:2], 0, 1)
+    elevation = np.radians(rng.uniform(4, 70))
     low = np.clip(1 - elevation / 0.6, 0, 1)
-    sun = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), -np.cos(elevation) * np.cos(azimuth)])
+    away = np.arccos(np.clip(d @ _axis(rng.uniform(-np.pi, np.pi), elevation), -1, 1))[..., None]
     zenith = np.array([0.18, 0.36, 0.85]) * rng.uniform(0.7, 1.2) * (1 - 0.5 * low)
     horizon = np.array([0.75, 0.85, 1.0]) * (1 - low) + np.array([1.0, 0.75, 0.5]) * low
-    towards = np.clip(d @ sun, -1, 1)[..., None]
-    base = horizon + (zenith - horizon) * np.clip(y, 0, 1) ** rng.uniform(0.35, 0.7)
-    base = base + np.array([1.0, 0.8, 0.55]) * np.exp(-np.arccos(towards) / rng.uniform(0.1, 0.5)) * rng.uniform(
-        0.2, 1.5
-    )
+    halo = np.array([1.0, 0.8, 0.55]) * np.exp(-away / rng.uniform(0.1, 0.5)) * rng.uniform(0.2, 1.5)
+    clear = horizon + (zenith - horizon) * up ** rng.uniform(0.35, 0.7) + halo
     cover = rng.choice([0.0, rng.uniform(0.2, 0.7), 1.0], p=[0.3, 0.4, 0.3])
     cloud = _clouds(rng, d, cover)
-    white = rng.uniform(0.6, 1.3) * (0.6 + 0.5 * np.clip(y, 0, 1)) * np.array([0.97, 0.98, 1.02])
-    total = base * (1 - cloud) + white * cloud
+    total = clear * (1 - cloud) + rng.uniform(0.6, 1.3) * (0.6 + 0.5 * up) * cloud
     ground = np.array([0.35, 0.3, 0.22]) * rng.uniform(0.2, 1.0) * rng.uniform(0.8, 1.2, 3)
     total = np.where(y < 0, ground * (0.6 + 0.4 * np.clip(1 + y, 0, 1)), total)
     if cover < 1 and rng.random() < 0.85:
         colour = np.array([1.0, 0.93, 0.8]) * (1 - low) + np.array([1.0, 0.55, 0.25]) * low
         radius = np.radians(rng.uniform(0.6, 2.0))
         power = rng.uniform(1.0, 5.0) * (1 - 0.7 * low)  # irradiance, where the sky gives about 2
-        disc = np.clip((radius + 0.005 - np.arccos(towards)) / 0.01, 0, 1)
-        total = total + disc * colour * power / (np.pi * radius**2)
+        total = total + np.clip((radius + 0.005 - away) / 0.01, 0, 1) * colour * power / (np.pi * radius**2)
     return np.maximum(total, 0).astype(np.float32)
 
 

@@ -93,9 +93,6 @@ def shade(rng: np.random.Generator, shades: tuple[Shade, ...] = ANY_COLOUR) -> C
     return hsv(*(rng.uniform(*r) for r in ranges))
 
 
-any_colour: Callable[[np.random.Generator], Colour] = shade
-
-
 @dataclass(frozen=True)
 class Finish:
     """A family of materials as ranges; a call draws one of them."""
@@ -158,15 +155,13 @@ wallpaper = Finish(
     "ornament ornament ornament stripes stripes spots plaid", ((1, ALL, (0.02, 0.5), (0.4, 0.95)),), (0.7, 0.5, 0.95),
     rougher=(0.2, 0.2), repeat=(0.4, 1.5),
 )  # fmt: skip
-white_paint = Finish(
-    "plain", ((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), (1, 1, 1), (1, 1, 1), (0, 0.05), ((1, 0.2, 0.6),)
-)
 lacquer = Finish("plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),))
 """Of any colour, dull or shiny."""
-rubber = Finish("plain", ((1, ALL, (0, 0.05), (0.05, 0.3)),), (1, 1, 1), (1, 1, 1), (0, 0.2), ((1, 0.5, 0.9),))
-card = Finish(
-    "plain", ((1, (0.07, 0.1), (0.3, 0.55), (0.45, 0.75)),), (1, 1, 1), (1, 1, 1), (0, 0.2), ((1, 0.7, 0.95),)
-)
+rubber = replace(lacquer, base=((1, ALL, (0, 0.05), (0.05, 0.3)),), roughness=((1, 0.5, 0.9),))
+card = replace(lacquer, base=((1, (0.07, 0.1), (0.3, 0.55), (0.45, 0.75)),), roughness=((1, 0.7, 0.95),))
+skin = replace(lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),))
+white_paint = replace(lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),))
+plastic = replace(lacquer, base=(*ANY_COLOUR, (1, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT)
 raw_wood = Finish(
     "wood", TIMBER, (1, 0.35, 0.75), (1, 0.15, 0.4), (0.1, 0.5), ((1, 0.4, 0.8),), (0.2, 0.2), (0.5, 1.4), (1, 2)
 )
@@ -193,16 +188,13 @@ ceramic = Finish(
     roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)), repeat=(0.1, 0.5), quarter=True,
 )  # fmt: skip
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
-plastic = Finish(
-    "plain", (*ANY_COLOUR, (1, ALL, (0.6, 1), (0.3, 0.95))), (1, 1, 1), (1, 1, 1), (0, 0.08), SHINY_OR_MATT
-)
 foliage = Finish(
-    "leaf", ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))), (1, 0.5, 1.3),
-    (1, 1.0, 1.6), (0.2, 0.6), ((1, 0.35, 0.7),), repeat=(0.1, 0.3),
+    "cloudy", ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))),
+    (1, 0.5, 1.3), (1, 1.0, 1.6), (0.2, 0.6), ((1, 0.35, 0.7),), repeat=(0.1, 0.3),
 )  # fmt: skip
 """Leaves, fresh or autumnal."""
 paved = Finish(
-    "speckle speckle paving paving cloudy bricks tiling", EARTH, (1, 0.55, 1.1), (0.8, 0.35, 0.8), (0.3, 1.1),
+    "speckle speckle bricks bricks cloudy tiling tiling", EARTH, (1, 0.55, 1.1), (0.8, 0.35, 0.8), (0.3, 1.1),
     ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)), (0.1, 0.1), (1, 4),
 )  # fmt: skip
 grass = replace(paved, tiles="grass", base=((1, (0.14, 0.34), (0.3, 0.7), (0.25, 0.6)),), roughness=((1, 0.7, 1.0),))
@@ -211,9 +203,6 @@ facade = Finish(
     ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),), (0.1, 0.5), ((1, 0.7, 0.95),), (-0.8, -0.5), (5, 12),
 )  # fmt: skip
 """House front with rows of dark or mirroring windows, which are smoother than the wall."""
-skin = Finish(
-    "plain", ((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), (1, 1, 1), (1, 1, 1), (0.1, 0.1), ((1, 0.4, 0.65),)
-)
 
 METALS = ((0.91, 0.90, 0.88), (0.62, 0.61, 0.60), (0.95, 0.78, 0.36), (0.93, 0.65, 0.52), (0.78, 0.68, 0.46),
           (0.45, 0.44, 0.43))  # fmt: skip

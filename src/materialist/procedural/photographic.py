@@ -47,20 +47,12 @@ def white_balanced(image: Array, rng: np.random.Generator) -> Array:
 
 
 def _blurred(image: Array, rng: np.random.Generator) -> Array:
-    """Lens and scaling: none, a little softness, or now and then some shake; at times sharpened again."""
+    """Lens and scaling: none or a little softness; at times sharpened again."""
     import cv2
 
-    kind = rng.random()
-    if kind < 0.3:
+    if rng.random() < 0.3:
         return image
-    if kind < 0.92:
-        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.25, 0.9))
-    else:
-        length, angle = int(rng.integers(2, 5)), rng.uniform(0, np.pi)
-        kernel = np.zeros((9, 9), np.float32)
-        for t in np.linspace(-length / 2, length / 2, 9):
-            kernel[round(4 + t * np.sin(angle)), round(4 + t * np.cos(angle))] += 1
-        image = cv2.filter2D(image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REFLECT)
+    image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.25, 0.9))
     if rng.random() < 0.3:
         soft = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.7, 1.5))
         image = np.maximum(image + rng.uniform(0.1, 0.6) * (np.minimum(image, 1) - np.minimum(soft, 1)), 0)
@@ -87,8 +79,6 @@ def _noisy(image: Array, rng: np.random.Generator) -> Array:
     noise = rng.standard_normal(image.shape, np.float32)
     if rng.random() < 0.4:
         noise = cv2.GaussianBlur(noise, (0, 0), rng.uniform(0.4, 0.8)) * 1.6
-    if rng.random() < 0.3:
-        noise = 0.7 * noise + 0.5 * noise.mean(-1, keepdims=True)
     deviation = np.sqrt(shot * np.minimum(image, 1) + (read * 0.3) ** 2)
     return np.maximum(image + noise * deviation, 0).astype(np.float32)
 
@@ -101,16 +91,12 @@ def _developed(image: Array, rng: np.random.Generator) -> Array:
         bent = knee + (1 - knee) * (1 - np.exp(-(image - knee) / (1 - knee)))
         image = np.where(image > knee, bent, image)
     grey = luminance(image)[..., None]
-    image = np.maximum(grey + (image - grey) * rng.uniform(0.8, 1.3), 0)
-    encoded = linear_to_srgb(image)
+    encoded = linear_to_srgb(np.maximum(grey + (image - grey) * rng.uniform(0.8, 1.3), 0))
     if kind >= 0.5:
-        strength = rng.uniform(-0.25, 0.8)
         curve = encoded * encoded * (3 - 2 * encoded)
-        encoded = encoded + strength * (curve - encoded)
+        encoded = encoded + rng.uniform(-0.25, 0.8) * (curve - encoded)
     if rng.random() < 0.4:
         encoded = encoded ** np.float32(np.exp(rng.normal(0, 0.12)))
-    if rng.random() < 0.2:
-        encoded = rng.uniform(0, 0.05) + encoded * rng.uniform(0.93, 1)  # haze, matt prints
     return np.clip(encoded, 0, 1)
 
 

@@ -51,6 +51,11 @@ def _step(x: Array, soft: float = 0.01) -> Array:
     return np.clip(x / soft + 0.5, 0, 1)
 
 
+def _from_line(x: Array) -> Array:
+    """Distance to the nearest whole number."""
+    return np.abs(x - np.round(x))
+
+
 def _plain(rng):
     return 0.0, 0.0, _noise(rng, rng.uniform(0.6, 1.6)), _noise(rng, 1.5)
 
@@ -88,10 +93,8 @@ def _planks(rng):
     rows, columns = int(rng.integers(4, 11)), int(rng.integers(1, 4))
     r = np.floor(_Y * rows).astype(int)
     x = (_X + rng.random(rows)[r]) % 1 * columns
-    c = np.floor(x).astype(int) % columns
-    shade = rng.random((rows, columns))[r, c]
-    gap = np.minimum(np.abs(_Y * rows - np.round(_Y * rows)), np.abs(x - np.round(x)) * rows / columns / 2)
-    seam = _step(0.035 - gap, 0.03)
+    shade = rng.random((rows, columns))[r, np.floor(x).astype(int) % columns]
+    seam = _step(0.035 - np.minimum(_from_line(_Y * rows), _from_line(x) * rows / columns / 2), 0.03)
     fibre = _noise(rng, 0.9, (1, 14))
     mix = np.clip(0.15 + 0.55 * shade + 0.6 * (fibre - 0.5), 0, 1)
     return mix, seam * rng.uniform(0.5, 1), 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
@@ -102,12 +105,9 @@ def _bricks(rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bo
     m = max(1, round(n / aspect))
     r = np.floor(_Y * n).astype(int)
     x = _X * m + (0.5 * (r % 2) if shift else 0)
-    c = np.floor(x).astype(int) % m
-    across = np.minimum(x - np.floor(x), np.ceil(x) - x) * n / m
-    down = np.minimum(_Y * n - np.floor(_Y * n), np.ceil(_Y * n) - _Y * n)
     wobble = 0.03 * (_noise(rng, 0.8) - 0.5)
-    joint = _step(gap + wobble - np.minimum(across, down), 0.05)
-    shade = rng.random((n, m))[r % n, c]
+    joint = _step(gap + wobble - np.minimum(_from_line(x) * n / m, _from_line(_Y * n)), 0.05)
+    shade = rng.random((n, m))[r % n, np.floor(x).astype(int) % m]
     return shade, joint, 0.5 + 0.7 * (_noise(rng, 0.8) - 0.5), np.maximum(joint, 0.3 * _noise(rng, 1.2))
 
 
@@ -119,7 +119,7 @@ def _tiling(rng):
 def _checker(rng):
     n = 2 * int(rng.integers(1, 6))
     board = (np.floor(_X * n) + np.floor(_Y * n)) % 2
-    edge = np.minimum(np.abs(_X * n - np.round(_X * n)), np.abs(_Y * n - np.round(_Y * n)))
+    edge = np.minimum(_from_line(_X * n), _from_line(_Y * n))
     return board, 0.6 * _step(0.02 - edge, 0.02), 0.5 + 0.6 * (_noise(rng, 1.0) - 0.5), 0.2
 
 
@@ -132,39 +132,34 @@ def _stripes(rng):
 
 
 def _plaid(rng):
-    n = int(rng.integers(2, 6))
-    profile = lambda: np.repeat(rng.random(8) < 0.4, SIZE // 8).astype(float)  # noqa: E731
-    a, b, c = profile(), profile(), profile()
-    index = (np.arange(SIZE) * n) % SIZE
-    return (
-        0.5 * a[index][:, None] + 0.5 * b[index][None],
-        0.7 * c[index][:, None] * c[index][None],
-        _noise(rng, 0.3),
-        0.5,
-    )
+    """Three stripes of their own along both axes."""
+    a, b, c = np.tile(np.repeat(rng.random((3, 8)) < 0.4, SIZE // 32, axis=1), (1, 4)).astype(float)
+    return 0.5 * a[:, None] + 0.5 * b, 0.7 * c[:, None] * c, _noise(rng, 0.3), 0.5
 
 
 def _weave(rng):
     """Cloth seen close: crossing threads."""
     n = int(rng.integers(24, 56))
-    u, v = np.sin(2 * np.pi * n * _X), np.sin(2 * np.pi * n * _Y)
-    over = (np.floor(_X * n * 2) + np.floor(_Y * n * 2)) % 2
-    thread = np.where(over > 0, np.abs(u), np.abs(v))
-    melange = _noise(rng, 0.3, (1, 8)) * over + _noise(rng, 0.3, (8, 1)) * (1 - over)
+    over = (np.floor(_X * n * 2) + np.floor(_Y * n * 2)) % 2 > 0
+    thread = np.abs(np.sin(2 * np.pi * n * np.where(over, _X, _Y)))
+    melange = np.where(over, _noise(rng, 0.3, (1, 8)), _noise(rng, 0.3, (8, 1)))
     return np.clip(melange * rng.uniform(0.2, 1.2), 0, 1), 0.0, 0.25 + 0.45 * thread, 0.5
 
 
 def _carpet(rng):
     """Rug with borders and a mirrored ornament; the tile is the whole rug."""
     quarter = _noise(rng, rng.uniform(1.2, 2.2))
-    field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4
-    edge = np.minimum(np.minimum(_X, 1 - _X), np.minimum(_Y, 1 - _Y))
+    field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
+    edge = np.minimum(_from_line(_X), _from_line(_Y))
     bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
-    border = edge < rng.uniform(0.08, 0.2)
-    pick = rng.random(64) < 0.5
-    ornament = _step(field - 0.5, 0.02)
-    second = _step(np.abs(field - 0.5) - rng.uniform(0.06, 0.14), 0.02)
-    return np.where(border, pick[bands], ornament), np.where(border, pick[bands + 20], second), _noise(rng, 0.2), 0.5
+    border, first, second = edge < rng.uniform(0.08, 0.2), *(rng.random((2, 16)) < 0.5)
+    inner = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
+    return (
+        np.where(border, first[bands], _step(field, 0.02)),
+        np.where(border, second[bands], inner),
+        _noise(rng, 0.2),
+        0.5,
+    )
 
 
 def _ornament(rng):
@@ -228,10 +223,6 @@ def _grass(rng):
     return _noise(rng, 1.3), _step(_noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
 
 
-def _paving(rng):
-    return _bricks(rng, (2, 8), float(rng.choice([1, 1.5, 2])), True, rng.uniform(0.02, 0.06))
-
-
 def _rust(rng):
     """Worn metal: channel 0 is where it is corroded or painted over."""
     patch = _noise(rng, rng.uniform(1.3, 1.9))
@@ -243,15 +234,9 @@ def _brushed(rng):
     return 0.0, 0.0, 0.5 + 0.5 * (_noise(rng, 0.4, (1, 40)) - 0.5), _noise(rng, 0.8, (1, 40))
 
 
-def _leaf(rng):
-    rib = np.abs(np.sin(np.pi * (6 * _Y + 3 * np.abs(_X - 0.5))))
-    return _noise(rng, 1.6), 0.5 * np.exp(-np.abs(_X - 0.5) * 30) + 0.2 * (rib < 0.15), _noise(rng, 1.0), 0.5
-
-
 _KINDS = {
     "plain": _plain, "cloudy": _cloudy, "speckle": _speckle, "marble": _marble, "wood": _wood, "planks": _planks,
     "bricks": _bricks, "tiling": _tiling, "checker": _checker, "stripes": _stripes, "plaid": _plaid, "weave": _weave,
     "carpet": _carpet, "ornament": _ornament, "spots": _spots, "picture": _picture, "print": _print,
-    "facade": _facade, "grass": _grass, "paving": _paving, "rust": _rust, "brushed": _brushed, "leaf": _leaf,
+    "facade": _facade, "grass": _grass, "rust": _rust, "brushed": _brushed,
 }  # fmt: skip
-KINDS = tuple(_KINDS)
