@@ -11,11 +11,11 @@ NORMAL = np.array([0.0, 0.0, 1.0])
 """The local frame's normal."""
 
 
-def make(albedo=ALBEDO, roughness=0.5, metallic=0.0, plugin="materialist_disney"):
-    """A BSDF with constant parameters; the name of the metallic parameter differs in Mitsuba's own `principled`."""
+def make(albedo=ALBEDO, roughness=0.5, metallic=0.0):
+    """A BSDF with constant parameters."""
     return mi.load_dict(
         {
-            "type": plugin,
+            "type": "materialist_disney",
             "base_color": {"type": "rgb", "value": list(albedo)},
             "roughness": {"type": "uniform", "value": roughness},
             "metallic": {"type": "uniform", "value": metallic},

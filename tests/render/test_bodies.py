@@ -95,31 +95,6 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     assert larger.sum() == pytest.approx(16 * np.pi * outline() ** 2, rel=0.02)
 
 
-def test_a_body_alone_has_its_own_radiance_at_its_rim():
-    """A grey sphere in white light before a bright sky: rays that miss it do not count."""
-    from materialist.render.native import radiance
-
-    body = sphere(surface(0.5, roughness=1.0))
-    target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
-    target.set_envmap(10 * uniform())
-    size, box = (CAMERA.height, CAMERA.width), (0, CAMERA.height, 0, CAMERA.width)
-    options = {"spp": 256, "seed": 1, "max_depth": 4}
-    alone = radiance(target, size, box, names=["body0"], **options)
-    mixed = radiance(target, size, box, **options)
-    rows, columns = np.mgrid[: CAMERA.height, : CAMERA.width]
-    radius = np.hypot(columns + 0.5 - CAMERA.width / 2, rows + 0.5 - CAMERA.height / 2)
-    away, rim = radius > outline() + 1, np.abs(radius - outline()) < 0.3
-    assert (alone[away] == 0).all() and mixed[away] == pytest.approx(10, rel=1e-3)
-    assert rim.sum() > 10
-    assert alone[disc()] == pytest.approx(mixed[disc()], rel=1e-5)
-    assert np.abs(mixed - alone)[rim].mean() > 1
-    share = first_hits(target.mi_scene, CAMERA, {"body0": body}, size, box).share[..., None]
-    expected = share * alone + (1 - share) * 10
-    met = (alone > 0).any(-1)
-    error = np.abs(mixed - expected)  # the share is one of 16 rays
-    assert error[met].max() < 10 / 16 and error[rim & met].mean() < 0.15
-
-
 def test_a_body_behind_a_thing_is_seen_as_if_that_were_not_there():
     """In its own light: the outline of what hides it may be elsewhere in the photo than in the depth."""
     from render_scenes import wall

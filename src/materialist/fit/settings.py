@@ -127,7 +127,7 @@ PAPER = FitSettings(
 DEFAULT = FitSettings(
     light=LightSettings(
         field="texels",
-        height=16,
+        height=24,
         encoding="srgb",
         clipped=True,
         schedule=Schedule(learning_rate=0.05, max_steps=150, decay_every=60, decay=0.6, patience=0),
@@ -158,7 +158,7 @@ DEFAULT = FitSettings(
     corrections=2,
     correction_spp=8,
     explained=0.08,
-    light_grid=16,
+    light_grid=24,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 
