@@ -12,7 +12,7 @@ from materialist.batches.edits import edits_key
 from materialist.batches.ledger import Ledger
 from materialist.batches.photos import Listed, unique_names
 from materialist.batches.remote import fingerprint
-from materialist.batches.results import file_hash, whole_size
+from materialist.batches.results import file_hash, package_size
 from materialist.batches.task import PhotoTask
 from materialist.errors import InputError
 from materialist.options import InvertOptions
@@ -59,7 +59,7 @@ def plan(photos: Iterable[Listed], ledger: Ledger, template: PhotoTask) -> tuple
 def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether the scene of the ledger's last entry is there, whole, and of the photo as it is now."""
     size, version = entry.get("scene_bytes"), entry.get("photo_version")
-    return bool(size and version) and size == whole_size(task.scene) and version == fingerprint(task.location)
+    return bool(size and version) and size == package_size(task.scene) and version == fingerprint(task.location)
 
 
 def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:

@@ -13,13 +13,6 @@ from materialist.io.atomic import MARKER
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
 """Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
-MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
-NEEDED = (
-    *("photo.exr", "photo.png", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "rerender.png"),
-    *(f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in MAPS),
-    *("overview.png", "report.json", MARKER),
-)
-"""Files of a whole package."""
 
 
 def scene_path(runs: Path, name: str) -> Path:
@@ -73,15 +66,9 @@ def file_hash(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def whole_size(path: str | Path) -> int | None:
-    """Bytes of a scene package, or None where a file that it needs is missing or empty."""
-    folder = Path(path)
-    try:
-        if not all((folder / name).stat().st_size for name in NEEDED):
-            return None
-        return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    except OSError:
-        return None
+def package_size(path: str | Path) -> int:
+    """Bytes of all files of a scene package; 0 where there is none. Another size than at first: it is not whole."""
+    return sum(file.stat().st_size for file in Path(path).rglob("*") if file.is_file())
 
 
 def together(hashes: Iterable[tuple[str, str]]) -> str:

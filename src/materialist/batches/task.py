@@ -18,7 +18,7 @@ import numpy as np
 from materialist.batches import results
 from materialist.batches.edits import edits_for, edits_key
 from materialist.batches.remote import fingerprint, is_url, local_copy
-from materialist.batches.results import file_hash, package_hash, whole_size
+from materialist.batches.results import file_hash, package_hash, package_size
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable
@@ -88,7 +88,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
             picture, notes = _edited(task, task.edits, scene, report)
         except Exception as error:
             # The scene is whole: with it in the ledger, the failure costs no second inversion.
-            error.facts = {**facts, "scene_bytes": whole_size(task.scene)}  # type: ignore[attr-defined]
+            error.facts = {**facts, "scene_bytes": package_size(task.scene)}  # type: ignore[attr-defined]
             raise
         pictures.append(picture)
         warnings += notes
@@ -97,7 +97,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     _write_strip(results.thumbnail_path(task.runs, task.name), pictures)
     metrics = scene.report.metrics
     facts |= {
-        "scene_hash": package_hash(task.scene), "scene_bytes": whole_size(task.scene),
+        "scene_hash": package_hash(task.scene), "scene_bytes": package_size(task.scene),
         "width": scene.camera.width, "height": scene.camera.height, "fov": scene.camera.fov,
         "predictor": scene.prior.predictor, "psnr": metrics.get("rerender_psnr_path"),
         "ssim": metrics.get("rerender_ssim_path"), "warnings": list(dict.fromkeys(warnings)),
