@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +11,14 @@ from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 
-def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
+def denoise(image: Array, *, albedo: Array, normal: Array, device: str = "cpu") -> Array:
     """Remove the path tracer's noise, guided by the scene's own maps, whose edges stay.
 
     Args:
         image: [H, W, 3] linear radiance, >= 0, any range.
         albedo: [H, W, 3] linear, in [0, 1].
         normal: [H, W, 3] unit, or 0 where there is no surface.
+        device: where the filter runs, `cpu` or `cuda`.
 
     Returns:
         [H, W, 3] float32 linear radiance, >= 0. Equal inputs give equal pictures on one machine.
@@ -37,13 +39,13 @@ def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
         ) from error
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
-    clean = pyoidn.denoise(
-        _at_least(image, _SMALLEST),
-        _at_least(np.clip(albedo, 0, 1), _SMALLEST),
-        _at_least(np.clip(normal, -1, 1), _SMALLEST),
-        hdr=True,
-        clean_aux=True,
-    )
+    pictures: list[Any] = [_at_least(p, _SMALLEST) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
+    if device == "cuda":
+        import torch
+
+        pictures = [torch.from_numpy(p).cuda() for p in pictures]
+    clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True)
+    clean = clean.cpu().numpy() if device == "cuda" else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
 
 

@@ -68,6 +68,7 @@ def epoch(
         worker_init_fn=_init_worker,
         prefetch_factor=4 if workers else None,
         collate_fn=_collated,
+        pin_memory=torch.cuda.is_available(),
     )
     batches = iter(loader)
     try:
