@@ -44,7 +44,10 @@ class Benchmark(OperationOptions, ABC):
         """Measure with the files of `data`; may add to the report's settings and sheet. Raises InputError."""
 
     def run(self, data: Path | None, output: Path) -> None:
-        """Write the report into the folder `output`, as rows come in and when the run ends or is stopped."""
+        """Write the report into the folder `output`, as rows come in and when the run ends or is stopped.
+
+        Raises InputError where there are no rows.
+        """
         from rich.console import Console
         from rich.progress import track
 
@@ -62,6 +65,8 @@ class Benchmark(OperationOptions, ABC):
         finally:
             if report.rows:
                 write(report, output)
+        if not report.rows:
+            raise InputError("There is nothing to measure with these options.")
 
 
 def names(called: str, text: str, known: Collection[str] = ()) -> list[str]:

@@ -35,7 +35,6 @@ from materialist.bench.edits import true_scene
 from materialist.bench.glass_models import Background, Case
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.color import linear_to_srgb
-from materialist.errors import InputError
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
 from materialist.procedural.synthetic import make_sample
@@ -87,8 +86,6 @@ class GlassBench(Benchmark):
         if self.full:
             paper = replace(self, full=False, shapes=10, envmaps=30, iors="1.1,1.3")
             return (yield from paper.rows(data, report))
-        if not (self.shapes or self.latency):
-            raise InputError("--shapes is 0; give at least 1, or a --latency.")
         iors = numbers("iors", self.iors, 1.001, 3, float)
         setup(self.device)
         for case, behind in self._cases(data, iors) if self.shapes else ():

@@ -33,24 +33,15 @@ ENVMAP_ROWS = {"room": 64, "envmap": 256}
 class GlassProtocol:
     """How the pictures of `bench glass` are made."""
 
-    diffuse_length: int = 6
-    """Most segments of a path where nothing is glass."""
-    glass_length: int = 40
-    """Most segments of a path through glass."""
-    brightest: float = 60.0
-    """Largest radiance of the light, as a multiple of its mean."""
-    lift: float = 0.002
-    """Air between an object and the floor: where two surfaces are one, either may be met first."""
-    exposed: float = 0.8
-    """Luminance of the brightest fiftieth of the background."""
-    albedo_spp: int = 256
-    """Paths a pixel from which the light that falls on the background is read, denoised."""
-    albedo_rounds: int = 3
-    """Times the background's albedo is corrected: light goes to and fro between surfaces."""
-    brightest_albedo: float = 0.95
-    """Largest albedo of the background."""
-    noise: float = 0.5
-    """Largest relative error of the thickness in the sensitivity test (paper, eq. ablation_d)."""
+    diffuse_length: int = 6  # most segments of a path where nothing is glass
+    glass_length: int = 40  # most segments of a path through glass
+    brightest: float = 60.0  # largest radiance of the light, in means
+    lift: float = 0.002  # air under an object: where two surfaces are one, either may be met first
+    exposed: float = 0.8  # luminance of the brightest fiftieth of the background
+    albedo_spp: int = 256  # paths a pixel from which the light on the background is read, denoised
+    albedo_rounds: int = 3  # corrections of the background's albedo: light goes to and fro between surfaces
+    brightest_albedo: float = 0.95  # largest albedo of the background
+    noise: float = 0.5  # largest relative error of the thickness (paper, eq. ablation_d)
 
 
 PROTOCOL = GlassProtocol()
