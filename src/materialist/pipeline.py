@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -49,7 +49,9 @@ def invert(
     preset = "paper" if wanted.engine == "path" else wanted.preset
     tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
     tick("read", 0, 1)
-    picture = _read(photo, size=wanted.size, fov=wanted.fov)
+    picture = exposed(photo) if isinstance(photo, Photo) else read_photo(photo, size=wanted.size, fov=wanted.fov)
+    if isinstance(photo, Photo) and wanted.fov != "auto":
+        picture = replace(picture, camera=replace(picture.camera, fov=cast(float, wanted.fov)), fov_source="option")
     mask = _mask(wanted.mask, picture)
     tick("predict", 0, 1)
     picture, prior, stages = _prior(picture, wanted)
@@ -170,22 +172,6 @@ def _named(mask: Array | None) -> dict[str, Any] | None:
         return None
     packed = np.packbits(np.asarray(mask, bool))
     return {"pixels": int(np.sum(mask)), "sha256": sha256(packed.tobytes()).hexdigest()}
-
-
-def _read(photo: str | Path | Photo, *, size: int, fov: float | str | None) -> Photo:
-    if not isinstance(photo, Photo):
-        return read_photo(photo, size=size, fov=fov)
-    photo = exposed(photo)
-    if fov == "auto":
-        return photo
-    return replace(
-        photo,
-        camera=replace(
-            photo.camera,
-            fov=float(fov),  # type: ignore[arg-type]
-        ),
-        fov_source="option",
-    )
 
 
 def _seen_by(source, picture: Photo) -> Photo:

@@ -71,18 +71,6 @@ def test_glass_of_a_glb_has_the_mean_way_through_it():
     assert thick == pytest.approx(0.8, rel=0.02) and "KHR_materials_volume" in content["extensionsUsed"]
 
 
-def test_trimesh_reads_the_bodies_back(tmp_path):
-    import trimesh
-
-    scene = with_bodies(CHECKS)
-    export(scene, tmp_path / "a.glb")
-    read = trimesh.load_scene(tmp_path / "a.glb", process=False).geometry
-    plate = next(mesh for name, mesh in read.items() if "body0" in name)
-    np.testing.assert_allclose(plate.vertices, scene.bodies[0].vertices, atol=1e-6)
-    picture = np.asarray(plate.visual.material.baseColorTexture.convert("RGB"))
-    np.testing.assert_array_equal(picture, CHECKS.albedo * 255)
-
-
 GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
 
 

@@ -21,18 +21,6 @@ def test_focal_plane_resolution_in_every_unit():
         assert horizontal_fov(tags, 4000, 2667) == pytest.approx(expected, rel=1e-9)
 
 
-def test_focal_plane_of_a_picture_that_was_scaled_since():
-    tags = {
-        "FocalLength": 35.0,
-        "FocalPlaneXResolution": 4000 / 23.6 * 25.4,
-        "FocalPlaneResolutionUnit": 2,
-        "ExifImageWidth": 4000,
-        "ExifImageHeight": 2667,
-    }
-    expected = math.degrees(2 * math.atan(11.8 / 35))
-    assert horizontal_fov(tags, 1000, 667) == pytest.approx(expected, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     "tags",
     [

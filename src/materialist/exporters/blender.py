@@ -119,15 +119,12 @@ def _look(part: Part) -> dict:
 
 def _find_blender(named: str | None) -> list[str] | None:
     """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
-    if named is not None:
-        found = shutil.which(named)
-        if found is None:
-            raise SetupError(f"There is no program {named}; give the path of blender, or of a Python that has bpy.")
-        return [found]
-    found = shutil.which("blender")
-    if found is not None:
-        return [found]
-    return [sys.executable] if importlib.util.find_spec("bpy") else None
+    found = shutil.which(named or "blender")
+    if found is None and named is not None:
+        raise SetupError(f"There is no program {named}; give the path of blender, or of a Python that has bpy.")
+    if found is None:
+        return [sys.executable] if importlib.util.find_spec("bpy") else None
+    return [found]
 
 
 def _command(program: list[str], script: Path, output: Path, options: list[str]) -> list[str]:

@@ -45,17 +45,12 @@ def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | 
     36 mm of a film frame. Without it, FocalLength with FocalPlaneXResolution gives the focal length in pixels.
     Values that lead outside (1, 170) degrees are not believed.
     """
-    focal = _from_film(tags, width, height) or _from_focal_plane(tags, width, height)
+    film = _number(tags.get("FocalLengthIn35mmFilm"))
+    focal = film / FILM_WIDTH * max(width, height) if film else _from_focal_plane(tags, width, height)
     if not focal:
         return None
     fov = math.degrees(2 * math.atan(0.5 * width / focal))
     return fov if 1 < fov < 170 else None
-
-
-def _from_film(tags: Mapping[str, Any], width: int, height: int) -> float | None:
-    """Focal length in pixels from the 35 mm equivalent."""
-    film = _number(tags.get("FocalLengthIn35mmFilm"))
-    return film / FILM_WIDTH * max(width, height) if film else None
 
 
 def _from_focal_plane(tags: Mapping[str, Any], width: int, height: int) -> float | None:

@@ -61,9 +61,9 @@ def load_scene(path: str | Path) -> Scene:
             geometry=Geometry(read_ply(folder / "mesh.ply"), label),
             envmap=_exr(folder / "envmap.exr", None),
             rerender=_exr(folder / "rerender.exr", (*shape, 3)),
-            report=_report_from_json(_read_json(folder / "report.json")),
+            report=_read_report(folder / "report.json"),
             provenance=meta["provenance"],
-            lamps=tuple(_lamp(entry) for entry in meta.get("lamps", ())),
+            lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
             bodies=read_bodies(folder, meta.get("bodies", [])),
         )
     except (InputError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -91,7 +91,9 @@ def _write(scene: Scene, folder: Path) -> None:
     write_exr(folder / "rerender.exr", scene.rerender)
     write_png(folder / "rerender.png", scene.rerender)
     write_png_bytes(folder / "overview.png", overview(scene))
-    _write_json(folder / "report.json", _report_to_json(scene.report))
+    report = scene.report  # its metrics lie flat beside `stages` and `warnings`
+    warnings = list(dict.fromkeys(report.warnings))
+    _write_json(folder / "report.json", {**report.metrics, "stages": list(report.stages), "warnings": warnings})
     meta = _meta(scene, original)
     if scene.bodies:
         meta["bodies"] = write_bodies(folder, scene.bodies)
@@ -125,11 +127,6 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
         "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
         **({"lamps": [asdict(lamp) for lamp in scene.lamps]} if scene.lamps else {}),
     }
-
-
-def _lamp(entry: dict[str, Any]) -> Lamp:
-    """A lamp of scene.json; its lists become tuples."""
-    return Lamp(tuple(entry["position"]), tuple(entry["power"]), entry["radius"])
 
 
 def _write_original(photo: Photo, folder: Path) -> str:
@@ -251,11 +248,7 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
     path.write_text(text + "\n", "utf-8")
 
 
-def _report_to_json(report: FitReport) -> dict[str, Any]:
-    """report.json: the metrics lie flat beside `stages` and `warnings`."""
-    return {**report.metrics, "stages": list(report.stages), "warnings": list(dict.fromkeys(report.warnings))}
-
-
-def _report_from_json(content: dict[str, Any]) -> FitReport:
+def _read_report(path: Path) -> FitReport:
+    content = _read_json(path)
     metrics = {k: math.nan if v is None else v for k, v in content.items() if k not in ("stages", "warnings")}
     return FitReport(tuple(content.get("stages", ())), metrics, tuple(content.get("warnings", ())))
