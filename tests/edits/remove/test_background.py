@@ -36,21 +36,6 @@ def test_a_true_background_is_what_is_seen():
     assert np.sqrt(((picture - truth) ** 2)[MASK].mean()) < 0.04
 
 
-def test_a_background_in_one_place_changes_no_other():
-    """What is filled from its surroundings keeps their light, whatever is given elsewhere."""
-    scene = rendered_scene()
-    other = np.zeros((36, 48), bool)
-    other[4:9, 38:44] = True
-    first = remove(scene, MASK)
-    alone, patches, given = (
-        composite(scene, edited, spp=16, denoise=False)
-        for edited in (first, remove(first, other), remove(first, other, background=0.5 * scene.photo.linear))
-    )
-    near = np.abs(patches - alone)[MASK].mean()  # another scene has other noise
-    assert np.abs(given - alone)[MASK].mean() < 2 * near + 1e-3
-    assert np.abs(given - patches)[other].mean() > 0.05
-
-
 def test_what_is_odd_about_a_background_is_told(tmp_path):
     from PIL import Image
 

@@ -5,7 +5,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
-from scipy import ndimage
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.region import body_coverage
@@ -114,20 +113,3 @@ def test_a_wall_ends_without_the_object_where_it_ended_with_it():
     assert float(empty.geometry.mesh.vertices[:, 1].max()) == pytest.approx(ends.up, abs=0.2)
     usual = remove(replace(scene, geometry=completed, provenance={**provenance, "ends": []}), MASK)
     assert float(usual.geometry.mesh.vertices[:, 1].max()) < ends.up - 1
-
-
-def test_what_was_removed_leaves_no_ghost_of_its_pattern():
-    """The composite of a patterned block that goes is the filled photo."""
-    scene = rendered_scene()
-    mask = block_mask(36, 48)
-    pattern = np.where((np.indices(mask.shape).sum(0) % 6 < 3)[..., None], 0.05, 0.9).astype(np.float32)
-    albedo = np.where(mask[..., None], pattern, scene.materials.albedo).astype(np.float32)
-    linear = np.where(mask[..., None], 0.6 * pattern, scene.photo.linear).astype(np.float32)
-    scene = replace(
-        scene, materials=replace(scene.materials, albedo=albedo),
-        photo=replace(scene.photo, linear=linear, original=linear),
-    )  # fmt: skip
-    gone = remove(scene, mask, shadow=0)
-    out = composite(scene, gone, spp=32)
-    inner = ndimage.binary_erosion(mask, iterations=2)
-    np.testing.assert_allclose(out[inner], gone.photo.original[inner], atol=0.03)

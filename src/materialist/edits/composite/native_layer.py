@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from materialist.edits.composite.upsample import matte, nearest
+from materialist.edits.composite.upsample import matte, nearest, window
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
 from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
 from materialist.types import Array, Body, Scene
+
+if TYPE_CHECKING:
+    from materialist.render.coverage import Box
 
 
 @dataclass(frozen=True)
@@ -23,8 +26,8 @@ class NativeSettings:
     """Paths a native pixel, at least, as the denoiser needs (tuned by eye)."""
     most_paths: int = 4
     """Paths a native pixel, at most, in multiples of those of the picture (derived: time)."""
-    margin: int = 4
-    """Native pixels around the bodies that the denoiser sees (tuned by eye)."""
+    margin: int = 3
+    """Working pixels around the bodies that the denoiser sees (tuned by eye)."""
     contact: float = 0.05
     """Share of a body's extent up to which a surface before it is the ground it stands on (tuned by eye)."""
     lamp_contact: float = 2.0
@@ -83,7 +86,8 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     small = first_hits(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1])).share
     if not small.any():
         return None
-    box = _box(small, native)
+    there = window(small > 0, native, SETTINGS.margin)
+    box = (there[0].start, there[0].stop, there[1].start, there[1].stop)
     sight = first_hits(target.mi_scene, camera, chosen, native, box)
     alone = first_hits(only(target.mi_scene, names), camera, chosen, native, box)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
@@ -98,7 +102,6 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
         guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
         picture = denoised(picture, guide.albedo, guide.normal)
     share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
-    there = slice(*box[:2]), slice(*box[2:])
     share[there] = _behind_things(sight, alone, scene, there, gap)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
     if lamps or any(max(body.surface.emission) > 1 for body in chosen.values()):
@@ -107,20 +110,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     return NativeLayer(small, share, whole)
 
 
-def _box(share: Array, native: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """The native rows and columns around what is covered at working size."""
-    edges = []
-    for axis in (0, 1):
-        places = np.flatnonzero(share.any(1 - axis))
-        scale = native[axis] / share.shape[axis]
-        edges += [
-            max(0, int(np.floor((places[0] - 1) * scale)) - SETTINGS.margin),
-            min(native[axis], int(np.ceil((places[-1] + 2) * scale)) + SETTINGS.margin),
-        ]
-    return edges[0], edges[1], edges[2], edges[3]
-
-
-def _traced_size(native: tuple[int, ...], box: tuple[int, int, int, int]):
+def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
     """Size of the picture that is traced, and the native box in it."""
     factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
     height, width = (max(2, round(n * factor)) for n in native)

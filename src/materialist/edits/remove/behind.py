@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays
+from materialist.edits.composite.upsample import window
 from materialist.geometry.membrane import membrane
 from materialist.types import Array, Camera
 
@@ -68,19 +69,20 @@ def behind(
         for k in np.unique(known[~hole & (known >= 0)])
     }
     margin = max(8, round(settings.window * float(np.sqrt(hole.sum()))) + 1)
-    (top, bottom), (left, right) = (np.flatnonzero(hole.any(axis))[[0, -1]] for axis in (1, 0))
-    box = np.s_[max(top - margin, 0) : bottom + margin + 1, max(left - margin, 0) : right + margin + 1]
-    window = _Window(depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float), settings)
-    label = window.labels(ends)
-    for k in np.unique(label[window.hole]):
-        here = window.hole & (label == k)
-        new_depth, new_normal = window.surface(int(k), here, front[box])
+    box = window(hole, hole.shape, margin)
+    around = _Surroundings(
+        depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float), settings
+    )
+    label = around.labels(ends)
+    for k in np.unique(label[around.hole]):
+        here = around.hole & (label == k)
+        new_depth, new_normal = around.surface(int(k), here, front[box])
         out.depth[box][here], out.normal[box][here] = new_depth, new_normal
     out.label[box] = label
     return out
 
 
-class _Window:
+class _Surroundings:
     """The hole and the surroundings that tell what is in it."""
 
     def __init__(
