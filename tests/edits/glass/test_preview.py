@@ -5,7 +5,6 @@ import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.edits.composite.composite import composite
-from materialist.edits.glass import preview as glass_preview
 from materialist.edits.glass.glass import glass
 from materialist.edits.glass.preview import GlassPreview
 from materialist.errors import InputError
@@ -39,17 +38,6 @@ def test_the_glass_is_exchanged_and_comes_back(preview):
     for other in (frosted, coated):
         assert np.abs(other - clear)[MASK].max() > 0.01
     np.testing.assert_array_equal(preview.picture(spp=16), clear)
-
-
-def test_large_objects_are_traced_at_fewer_pixels(preview, monkeypatch):
-    monkeypatch.setattr(glass_preview, "PATHS", 500)
-    small = preview.picture(ior=1.0, spp=64)
-    monkeypatch.undo()
-    size, box = preview._size(64)
-    assert size == MASK.shape and (box[1] - box[0]) * (box[3] - box[2]) * 4 > 500
-    full = preview.picture(ior=1.0, spp=64)
-    assert small.shape == full.shape
-    assert small[MASK].mean() == pytest.approx(full[MASK].mean(), rel=0.15)
 
 
 def test_bad_values_are_refused(preview):

@@ -14,7 +14,7 @@ from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
 PATHS = 600_000
-"""Paths of one picture: with more pixels than they allow, fewer pixels are traced and the picture is enlarged."""
+"""Paths of one picture, as far as FEWEST a pixel allow."""
 FEWEST = 4
 """Paths a traced pixel."""
 MARGIN = 2
@@ -58,7 +58,7 @@ class GlassPreview:
     def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
         """[H, W, 3] float32 linear at working size: the photo with the object as glass.
 
-        `spp` paths a working pixel of the object, fewer for objects so large that this would be more than PATHS;
+        `spp` paths a working pixel of the object, fewer for objects so large that these are more than PATHS;
         `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
         from materialist.edits.composite.native_layer import spread
@@ -69,12 +69,11 @@ class GlassPreview:
         if spp < 1:
             raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
-        size, box = self._size(spp)
-        target = self._dressed(surface)
-        paths = max(FEWEST, min(spp, PATHS // max((box[1] - box[0]) * (box[3] - box[2]), 1)))
-        seen = radiance(target, size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
+        target, box = self._dressed(surface), self._box
+        paths = max(FEWEST, min(spp, PATHS // ((box[1] - box[0]) * (box[3] - box[2]))))
+        seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
         calm = without_fireflies(spread(seen))
-        guide = self._guides[size]
+        guide = self._guide
         return self._in_photo(denoised(calm, guide.albedo, guide.normal), surface)
 
     @property
@@ -93,10 +92,10 @@ class GlassPreview:
         return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
 
     def _look(self) -> None:
-        """What of the body is seen where, at the sizes that pictures are traced at."""
+        """What of the body is seen where."""
         camera = self.scene.camera
-        working = (camera.height, camera.width)
-        share = self._sight(working, (0, working[0], 0, working[1])).share
+        self._size = working = (camera.height, camera.width)
+        share = self._sight((0, working[0], 0, working[1])).share
         rows, columns = np.flatnonzero(share.any(1)), np.flatnonzero(share.any(0))
         if not len(rows):
             raise InputError("The camera sees nothing of the object; mark another one.")
@@ -105,28 +104,13 @@ class GlassPreview:
             max(0, int(rows[0]) - MARGIN), min(working[0], int(rows[-1]) + 1 + MARGIN),
             max(0, int(columns[0]) - MARGIN), min(working[1], int(columns[-1]) + 1 + MARGIN),
         )  # fmt: skip
-        self._guides: dict[tuple[int, int], Any] = {}
+        self._guide = self._sight(self._box)
 
-    def _sight(self, size: tuple[int, int], box: tuple[int, int, int, int]) -> Any:
+    def _sight(self, box: tuple[int, int, int, int]) -> Any:
         from materialist.render.coverage import first_hits
 
         target = self._dressed(self._edited.bodies[-1].surface)
-        return first_hits(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, size, box)
-
-    def _size(self, spp: int) -> tuple[tuple[int, int], tuple[int, int, int, int]]:
-        """Size of the whole picture, and the rectangle of it to trace."""
-        top, bottom, left, right = self._box
-        pixels = (bottom - top) * (right - left)
-        factor = min(1.0, float(np.sqrt(PATHS / (pixels * max(min(spp, 8), FEWEST)))))
-        camera = self.scene.camera
-        size = (max(2, round(camera.height * factor)), max(2, round(camera.width * factor)))
-        y, x = size[0] / camera.height, size[1] / camera.width
-        first, before = int(top * y), int(left * x)
-        box = (first, min(size[0], max(first + 2, int(np.ceil(bottom * y)))),
-               before, min(size[1], max(before + 2, int(np.ceil(right * x)))))  # fmt: skip
-        if size not in self._guides:
-            self._guides[size] = self._sight(size, box)
-        return size, box
+        return first_hits(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, self._size, box)
 
     def _dressed(self, surface: Surface) -> Any:
         """The ray tracer's scene with the body of that glass: made once for each kind of glass."""
@@ -161,12 +145,9 @@ class GlassPreview:
         return target, target.mi.traverse(target.mi_scene)
 
     def _in_photo(self, traced: Array, surface: Surface) -> Array:
-        """[H, W, 3] the traced rectangle, at whatever size, in the photo without the object."""
-        import cv2
-
+        """[H, W, 3] the traced rectangle in the photo without the object."""
         top, bottom, left, right = self._box
-        part = cv2.resize(traced, (right - left, bottom - top), interpolation=cv2.INTER_LINEAR)
         out = self._edited.photo.linear.copy()
         share = self._share[top:bottom, left:right, None]
-        out[top:bottom, left:right] = share * part + (1 - share) * out[top:bottom, left:right]
+        out[top:bottom, left:right] = share * traced + (1 - share) * out[top:bottom, left:right]
         return out

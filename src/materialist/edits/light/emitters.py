@@ -48,7 +48,7 @@ class EmitterSettings:
 DEFAULT = EmitterSettings()
 
 
-def visible_lights(scene: Scene, settings: EmitterSettings = DEFAULT) -> list[Array]:
+def visible_lights(scene: Scene) -> list[Array]:
     """Masks [H, W] bool of the emitters on surfaces of the photo, the largest first.
 
     They are connected regions of clipped pixels with the bright ones beside them, and do not face up.
@@ -57,28 +57,28 @@ def visible_lights(scene: Scene, settings: EmitterSettings = DEFAULT) -> list[Ar
     from scipy import ndimage
 
     photo, surface = scene.photo, scene.depth > 0
-    least = settings.clipped
+    least = DEFAULT.clipped
     if photo.hdr and surface.any():
-        least = max(least, settings.hdr * float(np.median(photo.linear[surface].mean(-1))))
+        least = max(least, DEFAULT.hdr * float(np.median(photo.linear[surface].mean(-1))))
     value, longer = photo.linear.min(-1), max(surface.shape)
     bright = (value >= least) & surface
     if not bright.any():
         return []
-    near = ndimage.distance_transform_edt(~bright) <= max(1, round(settings.reach * longer))
-    grown = ndimage.binary_propagation(bright, mask=(value >= settings.beside * least) & surface & near)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(settings.gap * longer) + 1,) * 2)
+    near = ndimage.distance_transform_edt(~bright) <= max(1, round(DEFAULT.reach * longer))
+    grown = ndimage.binary_propagation(bright, mask=(value >= DEFAULT.beside * least) & surface & near)
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(DEFAULT.gap * longer) + 1,) * 2)
     closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, kernel) > 0
     masks = [
         mask for mask in _parts(closed)
-        if (mask & bright).sum() >= settings.area * mask.size
-        and scene.normal[mask][:, 1].mean() <= settings.upward
+        if (mask & bright).sum() >= DEFAULT.area * mask.size
+        and scene.normal[mask][:, 1].mean() <= DEFAULT.upward
     ]  # fmt: skip
     return sorted(masks, key=lambda mask: -int(mask.sum()))
 
 
 def dimmed(
     scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None, seed: int = 0,
-    device: str = "auto", settings: EmitterSettings = DEFAULT,
+    device: str = "auto",
 ) -> Scene:  # fmt: skip
     """The scene with its in-photo emitters as surfaces of `dim` times their radiance; the photo's is 1.
 
@@ -91,11 +91,9 @@ def dimmed(
         fitted: the scene before its edits, whose rendering is the photo: emitters are found in it.
 
     Raises:
-        InputError: the scene is edited, and `fitted` is not given; dim is not in [0, 10], no clipped region of the
+        InputError: the scene is edited, and `fitted` is not given, no clipped region of the
             photo is large enough, or the mask has another size or no surface in it.
     """
-    if not (np.isfinite(dim) and 0 <= dim <= 10):
-        raise InputError(f"The dimming is {dim:g}; it must lie in [0, 10], 1 for as it is, 0 for off.")
     if any(body.name.startswith(PHOTO_LIGHT) for body in scene.bodies):
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")
     if fitted is None and is_edited(scene):
@@ -103,20 +101,20 @@ def dimmed(
             "The lights of a photo are found in the scene before its edits; give that as fitted=, or dim first."
         )
     known = fitted or scene
-    masks = visible_lights(known, settings) if lights is None else _given(known, lights, settings)
+    masks = visible_lights(known) if lights is None else _given(known, lights)
     if not masks:
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
             "mark the lights that you mean."
         )
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
-    masks = [part for mask in masks for part in _parts(mask & ~gone) if part.sum() >= settings.pixels]
+    masks = [part for mask in masks for part in _parts(mask & ~gone) if part.sum() >= DEFAULT.pixels]
     if not masks:
         raise InputError("The lights of this photo were taken away by an earlier step; leave the dimming out.")
-    colours, radiance = _looks(known.photo, masks, settings)
-    patches = [_patch(scene, mask, f"{PHOTO_LIGHT} {k}", settings.lift) for k, mask in enumerate(masks)]
+    colours, radiance = _looks(known.photo, masks)
+    patches = [_patch(scene, mask, f"{PHOTO_LIGHT} {k}") for k, mask in enumerate(masks)]
     shining = tuple(emitting(body, colour) for body, colour in zip(patches, colours))
-    ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance, seed, device, settings)
+    ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance, seed, device)
     emission = [[radiance * c for c in colour] for colour in colours]
     found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": emission}
     bodies = [emitting(body, [dim * c for c in own]) for body, own in zip(patches, emission)]
@@ -135,17 +133,15 @@ def _parts(mask: Array) -> list[Array]:
     return [label == k for k in range(1, count + 1)]
 
 
-def _given(scene: Scene, lights: Array, settings: EmitterSettings) -> list[Array]:
+def _given(scene: Scene, lights: Array) -> list[Array]:
     """The parts of a mask of emitters that are large enough to be a surface."""
-    masks = [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() >= settings.pixels]
+    masks = [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() >= DEFAULT.pixels]
     if not masks:
-        raise InputError(f"The mask of lights has no connected part of {settings.pixels} pixels; mark the whole light.")
+        raise InputError(f"The mask of lights has no connected part of {DEFAULT.pixels} pixels; mark the whole light.")
     return masks
 
 
-def _looks(
-    photo: Photo, masks: list[Array], settings: EmitterSettings
-) -> tuple[list[tuple[float, float, float]], float | None]:
+def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, float]], float | None]:
     """(colours of the emitters, the radiance that goes with them where the photo tells it).
 
     An HDR photo tells the radiance, and any photo that of emitters that are not clipped. Else colours are 1 in the
@@ -153,17 +149,16 @@ def _looks(
     """
     inside = [photo.linear[mask] for mask in masks]
     means = [pixels.mean(0) for pixels in inside]
-    if photo.hdr or np.concatenate([pixels.max(-1) >= settings.clipped for pixels in inside]).mean() < settings.known:
+    if photo.hdr or np.concatenate([pixels.max(-1) >= DEFAULT.clipped for pixels in inside]).mean() < DEFAULT.known:
         peak = max(*(float(mean.max()) for mean in means), OFF)
         return [triple(mean / peak) for mean in means], peak
-    white = [(pixels.min(-1) >= settings.clipped).mean() > settings.white for pixels in inside]
+    white = [(pixels.min(-1) >= DEFAULT.clipped).mean() > DEFAULT.white for pixels in inside]
     means = [np.ones(3) if is_white else mean for is_white, mean in zip(white, means)]
     return [triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
 
 
 def _estimated(
-    scene: Scene, emitters: tuple[Body, ...], masked: Array, radiance: float | None, seed: int, device: str,
-    settings: EmitterSettings,
+    scene: Scene, emitters: tuple[Body, ...], masked: Array, radiance: float | None, seed: int, device: str
 ) -> tuple[float, float, float]:  # fmt: skip
     """(factor on the environment map, radiance of the emitters) that together give the photo, and the emitters' share.
 
@@ -178,9 +173,9 @@ def _estimated(
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters), device=device)
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), OFF, np.float32))
-    by_emitters = target.render(spp=settings.spp, seed=seed)  # [H, W, 3] of emitters of radiance 1 alone
+    by_emitters = target.render(spp=DEFAULT.spp, seed=seed)  # [H, W, 3] of emitters of radiance 1 alone
     photo = scene.photo.linear
-    seen = (scene.depth > 0) & ~masked & (photo.max(-1) < settings.clipped)
+    seen = (scene.depth > 0) & ~masked & (photo.max(-1) < DEFAULT.clipped)
     if not seen.any():
         return 1.0, 1.0 if radiance is None else radiance, 0.0
     wanted, base, lit = (v[seen].astype(np.float64) for v in (photo, scene.rerender, by_emitters))
@@ -191,12 +186,12 @@ def _estimated(
     return float(factor), float(radiance), float(radiance * lit.mean() / max(base.mean(), 1e-6))
 
 
-def _patch(scene: Scene, mask: Array, name: str, lift: float = DEFAULT.lift) -> Body:
+def _patch(scene: Scene, mask: Array, name: str) -> Body:
     """The surface of the masked pixels, black, and moved a little towards the camera."""
     surface = part(scene.geometry.mesh, -1)
     faces = surface.faces[mask.reshape(-1)[surface.face_pixel]]
     used, numbers = np.unique(faces, return_inverse=True)
-    vertices = (surface.vertices[used] * np.float32(1 - lift)).astype(np.float32)
+    vertices = (surface.vertices[used] * np.float32(1 - DEFAULT.lift)).astype(np.float32)
     return Body(
         vertices, numbers.reshape(faces.shape).astype(np.int32), surface.normals[used], surface.uv[used],
         uniform_surface(0.0, 1.0, 0.0), name,
