@@ -8,6 +8,7 @@ from made_batch import photos
 from materialist.batches.photos import LONGEST_NAME as LONGEST
 from materialist.batches.photos import list_photos, unique_names
 from materialist.batches.remote import fingerprint, local_copy
+from materialist.batches.run import batch
 from materialist.errors import InputError
 
 
@@ -93,3 +94,17 @@ def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
     shuffled = list(texts)
     random.shuffle(shuffled)
     assert unique_names(shuffled) == names
+
+
+def test_a_batch_behind_a_url_resumes_with_what_has_changed(tmp_path):
+    pytest.importorskip("fsspec")
+    photos(tmp_path / "in", "a", "b", "c")
+    (tmp_path / "in/c.png").rename(tmp_path / "c.png")
+    options = {"function": "made_batch:made_up", "workers": 1, "device": "cpu"}
+    first = batch(f"file://{tmp_path}/in", tmp_path / "runs", **options)
+    assert first.count("done") == 2 and {row["name"] for row in first.rows} == {"a", "b"}
+    (tmp_path / "c.png").rename(tmp_path / "in/b.png")
+    again = batch(f"file://{tmp_path}/in", tmp_path / "runs", resume=True, **options)
+    assert again.kept == 1 and again.count("done") == 2
+    hashes = [{row["name"]: row["photo_hash"] for row in outcome.rows} for outcome in (first, again)]
+    assert hashes[0]["a"] == hashes[1]["a"] and hashes[0]["b"] != hashes[1]["b"]

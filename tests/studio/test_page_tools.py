@@ -22,15 +22,6 @@ def stroke(page, points, key=None):
     page.wait_for_function(f"(old) => {MASK} !== old", arg=before)
 
 
-def touched(page, points):
-    """The same with a finger."""
-    before, finger = page.evaluate(MASK), page.context.new_cdp_session(page)
-    for kind, some in (("touchStart", points[:1]), *(("touchMove", [p]) for p in points[1:]), ("touchEnd", [])):
-        at = [dict(zip("xy", place(page, *point))) for point in some]
-        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
-    page.wait_for_function(f"(old) => {MASK} !== old", arg=before)
-
-
 def test_the_brush_paints_and_rubs_out(page, running):
     opened(page, running[0])
     press(page, "Brush")
@@ -55,23 +46,6 @@ def test_the_brush_paints_and_rubs_out(page, running):
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors
-
-
-def test_a_finger_paints(browser, running):
-    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
-    page = context.new_page()
-    opened(page, running[0])
-    press(page, "Brush")
-    page.locator("#stage").scroll_into_view_if_needed()
-    touched(page, [(0.3, 0.5), (0.5, 0.5), (0.7, 0.5)])
-    painted = mask(page)
-    assert painted[24, 22:43].all() and not painted[45].any()
-    press(page, "Remove (Alt)")
-    touched(page, [(0.6, 0.2), (0.7, 0.5), (0.7, 0.8)])
-    rubbed = mask(page)
-    assert rubbed is None or painted.sum() > rubbed.sum()
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    context.close()
 
 
 def test_selecting_by_clicks(page, running):
