@@ -28,7 +28,7 @@ COMMIT = "1" * 40
 
 
 class Hub(BaseHTTPRequestHandler):
-    """As much of a model hub as a download needs; the server holds `files`, `claims`, `cuts` and `log`."""
+    """As much of a model hub as a download needs; the server holds `files`, `claims` and `log`."""
 
     def do_HEAD(self):
         self.answer_file(body=False)
@@ -55,16 +55,15 @@ class Hub(BaseHTTPRequestHandler):
             self.server.log.append((name, asked))
             start = int(asked.removeprefix("bytes=").rstrip("-")) if asked else 0
         headers = {"X-Repo-Commit": COMMIT, "ETag": f'"{self.digest(name)}"'}
-        cut = self.server.cuts.pop() if body and self.server.cuts else None
-        return self.answer(206 if start else 200, content[start:], headers, cut=cut, body=body)
+        return self.answer(206 if start else 200, content[start:], headers, body=body)
 
-    def answer(self, status, content, headers, cut=None, body=True):
+    def answer(self, status, content, headers, body=True):
         self.send_response(status)
         for name, value in {**headers, "Content-Length": str(len(content))}.items():
             self.send_header(name, value)
         self.end_headers()
         if body:
-            self.wfile.write(content[:cut])
+            self.wfile.write(content)
 
     def log_message(self, *_):
         pass
@@ -80,7 +79,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def hub(monkeypatch):
     server = ThreadingHTTPServer(("127.0.0.1", 0), Hub)
-    server.files, server.claims, server.log, server.cuts = dict(CONTENT), {}, [], []
+    server.files, server.claims, server.log = dict(CONTENT), {}, []
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{server.server_port}")
     yield server
@@ -107,13 +106,6 @@ def test_a_download_is_whole_checked_listed_and_not_repeated(hub, folder):
     assert download(MODEL) == folder and fetched(hub) == []
     download(MODEL, force=True)
     assert fetched(hub) == ["config.json", "matnet_weights.pth"]
-
-
-def test_a_broken_connection_is_taken_up_again(hub, folder):
-    hub.cuts = [5000, None]
-    download(MODEL)
-    assert fetched(hub) == ["config.json", "matnet_weights.pth", "matnet_weights.pth"]
-    assert is_complete(MODEL) and (folder / "matnet_weights.pth").read_bytes() == CONTENT["matnet_weights.pth"]
 
 
 def test_a_file_that_came_damaged_is_not_kept(hub, folder):

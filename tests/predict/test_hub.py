@@ -9,7 +9,7 @@ from made_matnet import made_photo
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.marigold import appearance, unit_normals
+from materialist.predict.marigold import appearance
 from materialist.predict.protocol import MAPS
 
 pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("one_thread")]
@@ -148,48 +148,6 @@ def test_depth_anything_relative_and_metric(hub, models, tmp_path):
         get_predictor("depth-anything")
 
 
-def test_depth_anything_sees_what_its_own_processor_would_show_it(hub, tmp_path, monkeypatch):
-    import torch
-    from PIL import Image
-    from transformers import DepthAnythingForDepthEstimation
-    from transformers.models.dpt.image_processing_pil_dpt import DPTImageProcessorPil
-
-    folder = hub.save_depth_anything(tmp_path / "model")
-    seen = []
-    forward = DepthAnythingForDepthEstimation.forward
-    monkeypatch.setattr(
-        DepthAnythingForDepthEstimation, "forward",
-        lambda self, pixel_values: seen.append(pixel_values) or forward(self, pixel_values),
-    )  # fmt: skip
-    smooth = np.add.outer(np.linspace(0, 0.5, 518), np.linspace(0, 0.4, 700))[..., None] * [1, 0.8, 0.6]
-    photo = made_photo(518, 700)
-    photo.linear[:] = srgb_to_linear(np.round(smooth * 255) / 255)
-    get_predictor("constant", depth=f"depth-anything:{folder}", device="cpu").predict(photo)
-    processor = DPTImageProcessorPil(  # as the published preprocessor_config.json has it
-        size={"height": 518, "width": 518}, ensure_multiple_of=14, keep_aspect_ratio=True,
-        image_mean=[0.485, 0.456, 0.406], image_std=[0.229, 0.224, 0.225],
-    )  # fmt: skip
-    picture = Image.fromarray((linear_to_srgb(photo.linear) * 255).round().astype(np.uint8))
-    wanted = torch.as_tensor(np.asarray(processor(picture)["pixel_values"]))
-    assert seen[0].shape == wanted.shape and (seen[0] - wanted).abs().max() < 0.02
-
-
-def test_a_damaged_depth_anything_is_refused(hub, tmp_path):
-    from safetensors.torch import load_file, save_file
-
-    folder = hub.save_depth_anything(tmp_path / "model")
-    weights = folder / "model.safetensors"
-    ask = lambda: get_predictor("constant", depth=f"depth-anything:{folder}", device="cpu").predict(made_photo())  # noqa: E731
-    state = load_file(weights)
-    name = next(iter(state))
-    save_file({k: v for k, v in state.items() if k != name}, weights)
-    with pytest.raises(WeightsError, match=r"DepthAnythingForDepthEstimation.*lacks"):
-        ask()
-    weights.write_bytes(b"x" * 40)
-    with pytest.raises(WeightsError, match="DepthAnythingForDepthEstimation"):
-        ask()
-
-
 def test_absent_models_say_how_to_get_them():
     for spec, part, name in (
         ("marigold", "albedo", "marigold-appearance"),
@@ -227,8 +185,3 @@ def test_appearance_reads_the_order_and_the_colour_space_of_the_targets():
     about["albedo"] = {"prediction_space": "srgb"}
     assert np.allclose(appearance(output, about)["albedo"], srgb_to_linear(output[1]))
     assert list(appearance(output, {"target_names": ["albedo", "shading"], "shading": {}})) == ["albedo"]
-
-
-def test_normals_keep_their_direction_and_get_their_length():
-    output = np.array([[[0.3, 0, 0.4], [0, 0, 0]]], np.float32)
-    assert np.allclose(unit_normals(output), [[[0.6, 0, 0.8], [0, 0, 1]]])

@@ -16,7 +16,7 @@ from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.sample import Options
 from materialist.train import checkpoint, click_views
-from materialist.train.click_views import ClickView, click_in, draw_click, worse
+from materialist.train.click_views import ClickView, draw_click, worse
 from materialist.train.clicks import click_losses
 
 
@@ -36,12 +36,6 @@ def test_clicks_lie_on_what_they_ask_for():
         assert spots.any() and mask[spots].all(), "every click lies on the object"
         seen.add(bool(mask.mean() > 0.5))
     assert seen == {True, False}, "things mostly, the floor at times"
-
-
-def test_a_view_without_anything_large_enough_has_no_click():
-    view = ClickView(**{**made_runs.click_view(0), "thing": np.zeros((64, 80), np.int16)})
-    assert draw_click(view, 64, np.random.default_rng(0)) is None
-    assert click_in(np.zeros((9, 9), bool), np.random.default_rng(0), 2.5) is None
 
 
 def test_worse_maps_lose_edges_and_keep_what_they_are():

@@ -50,18 +50,19 @@ def ssim(a: Array, b: Array) -> float:
     Wang et al. 2004 as published: Gaussian window, sigma 1.5 (11 x 11), mean over pixels and channels. Images smaller
     than the window are compared through the largest odd window that fits; below 3 x 3 pixels raises InputError.
     """
+    return ssim_of_values(linear_to_srgb(_checked(a, b)), linear_to_srgb(b))
+
+
+def ssim_of_values(a: Array, b: Array) -> float:
+    """As `ssim`, of maps [H, W] or [H, W, C] in [0, 1] as they are, without encoding."""
     from skimage.metrics import structural_similarity
 
-    a, b = linear_to_srgb(_checked(a, b)), linear_to_srgb(b)
     smallest = min(a.shape[:2])
     if smallest < 3:
         raise InputError(f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}.")
-    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    if smallest < 11:
-        options = {"win_size": smallest - (smallest + 1) % 2, "use_sample_covariance": False}
-    return float(
-        structural_similarity(a.astype(np.float64), b.astype(np.float64), data_range=1, channel_axis=-1, **options)
-    )
+    window = {"gaussian_weights": True, "sigma": 1.5} if smallest >= 11 else {"win_size": smallest - 1 + smallest % 2}
+    a, b, channel = a.astype(np.float64), b.astype(np.float64), -1 if a.ndim == 3 else None
+    return float(structural_similarity(a, b, data_range=1, channel_axis=channel, use_sample_covariance=False, **window))
 
 
 def sh_coefficients(envmap: Array, degree: int = 3) -> Array:

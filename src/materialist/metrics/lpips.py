@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +27,16 @@ def lpips(a: Array, b: Array) -> float | None:
         return float(network(tensor(a), tensor(b)))
 
 
-def backbone(name: str, _kept: dict[str, Any] = {}) -> Any:  # noqa: B006 (the dict is the memory)
-    """The lpips package's network on `alex` or `vgg`, once, frozen; None unless package and backbone are here."""
-    if name not in _kept:
-        import torch
+@cache
+def backbone(name: str) -> Any:
+    """The lpips package's network on `alex` or `vgg`, frozen; None unless package and backbone are here."""
+    import torch
 
-        files = {"alex": "alexnet*", "vgg": "vgg16*"}[name]
-        here = list((Path(torch.hub.get_dir()) / "checkpoints").glob(files))
-        try:
-            from lpips import LPIPS  # type: ignore[import-not-found]
-        except ImportError:
-            LPIPS = None
-        network = LPIPS(net=name, verbose=False).eval().requires_grad_(False) if LPIPS is not None and here else None
-        _kept[name] = network
-    return _kept[name]
+    files = {"alex": "alexnet*", "vgg": "vgg16*"}[name]
+    if not list((Path(torch.hub.get_dir()) / "checkpoints").glob(files)):
+        return None
+    try:
+        from lpips import LPIPS  # type: ignore[import-not-found]
+    except ImportError:
+        return None
+    return LPIPS(net=name, verbose=False).eval().requires_grad_(False)

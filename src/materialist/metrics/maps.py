@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.metrics import ssim
+from materialist.metrics import ssim, ssim_of_values
 from materialist.types import Array, Prediction
 
 LEAST_SURFACE = 0.01
@@ -35,7 +35,7 @@ def score(predicted: Prediction, true: Prediction, *, mask: Array | None = None)
         p, t = getattr(predicted.materials, name), getattr(true.materials, name)
         found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
         found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
-        found[f"{name}_ssim"] = _ssim_of_values(p, t, surface)
+        found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t)
     found |= depth_figures(predicted.depth, true.depth, surface)
     cosine = np.clip((predicted.normal * true.normal).sum(-1), -1, 1)[surface]
     found["normal_angle"] = float(np.degrees(np.arccos(cosine)).mean())
@@ -113,16 +113,5 @@ def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
         found[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
         found[f"albedo_psnr{suffix}"] = decibel(found[f"albedo{suffix}_mse"])
         filled = np.where(surface[..., None], estimate, true)  # outside the surface nothing differs
-        found[f"albedo_ssim{suffix}"] = ssim(filled, true) if min(surface.shape) >= 3 else float("nan")
+        found[f"albedo_ssim{suffix}"] = ssim(filled, true)
     return found
-
-
-def _ssim_of_values(predicted: Array, true: Array, surface: Array) -> float:
-    """SSIM of maps [H, W] in [0, 1] as they are (no encoding)."""
-    from skimage.metrics import structural_similarity
-
-    if min(surface.shape) < 11:
-        return float("nan")
-    filled = np.where(surface, predicted, true).astype(np.float64)
-    options = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    return float(structural_similarity(filled, true.astype(np.float64), data_range=1, **options))

@@ -7,9 +7,7 @@ Google trained them on the photographs of ImageNet (Apache 2.0; docs/training.md
 
 from __future__ import annotations
 
-import copy
 import math
-from functools import lru_cache
 from pathlib import Path
 
 import torch
@@ -101,11 +99,6 @@ def shipped(name: str) -> EfficientNetLite:
     """
     if name != NAME:
         raise ValueError(f"there is no encoder '{name}', only '{NAME}'")
-    return copy.deepcopy(_read())
-
-
-@lru_cache(maxsize=1)
-def _read() -> EfficientNetLite:
     encoder = EfficientNetLite()
     load_weights(encoder, read_state(WEIGHTS), WEIGHTS)
     return encoder.eval().requires_grad_(False).to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 import pytest
 
-from materialist.predict.bundled import edges
 from materialist.predict.bundled.edges import Guide, weighted_median
 
 
@@ -72,15 +71,3 @@ def test_a_constant_is_kept(level):
     np.testing.assert_array_equal(
         weighted_median(np.full(side.shape, level, np.float32), Guide(photo, radius=4)), level
     )
-
-
-@pytest.mark.parametrize("shape", [(64, 80), (63, 81)])
-def test_sums_at_half_the_resolution_hardly_differ(monkeypatch, shape):
-    photo, side = two_sides(*shape)
-    members = cv2.GaussianBlur(side.astype(np.float32), (0, 0), 3)
-    halved = Guide(photo, radius=10)
-    monkeypatch.setattr(edges, "HALVED", 1000)
-    whole = Guide(photo, radius=10)
-    assert halved.coarse != whole.coarse == shape
-    apart = np.abs(halved.share(members) - whole.share(members))
-    assert apart.shape == shape and apart.mean() < 0.005 and apart.max() < 0.08

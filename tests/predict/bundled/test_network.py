@@ -56,13 +56,6 @@ def test_a_batch_is_its_pictures_one_by_one(network):
         torch.testing.assert_close(together[name][1:2], alone[name], atol=1e-4, rtol=1e-4)
 
 
-def test_the_untrained_head_has_no_checkerboard(network):
-    with torch.inference_mode():
-        albedo = network(torch.full((1, 3, 64, 64), 0.4), torch.zeros(1, 2, 64, 64))["albedo"]
-    cell = albedo[..., 30:32, 30:32]
-    assert float((cell - cell.mean((-1, -2), keepdim=True)).abs().max()) < 1e-4
-
-
 def test_the_whole_network_learns():
     torch.manual_seed(1)
     network = BundledNetwork(TINY)
@@ -84,16 +77,6 @@ def test_any_size(file, size):
     known = prediction.depth > 0
     assert known.any() and np.isfinite(prediction.depth).all()
     assert np.median(prediction.depth[known]) == pytest.approx(inference.SETTINGS.median_depth, rel=0.05)
-
-
-def test_large_photos_and_their_mirror_images_are_seen_small(network, monkeypatch):
-    seen = []
-    run = inference._run
-    monkeypatch.setattr(inference, "_run", lambda n, photo, *rest: seen.append(photo.shape[:2]) or run(n, photo, *rest))
-    camera = Camera(150, 100, 60.0)
-    linear = np.random.default_rng(0).random((100, 150, 3), dtype=np.float32)
-    prediction = inference.infer(network, linear, inference.rays_of(camera), sides=(96,))
-    assert seen == [(64, 96)] * 2 and prediction.depth.shape == (100, 150)
 
 
 def test_rays_go_on_into_the_padding(network):
@@ -135,11 +118,6 @@ def test_weights_round_trip(network, file):
     assert not list(file.parent.glob("*.part"))
 
 
-def test_the_name_tells_weights_apart(file):
-    name = BundledPredictor(file).name
-    assert "step 7" in name and "sha256:" in name
-
-
 def test_bad_weights_are_refused(file, tmp_path):
     whole = file.read_bytes()
     broken = tmp_path / "broken.safetensors"
@@ -170,12 +148,3 @@ def test_the_same_photo_gives_the_same_maps(file):
     first, second = BundledPredictor(file).predict(photo), BundledPredictor(file).predict(photo, seed=9)
     np.testing.assert_array_equal(first.depth, second.depth)
     assert linear_to_srgb(first.materials.albedo).shape == (48, 64, 3)
-
-
-def test_sky_is_what_is_joined_to_sure_sky():
-    logit = np.full((6, 9), 3.0, np.float32)
-    logit[:2, :4] = -2.0
-    logit[0, 0] = inference.SETTINGS.sure_sky - 0.5
-    logit[:2, 6:] = -2.0  # a white wall: likely, and nowhere sure
-    surface = inference._surface(logit)
-    assert not surface[:2, :4].any() and surface.sum() == 54 - 8

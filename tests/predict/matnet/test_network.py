@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 import torch
 from made_matnet import TINY, made_network, made_photo
-from torch.nn import functional as F
 
-from materialist.errors import InputError
-from materialist.predict.matnet.encoder import PATCH, Encoder
+from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.inference import infer, network_size, planar_depth
-from materialist.predict.matnet.network import SIZES, MatNet
 
 
 def test_outputs_have_the_promised_shapes_and_ranges():
@@ -20,12 +17,6 @@ def test_outputs_have_the_promised_shapes_and_ranges():
     assert all((outputs[name] >= 0).all() for name in channels if name != "normal")
     assert torch.allclose(outputs["normal"].norm(dim=1), torch.ones(2, 42, 70), atol=1e-5)
     assert all(outputs[name].std() > 0 for name in channels)
-
-
-@pytest.mark.parametrize("shape", [(1, 3, 40, 70), (1, 3, 42, 71), (1, 4, 42, 70)])
-def test_forward_refuses_what_it_cannot_cut_into_patches(shape):
-    with pytest.raises(InputError, match="multiples of 14"):
-        made_network()(torch.rand(shape))
 
 
 def test_attention_is_the_textbook_one():
@@ -48,40 +39,6 @@ def test_tokens_keep_their_place():
         patches = encoder.patch_embed(image).transpose(1, 2).unflatten(-1, (3, 5))
     changed = (patches - patches[..., :1, :1]).abs().sum(1)[0] > 1e-6
     assert changed.nonzero().tolist() == [[1, 3]]
-
-
-def test_position_embedding_is_learned_grid_or_resized_with_the_offset():
-    encoder = made_network().pretrained
-    assert encoder._positions(5, 5) is encoder.pos_embed
-    learned = encoder.pos_embed[:, 1:].reshape(1, 5, 5, TINY.width).permute(0, 3, 1, 2)
-    wanted = F.interpolate(learned, scale_factor=(3.1 / 5, 8.1 / 5), mode="bicubic")
-    assert wanted.shape[-2:] == (3, 8)
-    found = encoder._positions(3, 8)
-    assert torch.equal(found[:, 1:].transpose(1, 2).reshape(wanted.shape), wanted)
-    plain = F.interpolate(learned, size=(3, 8), mode="bicubic")
-    assert not torch.allclose(wanted, plain, atol=1e-3)  # the offset matters
-
-
-def test_position_embedding_fits_every_size():
-    encoder = Encoder(4, 1, 1)
-    for rows in range(1, 80):
-        assert encoder._positions(rows, 37).shape[1] == 1 + rows * 37
-
-
-def test_later_blocks_are_not_computed_when_nothing_reads_them():
-    encoder = made_network().pretrained
-    encoder.blocks[3].forward = None
-    assert len(encoder(torch.rand(1, 3, 28, 28), (0, 2))) == 2
-
-
-@pytest.mark.parametrize(("size", "count"), [("vits", 303), ("vitb", 303), ("vitl", 471)])
-def test_sizes_follow_depth_anything(size, count):
-    with torch.device("meta"):
-        state = MatNet(size).state_dict()
-    assert len(state) == count
-    assert state["pretrained.pos_embed"].shape == (1, 1370, SIZES[size].width)
-    with pytest.raises(InputError, match="vits, vitb, vitl"):
-        MatNet("vitg")
 
 
 @pytest.mark.parametrize(

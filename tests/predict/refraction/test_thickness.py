@@ -99,11 +99,6 @@ def test_windows_frame_small_objects_as_they_frame_large_ones():
         assert max(abs(rows.mean() - (SIDE - 1) / 2), abs(columns.mean() - (SIDE - 1) / 2)) < 0.5 + 0.5 * pixel
 
 
-def test_a_window_is_moved_about_its_middle():
-    window = Window(10.0, 20.0, 40.0).moved(1.1, 0.05, -0.1)
-    assert (window.left, window.top, window.side) == pytest.approx((10.0, 14.0, 44.0))
-
-
 def test_windows_reach_over_the_border_and_come_back():
     inside = np.zeros((60, 40), bool)
     inside[30:60, 0:12] = True

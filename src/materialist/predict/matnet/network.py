@@ -8,8 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.errors import InputError
-from materialist.predict.matnet.encoder import GRID, PATCH, Encoder
+from materialist.predict.matnet.encoder import GRID, Encoder
 from materialist.predict.matnet.head import Head
 
 
@@ -44,8 +43,6 @@ class MatNet(nn.Module):
     def __init__(self, size: str | Size = "vitb"):
         super().__init__()
         if isinstance(size, str):
-            if size not in SIZES:
-                raise InputError(f"There is no MatNet of size '{size}'; choose one of {', '.join(SIZES)}.")
             size = SIZES[size]
         self.size = size
         self.pretrained = Encoder(size.width, size.blocks, size.heads, size.grid)
@@ -63,11 +60,6 @@ class MatNet(nn.Module):
             [B, 3, H, W]: unit, camera frame (+X right, +Y up, +Z to the viewer). What `depth` means depends on the
             weights: in the published ones it falls with distance (see `planar_depth`).
         """
-        height, width = image.shape[-2:]
-        if height % PATCH or width % PATCH or image.shape[1] != 3:
-            raise InputError(
-                f"MatNet takes [B, 3, H, W] with sides that are multiples of 14, not {tuple(image.shape)}."
-            )
         features = self.pretrained(image, self.size.layers)
         materials = self.material_head(features)
         positive = F.relu(materials[:, :5])
