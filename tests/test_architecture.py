@@ -80,7 +80,6 @@ NETWORKS = (
     "predict.matnet.",
     "predict.refraction.",
     "predict.clicks.",
-    "predict.unet",
     "predict.efficientnet",
     "predict.network",
 )

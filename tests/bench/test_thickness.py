@@ -7,8 +7,8 @@ import torch
 import trimesh
 
 from materialist import bench
+from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction.network import RefractionNet
-from materialist.predict.unet import UNetArchitecture
 
 
 @pytest.fixture

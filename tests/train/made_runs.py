@@ -8,7 +8,7 @@ import torch
 
 from materialist.io.datasets import open_source
 from materialist.predict.bundled.network import BundledArchitecture
-from materialist.predict.unet import UNetArchitecture
+from materialist.predict.network import UNetArchitecture
 from materialist.train.bundled import RECIPE, BundledTask
 from materialist.train.clicks import RECIPE as CLICKS
 from materialist.train.clicks import ClickTask

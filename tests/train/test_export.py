@@ -11,7 +11,7 @@ from materialist.errors import InputError, OutputError, WeightsError
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.network import ClickNet
-from materialist.predict.unet import UNetArchitecture
+from materialist.predict.network import UNetArchitecture
 from materialist.predict.weights import sha256
 from materialist.train import checkpoint
 from materialist.train.export import export_run

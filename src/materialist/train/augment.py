@@ -75,7 +75,7 @@ def resized(sample: Sample, height: int, width: int) -> Sample:
 
 def flip(sample: Sample, axis: int = 1) -> Sample:
     """The mirror image along an axis: 1 reverses columns and negates x of normals and rays, 0 rows and y."""
-    mirror = np.float32([-1, 1, 1] if axis == 1 else [1, -1, 1])
+    mirror = np.array([-1, 1, 1] if axis == 1 else [1, -1, 1], np.float32)
     mirrored = _each(sample, lambda array, _: np.ascontiguousarray(np.flip(array, axis)))
     return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
 

@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from materialist.errors import InputError
 from materialist.predict.clicks.network import ClickNet
-from materialist.predict.unet import UNetArchitecture
+from materialist.predict.network import UNetArchitecture
 from materialist.train.click_views import ClickView, draw_click, load
 from materialist.train.task import Batch, Examples, Recipe, Task
 from materialist.types import Array

@@ -9,7 +9,7 @@ from materialist.errors import InputError, WeightsError
 from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.clicks.segment import ClickMaps, object_at
-from materialist.predict.unet import UNetArchitecture
+from materialist.predict.network import UNetArchitecture
 from materialist.types import Camera
 
 SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))

@@ -6,10 +6,10 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
+from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction import WEIGHTS, thickness
 from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
 from materialist.predict.refraction.network import LEAST, RefractionNet
-from materialist.predict.unet import UNetArchitecture
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 

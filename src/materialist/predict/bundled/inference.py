@@ -14,8 +14,9 @@ from materialist.camera import pixel_rays, rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
-from materialist.predict.bundled.network import STRIDE, BundledNetwork
+from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.bundled.relief import with_relief
+from materialist.predict.network import STRIDE
 from materialist.types import Array, Camera, Materials, Prediction
 
 _MIRROR = np.array([-1, 1, 1], np.float32)

@@ -15,10 +15,8 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.predict.efficientnet import shipped, unit_power
-from materialist.predict.network import Architecture, ResidualBlock, StoredNetwork, group_norm
+from materialist.predict.network import STRIDE, Architecture, ResidualBlock, StoredNetwork, group_norm
 
-STRIDE = 32
-"""Sides of the input are multiples of this."""
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
 """Maps that the network answers with, and their channels."""
 ALBEDO_SLOPE = 4.0

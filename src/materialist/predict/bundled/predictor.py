@@ -58,7 +58,8 @@ class BundledPredictor(Predictor):
         maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
-        sky, warnings = found.depth == 0, ()
+        sky = found.depth == 0
+        warnings: tuple[str, ...] = ()
         if "depth" not in wanted:  # there may be a surface in the depth of another source
             maps["normal"] = np.where(sky[..., None], 0, found.normal).astype(np.float32)
         elif sky.any():

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 
 from materialist.predict.clicks.features import CHANNELS, SPOT
 from materialist.predict.efficientnet import shipped, unit_power
-from materialist.predict.unet import UNet, UNetArchitecture
+from materialist.predict.network import UNet, UNetArchitecture
 
 DEFAULT = UNetArchitecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
 

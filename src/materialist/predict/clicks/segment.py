@@ -93,7 +93,7 @@ def _seen(network: ClickNet, photo: ClickMaps, clicks: Sequence[tuple[int, int]]
     import cv2
     import torch
 
-    from materialist.predict.unet import STRIDE
+    from materialist.predict.network import STRIDE
 
     part = ClickMaps(*(np.ascontiguousarray(v[window], np.float32) for v in photo))
     height, width = part.depth.shape

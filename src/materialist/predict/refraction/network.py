@@ -11,9 +11,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from materialist.predict.network import UNet, UNetArchitecture
 from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X
-from materialist.predict.unet import STRIDE as STRIDE
-from materialist.predict.unet import UNet, UNetArchitecture
 
 LEAST = 0.05
 """Added to the mirrored thickness, in units of the object's size, so that a factor can change where that is 0."""
