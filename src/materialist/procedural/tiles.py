@@ -152,14 +152,10 @@ def _carpet(rng):
     field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
     edge = np.minimum(_from_line(_X), _from_line(_Y))
     bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
-    border, first, second = edge < rng.uniform(0.08, 0.2), *(rng.random((2, 16)) < 0.5)
-    inner = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
-    return (
-        np.where(border, first[bands], _step(field, 0.02)),
-        np.where(border, second[bands], inner),
-        _noise(rng, 0.2),
-        0.5,
-    )
+    border, stripes = edge < rng.uniform(0.08, 0.2), rng.random((2, 16)) < 0.5
+    second = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
+    mix, third = (np.where(border, s[bands], f) for s, f in zip(stripes, (_step(field, 0.02), second)))
+    return mix, third, _noise(rng, 0.2), 0.5
 
 
 def _ornament(rng):

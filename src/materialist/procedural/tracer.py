@@ -81,7 +81,7 @@ class SampleTracer:
         # Lanes that end together belong to pixels far from each other: their common fate leaves no streaks.
         place, sample = lane % (h * w), lane // (h * w)
         pixel = place // VECTOR + (place % VECTOR) * (h * w // VECTOR)
-        rng = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))
+        rng = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
         jitter = mi.Point2f(mi.Float(sample % rows) + rng.next_float32(), mi.Float(sample // rows) + rng.next_float32())
         ray = self._camera_ray(pixel, jitter / rows)
         total, white = self._paths(ray, pixel, sample, rng, dr.opaque(mi.UInt32, seed))

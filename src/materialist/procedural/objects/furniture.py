@@ -18,7 +18,7 @@ def _legs(rng, width, depth, height, look) -> Parts:
     corners = [(x * (width / 2 - 0.06), 0, z * (depth / 2 - 0.06)) for x in (-1, 1) for z in (-1, 1)]
     if square:
         return [block((2 * r, height, 2 * r), at, look) for at in corners]
-    return [rod([at, np.add(at, (0, height, 0))], r, look, 10) for at in corners]
+    return [rod([(x, 0, z), (x, height, z)], r, look, 10) for x, _, z in corners]
 
 
 def _board_look(rng) -> m.Material:

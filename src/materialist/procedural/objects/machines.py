@@ -82,8 +82,8 @@ def _motor(rng, seat, head, pedal, back, r, looks) -> Parts:
         guard = hub + (r + 0.03) * np.stack([np.cos(t), np.sin(t), 0 * t], -1)
         parts.append(ScenePart(s.strip(guard, rng.uniform(0.1, 0.16)), lacquer if rng.random() < 0.7 else metal))
     for z in (-0.16, 0.16)[: int(rng.integers(1, 3))]:
-        pipe = [pedal, pedal, (pedal + back) / 2, back]
-        pipe = np.add(pipe, [(0.25, 0.15, z), (0.2, -0.08, z), (0, -0.08, z), (-0.25, 0.05, z)])
+        bends = [(0.25, 0.15, z), (0.2, -0.08, z), (0, -0.08, z), (-0.25, 0.05, z)]
+        pipe = np.add([pedal, pedal, (pedal + back) / 2, back], bends)
         parts.append(rod(pipe, [0.02, 0.022, 0.04, 0.045], metal, 10))
     low, high = np.add(pedal, [(-0.25, -0.1, -0.12), (0.3, 0.3, 0.12)])
     return parts + _bolted(rng, int(rng.integers(5, 12)), low, high, looks)

@@ -211,7 +211,9 @@ def slab(size: ArrayLike, radius: float = 0.0) -> Solid:
             normal = (normal / np.linalg.norm(normal, axis=-1, keepdims=True)).reshape(-1, 3)
             mirrored = np.linalg.det(np.eye(3)[[u, v, axis]]) * sign < 0
             uv = np.stack([a, b], -1).reshape(-1, 2)
-            sides.append(Solid(inner.reshape(-1, 3) + radius * normal, grid_faces(*a.shape, mirrored), normal, uv))
+            sides.append(
+                Solid(inner.reshape(-1, 3) + radius * normal, grid_faces(len(a), a.shape[1], mirrored), normal, uv)
+            )
     return moved(joined(sides), (0, half[1], 0))
 
 

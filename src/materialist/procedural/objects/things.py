@@ -56,9 +56,10 @@ def _box(rng, size) -> Parts:
 
 def _superquadric(rng, size) -> Parts:
     """Balls, eggs, rounded boxes, drums, diamonds."""
-    round_one = rng.random() < 0.4
-    extent = size * (np.full(3, rng.uniform(0.5, 1)) if round_one else rng.uniform(0.5, 1.1, 3))
-    solid = s.superquadric(extent, *((1, 1) if round_one else rng.uniform(0.2, 1.4, 2)), 32)
+    extent, (e1, e2) = size * rng.uniform(0.5, 1.1, 3), rng.uniform(0.2, 1.4, 2)
+    if rng.random() < 0.4:  # a ball
+        extent, e1, e2 = np.full(3, extent[0]), 1, 1
+    solid = s.superquadric(extent, e1, e2, 32)
     return [ScenePart(s.metric(solid, extent[0] * 1.5, extent[1] * 1.5), m.any_object(rng))]
 
 
