@@ -124,11 +124,11 @@ def _make_glass(session: Session, *values: Any) -> None:
     session.set("glass", **{name: text(v) for (name, text), v in zip(_GLASS.items(), values)})
 
 
-def _change_glass(name: str, session: Session, value: Any) -> bool:
+def _change_glass(name: str, session: Session, value: Any) -> dict[Any, Any] | bool:
     if session.current_kind != "glass":
         return False
     session.set("glass", **{name: _GLASS[name](value)})
-    return True
+    return {}
 
 
 def _wire_following(context: PageContext) -> None:
