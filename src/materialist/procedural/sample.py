@@ -140,11 +140,10 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: O
     """Render, denoise, expose, quantise."""
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
-    device = "cuda" if tracer.mi.variant().startswith("cuda") else "cpu"
-    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, device=device)
+    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, device=tracer.device)
     # The shading is of white surfaces: a guide of their texture would print it into the shading.
     covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
-    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, device=device)
+    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, device=tracer.device)
     labels = labels_of(probe)
     gain = exposure(image, rng) * balance(shading, rng)
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
