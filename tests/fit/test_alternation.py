@@ -152,17 +152,16 @@ def test_papers_first_stage_leaves_albedo_alone(room):
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
 
 
-@pytest.mark.parametrize("field", ["maps", "unet"])
-def test_other_material_fields_start_from_the_same_maps(room, field):
+def test_the_unet_starts_from_the_same_maps(room):
     """The ablation of the network type compares like with like: all start from the remapped prior."""
-    settings = short(replace(PAPER, materials=replace(PAPER.materials, field=field)), 1)
+    settings = short(replace(PAPER, materials=replace(PAPER.materials, field="unet")), 1)
     fit = room.fit(settings)
     state = fit.run()
     expected = 0.7 * fit.prior_maps()[:, 3:] + 0.2
     assert float((state.maps[:, 3:] - expected).abs().max()) < 0.05
 
 
-@pytest.mark.parametrize("field", ["mlp", "mlp-uv", "sh", "texels"])
+@pytest.mark.parametrize("field", ["mlp-uv", "sh"])
 def test_every_light_field_learns(room, field):
     light = replace(DEFAULT.light, field=field, height=16, schedule=Schedule(learning_rate=5e-3, max_steps=25))
     fit = room.fit(short(replace(DEFAULT, light=light, rounds=1, corrections=0, explained=None), 25))
