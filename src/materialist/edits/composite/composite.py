@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from materialist import metrics
-from materialist.edits.composite.emitters import in_photo
-from materialist.edits.composite.into_photo import into_photo
+from materialist.edits.composite.into_photo import in_photo, into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.composite.output import is_deep
 from materialist.edits.core.emitters import base_of, dimmed_emitters

@@ -72,7 +72,7 @@ def render_layers(
         anything = renderer.covered(edited)
         covered = anything if alone is None else anything & (alone.inside == 0)
         changed = changed | covered
-        covered = covered & ~renderer.emitter_pixels(edited)  # `emitters.in_photo` lays them on the photo
+        covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if clean:
             albedo, normal = renderer.guides(edited, anything)
             guides = (guides[0], albedo, guides[2], normal)
