@@ -129,24 +129,6 @@ def test_an_hdr_photo_tells_how_bright_its_lights_are():
     assert dimmed(scene, 1.0).provenance["photo_lights"]["radiance"] == pytest.approx(RADIANCE)
 
 
-def test_a_light_has_its_bright_rim_and_no_narrow_gaps_and_reflections_are_none():
-    _, fit = rooms()
-    large = np.zeros((120, 160, 3), np.float32)
-    large[20:60, 40:100] = 1
-    large[20:60, 70] = 0.05  # a leaf
-    large[60:62, 40:100] = 0.7  # the rim
-    large[62:100, 40:100] = 0.65  # a wall beside it, bright as well
-    large[105:115, 20:60] = 1  # on the table
-    normal = np.broadcast_to(np.float32([0, 0, 1]), large.shape).copy()
-    normal[105:115] = [0, 1, 0]
-    scene = replace(
-        fit, photo=replace(fit.photo, linear=large), depth=np.ones((120, 160), np.float32), normal=normal
-    )  # fmt: skip
-    (mask,) = visible_lights(scene)
-    assert mask[22:60, 41:99].all(), "with the leaf"
-    assert mask[60:62, 41:68].all() and not mask[66:, :].any(), "as far as the rim may go"
-
-
 def test_the_lights_that_are_meant_need_not_be_clipped():
     """Half of the window, in a photo so dark that it is grey: as bright as it is, and of its colour."""
     _, fit = rooms()

@@ -79,12 +79,6 @@ def test_a_lamp_of_power_one_shows_a_white_wall_as_white():
     np.testing.assert_allclose(picture[11:13, column].mean(), 1.0, rtol=0.2)  # R = 1: the lobes add up to 1.02-1.05
 
 
-def test_lamps_are_where_the_pixel_and_depth_say():
-    one = lamp(SCENE, 24, 18, 2.5, 4000, 1)
-    x, y, z = one.position
-    assert z == -2.5 and 0 < x < 0.1 and -0.1 < y < 0
-
-
 def test_edited_light_is_noted_and_warned_about():
     sunny = replace(SCENE, envmap=spot(16) * 0 + 0.01)
     sunny.envmap[5, 16] = 1000
