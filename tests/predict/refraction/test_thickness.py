@@ -7,7 +7,7 @@ import torch
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.predict.network import UNetArchitecture
-from materialist.predict.refraction import WEIGHTS, thickness
+from materialist.predict.refraction import WEIGHTS, best_thickness, thickness
 from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
 from materialist.predict.refraction.network import LEAST, RefractionNet
 from materialist.solids.symmetry import symmetric_thickness
@@ -153,3 +153,15 @@ def test_the_shipped_weights_know_a_ball():
     found = thickness(photo, mask, normal, depth, camera)
     assert np.abs(found.solid - true)[mask].sum() < 0.25 * true[mask].sum()
     assert WEIGHTS.stat().st_size < 15e6
+
+
+def test_a_ball_is_a_surface_of_revolution_and_half_a_ball_is_the_networks():
+    camera = Camera(64, 64, 40)
+    photo, mask, normal, depth, true = ball(camera, (0, 0, -3.0), 0.6)
+    guess = thickness(photo, mask, normal, depth, camera)
+    found = best_thickness(photo, mask, normal, depth, camera, up=np.array([0.0, 1, 0]))
+    assert found.method == "revolution" and found.revolution is not None and found.back is None
+    assert np.abs(found.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    assert (found.hollow <= found.solid).all() and (found.hollow <= guess.hollow).all() and found.hollow.max() > 0
+    half = mask & (np.arange(64) > 32)
+    assert best_thickness(photo, half, normal, depth, camera, up=np.array([0.0, 1, 0])).method == "network"
