@@ -25,7 +25,6 @@ _MEMBER = re.compile(
     r"bodies/\d{1,4}\.(ply|(albedo|roughness|metallic)\.exr)"
 )
 """The files of a scene package; nothing else is unpacked."""
-_DAMAGED = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
 
 def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:

@@ -199,7 +199,7 @@ def control_values(session: Session) -> dict[str, Any]:
     """
     step, light = session.edits.current_step, session.edits.light
     kind, options = (step.kind, step.options) if step is not None else ("", {})
-    given = {MaterialEdit: options if kind == "edit" else {}}
+    given: dict[type[OperationOptions], dict[str, Any]] = {MaterialEdit: options if kind == "edit" else {}}
     given[Relight] = session.edits.steps[light].options if light is not None else {}
     given |= {Glass: options} if kind == "glass" else {Insertion: options} if kind in objects.KINDS else {}
     values: dict[str, Any] = {}
