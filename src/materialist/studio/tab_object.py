@@ -125,6 +125,7 @@ def _make_glass(session: Session, *values: Any) -> None:
 
 
 def _change_glass(name: str, session: Session, value: Any) -> dict[Any, Any] | bool:
+    """Change the current glass; without one the control is for the next, and nothing is shown anew."""
     if session.current_kind != "glass":
         return False
     session.set("glass", **{name: _GLASS[name](value)})
