@@ -91,8 +91,8 @@ def numbers(called: str, text: str, low: float, high: float, kind: type = int) -
     return found
 
 
-def timed(work: Callable[[], Any]) -> tuple[Any, dict[str, float]]:
+def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dict[str, float]]:
     """What `work` returns, and its wall and processor seconds; other programs hardly change the latter."""
     wall, cpu = time.perf_counter(), time.process_time()
-    value = work()
+    value = work(*given, **named)
     return value, {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}

@@ -77,7 +77,7 @@ class EditBench(Benchmark):
         if self.predictor:
             ways["edit, predicted"] = {"predictor": self.predictor}
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        found = {name: timed(lambda o=o: pipeline.invert(sample.photo, **shared, **o)) for name, o in ways.items()}
+        found = {name: timed(pipeline.invert, sample.photo, **shared, **o) for name, o in ways.items()}
         return {name: (scene, cost["seconds"]) for name, (scene, cost) in found.items()}
 
     def _compared(
@@ -99,7 +99,7 @@ class EditBench(Benchmark):
         yield {"method": f"{CEILING} {edit.kind}, composite", **scores(brought, after, inside)}
         shown = [photo, after, best]
         for name, (scene, seconds) in fitted.items():
-            picture, cost = timed(lambda scene=scene: composite(scene, edit.change(scene), **shared))
+            picture, cost = timed(composite, scene, edit.change(scene), **shared)
             shown.append(picture)
             method = f"{edit.kind}: {name}"
             yield {"method": method, **scores(picture, after, inside), "fit_seconds": seconds, **cost}
@@ -123,22 +123,22 @@ class EditBench(Benchmark):
         mask[size // 3 : size // 2, size // 3 : size // 2] = True
         mask &= scene.depth > 0
         sample = f"{size} x {size}"
-        preview, cost = timed(lambda: Preview(scene, **shared))
+        preview, cost = timed(Preview, scene, **shared)
         yield {"method": "preview: built once", "sample": sample, **cost}
         changes = [edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
         for name, edited in (("preview: material", changes), ("preview: light", turns)):
             preview.render(edited[0])  # the first one compiles
             for one in edited[1:]:
-                yield {"method": name, "sample": sample, **timed(lambda one=one: preview.render(one))[1]}
-        _, cost = timed(lambda: composite(scene, changes[0], spp=256, **shared))
+                yield {"method": name, "sample": sample, **timed(preview.render, one)[1]}
+        _, cost = timed(composite, scene, changes[0], spp=256, **shared)
         yield {"method": "final: material, 256 paths", "sample": sample, **cost}
         layers = render_layers(EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed)
         side = (self.large, self.large)
         large = np.asarray(cv2.resize(scene.photo.original, side, interpolation=cv2.INTER_CUBIC))
         grain = 0.03 * np.random.default_rng(0).standard_normal((*side, 1), np.float32)
         photo = replace(scene.photo, original=np.clip(large * (1 + grain), 0, 1))
-        _, cost = timed(lambda: into_photo(photo, layers))
+        _, cost = timed(into_photo, photo, layers)
         yield {"method": "final: into a large photo", "sample": f"{self.large} x {self.large}", **cost}
 
 

@@ -170,7 +170,7 @@ class GlassBench(Benchmark):
         changes += [("ior", {"ior": ior}) for ior in (1.3, 1.7)] + [("tint", {"tint": (0.6, 0.9, 0.7)})]
         changes += [("roughness", {"roughness": r}) for r in (0.2, 0.4)] + [("transmission", {"transmission": 0.9})]
         for name, change in changes:
-            _, cost = timed(lambda change=change: preview.picture(**change, spp=16, seed=self.seed))
+            _, cost = timed(preview.picture, **change, spp=16, seed=self.seed)
             yield {"method": f"preview: {name}", "sample": sample, **cost}
 
 

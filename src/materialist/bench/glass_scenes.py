@@ -218,8 +218,9 @@ class GlassScene:
             light["light"] = {"type": "envmap", "bitmap": mi.Bitmap(grid), "to_world": half_turn(mi)}
         scene = mi.load_dict({"type": "scene", **light, **things, "sensor": camera})
         how = mi.load_dict(integrator or {"type": "path", "max_depth": length, "rr_depth": 64})
-        side = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
-        picture = np.array(mi.render(scene, integrator=how, spp=side * side, seed=seed & 0x7FFFFFFF))[..., :3]
+        edge = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
+        render: Any = mi.render  # whose types know no plain seeds
+        picture = np.array(render(scene, integrator=how, spp=edge * edge, seed=seed & 0x7FFFFFFF))[..., :3]
         whole = np.zeros((self.camera.height, self.camera.width, 3), np.float32)
         whole[box] = np.nan_to_num(picture)
         return whole

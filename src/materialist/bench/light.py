@@ -150,7 +150,7 @@ class _Stage:
             figures = self._on(self.mesh(completion), truth.materials, self.sample.envmap)
             yield {"method": CEILING + suffix, **figures}
             options: dict[str, Any] = {"completion": completion, "seed": self.bench.seed, "device": device}
-            found, cost = timed(lambda o=options: pipeline.invert(self.sample.photo, prior=truth, **o))
+            found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
             mesh = RenderScene(found.geometry, found.camera, device=device)
             off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
             yield {
@@ -170,7 +170,7 @@ class _Stage:
             if method.preset == "paper" and completion == "auto":
                 completion = "planes"
             options: dict[str, Any] = {"mesh": mesh, "seed": bench.seed, "device": bench.device}
-            (envmap, steps, mesh), cost = timed(lambda m=method, c=completion, o=options: fit(self.sample, m, c, **o))
+            (envmap, steps, mesh), cost = timed(fit, self.sample, method, completion, **options)
             seen = self._on(mesh, self.sample.truth.materials, envmap)["mesh_psnr"]
             yield {"method": name, **self._of_light(envmap), "mesh_psnr": seen, "steps": steps, **cost}
 

@@ -81,7 +81,7 @@ class MaterialsBench(Benchmark):
             report.settings.update({f"no true {which}": True for which in absent})
             predictions = []
             for spec, source in sources.items():
-                found, cost = timed(lambda s=source, p=photo: s.predict(p, seed=self.seed))
+                found, cost = timed(source.predict, photo, seed=self.seed)
                 predictions.append(found)
                 yield {"method": spec, "sample": name, **_scores(found, truth, absent), "seconds": cost["seconds"]}
             if k < self.pictures:

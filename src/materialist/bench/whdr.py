@@ -58,9 +58,10 @@ class WhdrBench(Benchmark):
         for spec, source in sources.items():
             for picture, file in pairs:
                 photo = read_photo(picture, size=self.size)
-                albedo, cost = np.ones_like(photo.linear) if spec == "constant" else photo.linear, {}
+                albedo = np.ones_like(photo.linear) if spec == "constant" else photo.linear
+                cost: dict[str, float] = {}
                 if source is not None:
-                    found, cost = timed(lambda s=source, p=photo: s.predict(p, seed=self.seed))
+                    found, cost = timed(source.predict, photo, seed=self.seed)
                     albedo = found.materials.albedo
                 try:
                     error, count = whdr(albedo, json.loads(file.read_text("utf-8")), self.delta)
