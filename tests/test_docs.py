@@ -20,8 +20,8 @@ SOURCE = ROOT / "src" / "materialist"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAPER_MAP = ROOT / "docs" / "paper_map.md"
 PROGRAM = get_command(app)
-FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--nproc-per-node", "--maps"}
-"""Options of Blender, the script for it, torchrun and MoGe that the pages name."""
+FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--maps"}
+"""Options of Blender, the script for it, and MoGe that the pages name."""
 
 
 def _page_id(page):

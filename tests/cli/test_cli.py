@@ -227,5 +227,5 @@ def test_every_command_takes_seed_device_and_json():
     found = dict(commands(typer.main.get_command(app)))
     assert {"invert", "studio", "doctor", "train refraction", "bench"} <= set(found)
     lacking = {name: {"--seed", "--device", "--json"} - options for name, options in found.items()}
-    idle = {"models list", "models download", "models verify", "train export"}
+    idle = {"models list", "models download", "models verify"}
     assert {name for name, options in lacking.items() if options} == idle

@@ -1,10 +1,8 @@
-"""Tiny training runs of each network, in this process or in several."""
+"""Tiny training runs of each network."""
 
-import os
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from materialist.io.datasets import open_source
 from materialist.predict.bundled.network import BundledArchitecture
@@ -12,7 +10,6 @@ from materialist.predict.network import UNetArchitecture
 from materialist.train.bundled import RECIPE, BundledTask
 from materialist.train.clicks import RECIPE as CLICKS
 from materialist.train.clicks import ClickTask
-from materialist.train.processes import join
 from materialist.train.refraction import RECIPE as REFRACTION
 from materialist.train.refraction import RefractionTask
 from materialist.train.schedule import Budget
@@ -39,25 +36,13 @@ def refraction(views: Path, held_out: Path | None = None, **options) -> Refracti
     return RefractionTask(views, held_out, REFRACTION.changed(**SMALL), **options)
 
 
-def trainer(task, run: Path, *, steps: int, resume=False, processes=None, notes=None, **options) -> Trainer:
+def trainer(task, run: Path, *, steps: int, resume=False, notes=None, **options) -> Trainer:
     """A run that writes no checkpoint before its end."""
     note = (lambda _: None) if notes is None else notes.append
     return Trainer(
         task, run, budget=Budget(steps=steps), options=RunOptions(**{"checkpoint_seconds": 1e9, "seed": 3, **options}),
-        processes=processes, resume=resume, note=note,
+        resume=resume, note=note,
     )  # fmt: skip
-
-
-def one_of_two(rank: int, port: int, data: Path, run: Path) -> None:
-    """What each of two processes does: train three steps and leave its weights beside the run."""
-    os.environ |= {"RANK": str(rank), "WORLD_SIZE": "2", "LOCAL_RANK": str(rank)}
-    os.environ |= {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port)}
-    torch.set_num_threads(1)
-    processes = join("cpu")
-    mine = trainer(bundled(data), run, steps=3, processes=processes)
-    mine.fit()
-    torch.save(mine.network.state_dict(), run / f"weights{rank}.pt")
-    processes.leave()
 
 
 def click_view(seed: int) -> dict:

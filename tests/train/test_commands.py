@@ -1,4 +1,4 @@
-"""`materialist train matnet` and `train export`, as a user calls them."""
+"""`materialist train matnet`, as a user calls it."""
 
 import json
 
@@ -27,12 +27,9 @@ def test_one_step_and_its_weights(data, tmp_path):
     more = made_samples.write_set(tmp_path / "more", 3)
     made = _call("matnet", "--data", data, "--data", more, "-o", tmp_path / "run", "--steps", 1, *small)
     assert made["step"] == 1
-    written = _call("export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--json")
-    assert written["step"] == 1 and written["megabytes"] < 40, "what the package can hold"
-    assert BundledNetwork.load(tmp_path / "w.safetensors")[1]["data"] == {"samples": 5, "seed": [5, 5]}
-    mixed = ("-o", tmp_path / "mean.safetensors", "--average-with", tmp_path / "w.safetensors", "--json")
-    _call("export", tmp_path / "run", *mixed)
-    assert "averaged with" in BundledNetwork.load(tmp_path / "mean.safetensors")[1]
+    weights = tmp_path / "run" / "weights.safetensors"
+    assert weights.stat().st_size < 40e6, "what the package can hold"
+    assert BundledNetwork.load(weights)[1]["data"] == {"samples": 5, "seed": [5, 5]}
 
 
 @pytest.mark.parametrize(
@@ -42,8 +39,6 @@ def test_one_step_and_its_weights(data, tmp_path):
         (["matnet", "--data", "DATA", "-o", "run"], "either --steps or --minutes"),
         (["matnet", "--data", "nowhere", "-o", "run", "--steps", "1"], "no data folder nowhere"),
         (["matnet", "--data", "DATA", "-o", "run", "--steps", "1", "--init", "x.pth"], "x.pth"),
-        (["export", "nowhere", "-o", "w.safetensors"], "give the folder of a run"),
-        (["export", "nowhere", "-o", "w.bin"], "not w.bin"),
     ],
 )
 def test_bad_input_is_named(arguments, said, data, tmp_path, monkeypatch, capsys):

@@ -1,9 +1,9 @@
-"""Runs: they learn, stop on time, go on where they stopped, and several processes make one network."""
+"""Runs: they learn, stop on time, go on where they stopped, and leave weights that predict."""
 
 import json
 import os
 import signal
-import socket
+from dataclasses import replace
 
 import made_runs
 import made_samples
@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.procedural.thickness.dataset import ViewPlan, produce
 from materialist.train import checkpoint
 from materialist.train.bundled import RECIPE
@@ -80,6 +81,23 @@ def test_a_run_learns_and_tells(run):
     assert (folder / "sheet.png").stat().st_size > 1000
 
 
+def test_its_averaged_weights_predict_and_begin_another_run(run, data):
+    folder, _ = run
+    predictor = BundledPredictor(folder / checkpoint.WEIGHTS)
+    assert predictor.facts["step"] == 50 and predictor.facts["data"]["seed"] == [5]
+    state = checkpoint.load(folder, "matnet")
+    begun = made_runs.bundled(data)
+    begun.init = folder / checkpoint.WEIGHTS
+    for found in (predictor.network.state_dict(), begun.network().state_dict()):
+        for name, tensor in found.items():
+            torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
+    assert any(not torch.equal(state["averaged"][n], state["network"][n]) for n in state["network"])
+    other = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, fine=16))
+    other.init = folder / checkpoint.WEIGHTS
+    with pytest.raises(WeightsError, match="is not a checkpoint of BundledNetwork"):
+        other.network()
+
+
 @pytest.mark.parametrize("kind", ["matnet", "clicks", "refraction"])
 def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
     whole = made_runs.trainer(tasks[kind](), tmp_path / "whole", steps=6)
@@ -91,15 +109,6 @@ def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
     rest.fit()
     assert rest.schedule.step == 6
     torch.testing.assert_close(weights_of(rest), weights_of(whole), atol=0, rtol=0)
-
-
-def test_another_budget_is_on_top(tasks, tmp_path):
-    made_runs.trainer(tasks["clicks"](), tmp_path / "run", steps=2).fit()
-    notes: list[str] = []
-    again = made_runs.trainer(tasks["clicks"](), tmp_path / "run", steps=2, resume=True, notes=notes)
-    assert any("Resumed at step 2" in note for note in notes)
-    again.fit()
-    assert checkpoint.load(tmp_path / "run", "clicks")["schedule"]["step"] == 4
 
 
 def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_path):
@@ -134,22 +143,6 @@ def test_checkpoints_are_whole_or_refused(tmp_path):
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(WeightsError, match="is damaged"):
         checkpoint.load(tmp_path, "matnet")
-    with pytest.raises(WeightsError, match="materialist train clicks"):
-        checkpoint.load(tmp_path / "nowhere", "clicks")
-
-
-def test_two_processes_train_one_network(data, tmp_path):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    run = tmp_path / "run"
-    torch.multiprocessing.spawn(made_runs.one_of_two, (port, data, run), nprocs=2)
-    first, second = (torch.load(run / f"weights{k}.pt", weights_only=True) for k in range(2))
-    for name in first:
-        torch.testing.assert_close(first[name], second[name], atol=0, rtol=0)
-    assert checkpoint.load(run, "matnet")["schedule"]["step"] == 3
-    start = made_runs.trainer(made_runs.bundled(data), tmp_path / "other", steps=1).network.state_dict()
-    assert any(not torch.equal(start[name], first[name]) for name in first)
 
 
 def test_pictures_grow_with_the_run(data, tmp_path):

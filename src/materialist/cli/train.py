@@ -12,7 +12,7 @@ import typer
 
 from materialist.cli import train_data
 from materialist.cli.generate import add_command
-from materialist.cli.options import Force, Json, Learning, Training, output_option
+from materialist.cli.options import Learning, Training, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import Interrupted
@@ -41,14 +41,14 @@ class Recipe:
     """What differs from the recipe of the network."""
 
     config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled
-    batch: Annotated[int | None, typer.Option(help="Pictures a step, on each device; default: the recipe's.")] = None
+    batch: Annotated[int | None, typer.Option(help="Pictures a step; default: the recipe's.")] = None
     size: Annotated[
         int | None, typer.Option(help="Side of all crops, pixels; default: the recipe's, small ones first.")
     ] = None
     rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None
     init: Annotated[
         Path | None,
-        typer.Option(help="Weights to begin from; bundled: those of `train export`, paper: Depth Anything or DINOv2."),
+        typer.Option(help="Weights to begin from; bundled: those of a run, paper: Depth Anything or DINOv2."),
     ] = None
 
 
@@ -69,7 +69,6 @@ def register(app: typer.Typer) -> None:
     """Add the command group."""
     train_data.register(train)
     add_command(train, matnet)
-    add_command(train, export)
     add_command(train, refraction)
     add_command(train, clicks)
     app.add_typer(train)
@@ -86,9 +85,9 @@ def matnet(
     recipe: Recipe,
     training: Training = Training(every=300),  # noqa: B008
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
-    workers: Annotated[int, typer.Option(help="Processes that load data, for each training process.")] = 1,
+    workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
 ) -> None:
-    """Train a network; several GPUs: torchrun --nproc-per-node N -m materialist train matnet ..."""
+    """Train a network of all maps; RUN/weights.safetensors holds it, ready to use."""
     from materialist.io.datasets import open_sources
     from materialist.train import bundled
     from materialist.train import matnet as paper
@@ -100,23 +99,6 @@ def matnet(
     chosen = base.changed(batch=recipe.batch, side=recipe.size, rate=recipe.rate)
     task = lambda begin, _: make(open_sources(data), chosen, init=begin, score_samples=score_samples)  # noqa: E731
     _train("matnet", task, output, training, init=recipe.init, workers=workers)
-
-
-def export(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run of `train matnet`.")],
-    output: Annotated[Path, output_option("FILE", "A .safetensors file.")],
-    average_with: Annotated[
-        Path | None, typer.Option(help="Exported weights, such as the run began from: the mean of both is written.")
-    ] = None,
-    as_json: Json = False,
-    force: Force = False,
-) -> None:
-    """Write the averaged weights of a run as float16 with everything needed to load them."""
-    from materialist.train.export import export_run
-
-    facts = export_run(run, output, average_with=average_with, force=force)
-    lines = [f"{output}: {facts['megabytes']:.1f} MB after {facts['step']} steps."]
-    report_success("train export", as_json, lines, output=str(output), **facts)
 
 
 def refraction(
@@ -183,32 +165,26 @@ def _train(
     `minutes` are those of a run that names neither steps nor minutes. Errors that make a run impossible are raised
     before `make_task` is called, which may take long.
     """
+    from materialist.predict.device import on_gpu
     from materialist.train import checkpoint
-    from materialist.train.processes import join
     from materialist.train.schedule import Budget
     from materialist.train.trainer import RunOptions, Trainer
 
     unlimited = training.steps is None and training.minutes is None
     budget = Budget(training.steps, minutes if unlimited else training.minutes)
     options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
-    processes = join(training.device)
-    quiet = training.as_json or not processes.first
-    note = (lambda _: None) if quiet else lambda text: typer.echo(text, err=True)
+    device = "cuda" if on_gpu(training.device) else "cpu"
+    note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
     checkpoint.resumed(output, kind, resume=training.resume)
     if init is not None and training.resume and checkpoint.exists(output):
         note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
         init = None
-    try:
-        with StageProgress(quiet=quiet) as progress:
-            trainer = Trainer(
-                make_task(init, progress), output, budget=budget, options=options, processes=processes,
-                resume=training.resume, note=note,
-            )  # fmt: skip
-            scores = trainer.fit(progress)
-    finally:
-        processes.leave()
-    if not processes.first:
-        return
+    with StageProgress(quiet=training.as_json) as progress:
+        trainer = Trainer(
+            make_task(init, progress), output, budget=budget, options=options, device=device, resume=training.resume,
+            note=note,
+        )  # fmt: skip
+        scores = trainer.fit(progress)
     step, sheet = trainer.schedule.step, output / "sheet.png"
     if trainer.interrupted:
         raise Interrupted(f"Interrupted at step {step}; the same command with --resume goes on.")

@@ -52,13 +52,8 @@ def resumed(folder: Path, kind: str, *, resume: bool, device: Any = "cpu") -> di
 
 
 def load(folder: Path, kind: str, device: Any = "cpu") -> dict[str, Any]:
-    """The state in FOLDER/checkpoint.pt.
-
-    Raises WeightsError when there is none or it is damaged, InputError for a run of another kind.
-    """
+    """The state in FOLDER/checkpoint.pt. Raises WeightsError when it is damaged, InputError for another kind of run."""
     path = folder / NAME
-    if not path.is_file():
-        raise WeightsError(f"{folder} holds no {NAME}; give the folder of a run of: materialist train {kind}.")
     try:
         state = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch raises whatever its unpickler or zip reader raises

@@ -34,9 +34,6 @@ decay of weights and of the rate), torch's default or a constant."""
 DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
 """Parts of the depth decoder that learn (paper: "the last four layers of the RefineNet"); its rest is frozen."""
 
-UNUSED = ".refinenet4.resConfUnit1."
-"""The first unit of the coarsest layer, which has nothing to be added to it."""
-
 
 class PaperTask(MapsTask):
     """MatNet: LPIPS + L1 for albedo, L1 for roughness and metallic, SiLog for depth, cosine for normals."""
@@ -128,14 +125,11 @@ class PaperTask(MapsTask):
 
 
 def freeze(network: MatNet) -> None:
-    """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder.
-
-    What a decoder never uses is frozen, too: processes that train together wait for every gradient.
-    """
+    """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder."""
     for name, parameter in network.named_parameters():
         refine = any(f".{layer}." in name for layer in DEPTH_DECODER_LEARNS)
         learns = name.startswith("material_head.") or (name.startswith("depth_head.") and refine)
-        parameter.requires_grad_(learns and UNUSED not in name)
+        parameter.requires_grad_(learns)
 
 
 def load_start(network: MatNet, path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""The stream of training batches: which examples are drawn, in which order, and by which process."""
+"""The stream of training batches: which examples are drawn, and in which order."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import torch
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from materialist.errors import InputError
-from materialist.train.processes import Processes
 from materialist.train.task import Examples
 from materialist.types import Array
 
@@ -46,21 +45,18 @@ class _Drawn(Dataset):
 
 def epoch(
     examples: Examples, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0,
-    processes: Processes | None = None,
 ) -> Generator[dict[str, torch.Tensor], None, None]:  # fmt: skip
     """Batches of one pass over all examples in a random order, without the first `skip` of them.
 
-    Order and variants depend on (seed, number) alone, for any number of workers; of several processes each gets a
-    share of its own, and all get equally many batches. A small set is repeated so that a pass has at least one batch.
+    Order and variants depend on (seed, number) alone, for any number of workers. A small set is repeated so that a
+    pass has at least one batch.
     Raises InputError where ATTEMPTS examples in a row cannot be read.
     """
     examples.refresh()
-    place = processes or Processes()
     order = np.random.default_rng((seed, number)).permutation(len(examples))
-    together = batch * place.world
-    order = np.tile(order, -(-together // len(order)))
-    order = order[: len(order) // together * together]
-    keys = [(int(order[k]), (seed, number, k)) for k in range(place.rank, len(order), place.world)]
+    order = np.tile(order, -(-batch // len(order)))
+    order = order[: len(order) // batch * batch]
+    keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
     loader = DataLoader(
         _Drawn(examples, side),
         batch_sampler=[keys[k : k + batch] for k in range(skip * batch, len(keys), batch)],  # type: ignore[arg-type]

@@ -29,7 +29,7 @@ class Recipe:
     side: int
     """Pixels on a side of training pictures, at the end where `growth` has smaller ones before."""
     batch: int
-    """Pictures a step, on each device."""
+    """Pictures a step."""
     rate: float
     """Peak learning rate."""
     weight_decay: float = 0.02  # of weights, not of biases and gains; tuned by eye

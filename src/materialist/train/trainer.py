@@ -1,4 +1,4 @@
-"""The training loop of all networks: resumable, on one device or several."""
+"""The training loop of all networks, resumable."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from torch import Tensor, nn
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import make_folder
 from materialist.train import checkpoint, stream
-from materialist.train.processes import Processes
 from materialist.train.schedule import Budget, StopRequest, TrainingSchedule
 from materialist.train.task import Batch, Task
 
@@ -33,7 +32,7 @@ class RunOptions:
     report_steps: int = 20
     """Steps of which a line of the curve is the mean."""
     workers: int = 0
-    """Processes that load and augment, for each training process; 0 for the training process itself."""
+    """Processes that load and augment; 0 for the training process itself."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -48,16 +47,15 @@ class Trainer:
     """Whether Ctrl-C ended it."""
 
     def __init__(
-        self, task: Task, folder: Path, *, budget: Budget, options: RunOptions | None = None,
-        processes: Processes | None = None, resume: bool = False, note: Note = lambda _: None,
+        self, task: Task, folder: Path, *, budget: Budget, options: RunOptions | None = None, device: str = "cpu",
+        resume: bool = False, note: Note = lambda _: None,
     ):  # fmt: skip
         """Start or resume a run.
 
         Raises OutputError when FOLDER holds a run and `resume` is off, InputError when that run is of another network.
         """
         self.task, self.recipe, self.folder, self.note = task, task.recipe, folder, note
-        self.options, self.processes = options or RunOptions(), processes or Processes()
-        self.device = self.processes.device
+        self.options, self.device = options or RunOptions(), torch.device(device)
         state = checkpoint.resumed(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
         self.network = task.network().to(self.device)
@@ -80,7 +78,6 @@ class Trainer:
             make_folder(folder)
         except OSError as error:
             raise OutputError(f"{folder} cannot be made ({error.strerror or error}); choose another folder.") from error
-        self.wrapped = self.processes.wrap(self.network)
         for text in task.notes:
             note(text)
 
@@ -92,8 +89,6 @@ class Trainer:
         with StopRequest() as stop:
             self._train(stop, progress)
             self.interrupted = stop.interrupted
-            if not self.processes.first:
-                return {}
             scores = {} if stop.asked else self.score()
             self.save()
         return scores
@@ -106,13 +101,13 @@ class Trainer:
             for name, value in self._step(batch).items():
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
-            done = self.processes.agree(self.schedule.done or stop.asked)
+            done = self.schedule.done or stop.asked
             if self.schedule.step % self.options.report_steps == 0 or done:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses, count, since = {}, 0, time.monotonic()
             if done:
                 break
-            if self.processes.first and time.monotonic() - saved > self.options.checkpoint_seconds:
+            if time.monotonic() - saved > self.options.checkpoint_seconds:
                 start = time.monotonic()
                 self.score()
                 self.save()
@@ -124,7 +119,7 @@ class Trainer:
         schedule = self.schedule.as_dict()
         facts = {
             "step": schedule["step"], "minutes": round(schedule["seconds"] / 60, 1),
-            "examples": schedule["step"] * self.recipe.batch * self.processes.world, "recipe": self.recipe.as_dict(),
+            "examples": schedule["step"] * self.recipe.batch, "recipe": self.recipe.as_dict(),
             "data": self.task.data(), "scores": self.last_scores,
         }  # fmt: skip
         self.task.save(self.folder / checkpoint.WEIGHTS, self.averaged, facts)
@@ -151,7 +146,7 @@ class Trainer:
             side = self.recipe.side_at(self.schedule.progress)
             batches = stream.epoch(
                 self.task.examples, number=self.epoch, side=side, batch=self.recipe.batch, seed=self.options.seed,
-                skip=self.batch, workers=self.options.workers, processes=self.processes,
+                skip=self.batch, workers=self.options.workers,
             )  # fmt: skip
             for batch in batches:
                 self.batch += 1
@@ -169,7 +164,7 @@ class Trainer:
             group["lr"] = rate
         batch = {name: t.to(self.device, non_blocking=True) for name, t in batch.items()}
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.recipe.bfloat16):
-            terms = self.task.losses(self.wrapped, batch)
+            terms = self.task.losses(self.network, batch)
         total: Tensor = sum(terms.values(), torch.zeros((), device=self.device))
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
@@ -190,11 +185,9 @@ class Trainer:
 
     def _report(self, losses: dict[str, float], count: int, seconds: float, progress: Progress) -> None:
         """One line of the curve."""
-        if not self.processes.first:
-            return
         line: dict[str, Any] = {"step": self.schedule.step, "seconds": self.schedule.seconds, "epoch": self.epoch}
         line |= {"rate": self.optimizer.param_groups[0]["lr"]}
-        line |= {"per_second": count * self.recipe.batch * self.processes.world / max(seconds, 1e-6)}
+        line |= {"per_second": count * self.recipe.batch / max(seconds, 1e-6)}
         line |= {name: value / count for name, value in losses.items()}
         checkpoint.append_line(self.folder / checkpoint.CURVE, {k: _rounded(v) for k, v in line.items()})
         progress("train", round(1000 * self.schedule.progress), 1000)

@@ -46,7 +46,7 @@ class BundledArchitecture(Architecture):
 class BundledNetwork(StoredNetwork):
     """Photo and camera rays in, all maps out."""
 
-    FORMAT, COMMAND = "materialist-bundled-1", "materialist train export"
+    FORMAT, COMMAND = "materialist-bundled-1", "materialist train matnet"
     ARCHITECTURE = BundledArchitecture
 
     def __init__(self, architecture: BundledArchitecture | None = None):

@@ -19,7 +19,7 @@ from materialist.types import Array, Photo
 
 
 class BundledPredictor(Predictor):
-    """The bundled network, or one of its kind from `train export`.
+    """The bundled network, or one of its kind from `train matnet`.
 
     Args:
         where: a .safetensors file, or "" for the weights in the package.
@@ -34,8 +34,8 @@ class BundledPredictor(Predictor):
         path = Path(where).expanduser() if str(where) else WEIGHTS
         if not path.is_file():
             raise WeightsError(
-                f"There are no weights of the bundled network at {path}; install materialist again, or train and "
-                "export some (materialist train matnet, materialist train export)."
+                f"There are no weights of the bundled network at {path}; install materialist again, or train "
+                "some (materialist train matnet)."
             )
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
         network, self.facts = BundledNetwork.load(path)

@@ -18,7 +18,7 @@ from materialist.predict.weights import INSTEAD, load_weights, metadata, read_st
 from materialist.types import Array, Photo
 
 FORMAT = "materialist-matnet-1"
-"""What a file of `train export` calls itself in its metadata: its depth output is depth."""
+"""What a file of `train matnet --config paper` calls itself in its metadata: its depth output is depth."""
 
 
 class MatNetPredictor(Predictor):
