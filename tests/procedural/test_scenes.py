@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.procedural import materials, outdoors, packing, rooms, tiles
-from materialist.procedural.objects import furniture, machines, things
+from materialist.procedural.objects import furniture, things
 from materialist.procedural.sample import balance, exposure
 
 
@@ -58,7 +58,7 @@ def test_things_do_not_stand_in_each_other():
     assert len(middles) > 3 and apart.min() > 0.05
 
 
-@pytest.mark.parametrize("maker", [rooms.room, rooms.table_top, outdoors.still_life, outdoors.outdoor, rooms.workshop])
+@pytest.mark.parametrize("maker", [rooms.room, rooms.table_top, outdoors.still_life, outdoors.outdoor])
 def test_worlds_can_be_packed_and_are_seen_from_within(maker):
     for k in range(2):
         rng = np.random.default_rng([5, k])
@@ -70,18 +70,9 @@ def test_worlds_can_be_packed_and_are_seen_from_within(maker):
         assert np.linalg.det(world.view.to_scene) == pytest.approx(1)
         angle = np.repeat((-np.diff(np.cos(np.linspace(0, np.pi, packing.ENV_ROWS + 1)))), 2 * packing.ENV_ROWS)
         assert (packed.env_density * angle).sum() * np.pi / packing.ENV_ROWS == pytest.approx(1, abs=1e-4)
-        if maker in (rooms.room, rooms.table_top, rooms.workshop):
+        if maker in (rooms.room, rooms.table_top):
             points = np.concatenate([p.solid.vertices for p in world.parts])
             assert (world.view.position > points.min(0)).all() and (world.view.position < points.max(0)).all()
-
-
-@pytest.mark.parametrize("maker", [maker for _, maker in machines.KINDS])
-def test_large_things_stand_on_the_floor_and_fit_into_a_room(maker):
-    for k in range(3):
-        points = np.concatenate([p.solid.vertices for p in maker(np.random.default_rng([8, k]))])
-        assert np.isfinite(points).all()
-        assert -0.03 < points[:, 1].min() < 0.035  # feet of bars, soles of shoes
-        assert 0.3 < np.ptp(points, axis=0).max() < 3.2
 
 
 def test_exposure_ignores_the_lamp_in_the_picture():

@@ -32,9 +32,7 @@ class DataSet:
     meshes: Annotated[Path | None, typer.Option(help="Folder of .ply meshes to use as well.")] = None
     envmaps: Annotated[Path | None, typer.Option(help="Folder of .exr HDR captures to use as well.")] = None
     split: Annotated[Split, typer.Option(help="heldout uses only the files kept aside for testing.")] = Split.train
-    only: Annotated[
-        str, typer.Option(metavar="KIND", help="Only room, table, still-life, outdoor or workshop scenes.")
-    ] = ""
+    only: Annotated[str, typer.Option(metavar="KIND", help="Only room, table, still-life or outdoor scenes.")] = ""
     resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False
 
 

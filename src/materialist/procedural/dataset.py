@@ -20,7 +20,7 @@ from materialist.procedural.objects import things
 from materialist.procedural.sample import Options, make_sample
 
 FORMAT = 1
-CONTENT = 5
+CONTENT = 6
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")

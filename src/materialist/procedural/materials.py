@@ -157,8 +157,6 @@ wallpaper = Finish(
 )  # fmt: skip
 lacquer = Finish("plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),))
 """Of any colour, dull or shiny."""
-rubber = replace(lacquer, base=((1, ALL, (0, 0.05), (0.05, 0.3)),), roughness=((1, 0.5, 0.9),))
-card = replace(lacquer, base=((1, (0.07, 0.1), (0.3, 0.55), (0.45, 0.75)),), roughness=((1, 0.7, 0.95),))
 skin = replace(lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),))
 white_paint = replace(lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),))
 plastic = replace(lacquer, base=(*ANY_COLOUR, (1, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT)

@@ -1,4 +1,4 @@
-"""Rooms and workshops: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
+"""Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import numpy as np
 from materialist.procedural import lights, walls
 from materialist.procedural import materials as m
 from materialist.procedural.objects import furniture as f
-from materialist.procedural.objects import machines
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects.things import Meshes
 from materialist.procedural.walls import RoomWall
@@ -61,24 +60,6 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wor
     return _world(rng, size, captures, standing.parts, view, "table")
 
 
-def workshop(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World:
-    """A large thing of many parts seen from one metre to five, in a garage or hall with loaded shelves."""
-    w, d, h = size = rng.uniform([3.2, 4.0, 2.3], [8.0, 9.0, 4.0])
-    main = np.array([rng.uniform(-0.25, 0.25) * w, 0, rng.uniform(-0.3, 0.1) * d])
-    standing = Furniture(size)
-    standing.add(placed(m.pick(rng, machines.KINDS)(rng, meshes), main, rng.normal() * 0.5), anyhow=True)
-    standing.along_walls(rng, _some(rng, machines.ALONG_WALLS, 4, 12, meshes))
-    standing.in_the_middle(rng, _some(rng, machines.KINDS, 0, 3, meshes))
-    standing.in_the_middle(rng, _some(rng, ((1, f.floor_thing),), 0, 4, meshes))
-    target = np.add(main, (rng.normal() * 0.25, rng.uniform(0.3, 0.9), 0))
-    turn, distance = rng.normal() * 0.5, rng.uniform(1.6, 4.5)
-    eye = target + distance * np.array([np.sin(turn), 0, np.cos(turn)])
-    eye[1] = rng.uniform(0.8, 1.8)
-    eye = np.clip(eye, [-w / 2 + 0.2, 0.3, main[2] + 1.1], [w / 2 - 0.2, h - 0.3, d / 2 - 0.15])
-    view = look(eye, target, rng.uniform(33, 70), rng.normal() * 0.025)
-    return _world(rng, size, captures, standing.parts, view, "workshop")
-
-
 def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
     """At least `low` and fewer than `high` pieces of these kinds."""
     return [m.pick(rng, kinds)(rng, meshes) for _ in range(int(rng.integers(low, high)))]
@@ -86,10 +67,9 @@ def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
 
 def _world(rng, size: Size, captures, furniture: Parts, view: Viewpoint, kind: str) -> World:
     w, d, _ = size
-    ground = m.ground(rng) if kind == "workshop" and rng.random() < 0.5 else None
-    parts, portals, envmap = shell(rng, size, captures, ground)
+    parts, portals, envmap = shell(rng, size, captures)
     parts += furniture
-    if kind != "workshop" and rng.random() < 0.5:
+    if rng.random() < 0.5:
         a, b = w * rng.uniform(0.3, 0.7), d * rng.uniform(0.25, 0.6)
         rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
         parts.append(block((a, 0.012, b), (rng.normal() * 0.3, 0, rng.normal() * 0.4), rug, 0.004))
@@ -104,11 +84,8 @@ def _sides(size: Size) -> list[tuple[Array, float, float]]:
     return list(zip(corners, (0.0, -np.pi / 2, np.pi, np.pi / 2), (w, d, w, d)))
 
 
-def shell(rng, size: Size, captures, ground: m.Material | None = None) -> tuple[Parts, list[Portal], Array]:
-    """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms.
-
-    ground: what the floor is made of, if not what rooms have.
-    """
+def shell(rng, size: Size, captures) -> tuple[Parts, list[Portal], Array]:
+    """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
     is_open = rng.random() < 0.25
     parts: Parts = []
@@ -138,7 +115,7 @@ def shell(rng, size: Size, captures, ground: m.Material | None = None) -> tuple[
             portals.append(Portal(low, right - low, up - low))
     floor = m.one_of(rng, m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric)
     ceiling = m.floor_boards(rng) if rng.random() < 0.08 else m.white_paint(rng)
-    parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), ground or floor))
+    parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), floor))
     parts.append(ScenePart(s.sheet((-w / 2, h, -d / 2), w * x, d * z), ceiling))
     if rng.random() < 0.12:
         beams, look = np.arange(-w / 2 + 0.4, w / 2, 0.9), m.wood(rng)
@@ -156,11 +133,11 @@ class Furniture:
         self.parts: Parts = []
         self.boxes: list[tuple[Array, Array]] = []
 
-    def add(self, piece: Parts, *, anyhow: bool = False) -> None:
-        """Take the piece in, unless it reaches through a wall or into another piece; or `anyhow`."""
+    def add(self, piece: Parts) -> None:
+        """Take the piece in, unless it reaches through a wall or into another piece."""
         low, high = bounds(piece)
         inside = (np.maximum(-low, high)[[0, 2]] <= self.size[:2] / 2).all()
-        if anyhow or (inside and not any((low < b).all() and (high > a).all() for a, b in self.boxes)):
+        if inside and not any((low < b).all() and (high > a).all() for a, b in self.boxes):
             self.parts += piece
             self.boxes.append((low, high))
 

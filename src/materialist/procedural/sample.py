@@ -21,11 +21,10 @@ PROBE = 4
 ATTEMPTS = 6
 """Cameras that see too little are thrown away at most that often."""
 _KINDS: tuple[tuple[str, Callable[..., World], float], ...] = (
-    ("room", rooms.room, 0.36),
-    ("table", rooms.table_top, 0.14),
-    ("still-life", outdoors.still_life, 0.12),
-    ("outdoor", outdoors.outdoor, 0.18),
-    ("workshop", rooms.workshop, 0.2),
+    ("room", rooms.room, 0.45),
+    ("table", rooms.table_top, 0.175),
+    ("still-life", outdoors.still_life, 0.15),
+    ("outdoor", outdoors.outdoor, 0.225),
 )
 """Name, maker and share of a set."""
 KINDS = tuple(name for name, *_ in _KINDS)

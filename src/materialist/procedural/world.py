@@ -117,11 +117,6 @@ def placed(parts: Parts, at: ArrayLike, turn: float = 0.0) -> Parts:
     return moved(one_thing(parts), at, turn)
 
 
-def standing(parts: Parts) -> Parts:
-    """The parts moved up or down together, so that they stand on y = 0."""
-    return placed(parts, (0, -bounds(parts)[0][1], 0))
-
-
 def bounds(parts: Parts) -> tuple[Array, Array]:
     """[3] lower and [3] upper corner of the box around the parts, metres."""
     points = np.concatenate([p.solid.vertices for p in parts])
