@@ -46,8 +46,8 @@ class BatchOptions:
 
     apply: str | Path | None = None
     """A list of edits (docs/editing.md); `{name}` in its file names stands for the photo's name."""
-    spp: int = 256
-    """Paths per pixel of the edit's renderings."""
+    spp: int | None = None
+    """Paths per pixel of the edit's renderings; None: those of `composite`."""
     workers: int | None = None
     """Worker processes; None: one a GPU, else one a processor as far as memory reaches."""
     ray: str | None = None
@@ -61,7 +61,7 @@ class BatchOptions:
 
     def __post_init__(self) -> None:
         """Raises InputError."""
-        if self.apply is not None and not 2 <= self.spp <= 1_000_000:
+        if self.apply is not None and self.spp is not None and not 2 <= self.spp <= 1_000_000:
             raise InputError(f"spp is a number of paths from 2 to 1000000, not {self.spp}.")
         if self.workers is not None and self.workers < 1:
             raise InputError(f"The number of workers is {self.workers}; give at least 1.")

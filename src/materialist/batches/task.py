@@ -55,8 +55,8 @@ class PhotoTask:
     """Keywords of the inversion; `{name}` in a text stands for the name."""
     edits: Path | None = None
     """A list of edits to apply."""
-    spp: int = 256
-    """Paths per pixel of each rendering of the edit."""
+    spp: int | None = None
+    """Paths per pixel of each rendering of the edit; None: those of `composite`."""
     inverted: bool = False
     """The package is there, whole and of this photo and these options: only the edit is missing."""
     function: str = INVERSION

@@ -48,7 +48,9 @@ def batch(
     predictor: Annotated[str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")] = "auto",
     fov: FieldOfView = "auto",
     size: WorkingSize = 512,
-    spp: Annotated[int, typer.Option(help="Paths per pixel of the edits' renderings.")] = 128,
+    spp: Annotated[
+        int | None, typer.Option(help="Paths per pixel of the edits; else 256 for glass and other light, 128.")
+    ] = None,
     seed: Seed = 0,
     device: DeviceOption = Device.auto,
     as_json: Json = False,

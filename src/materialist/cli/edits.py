@@ -16,6 +16,8 @@ from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
 from materialist.options import Glass, Insertion, MaterialEdit, Removal
 
+PREVIEW_PATHS = 16
+"""Paths a pixel of `glass --preview`, as in the studio."""
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
 
 
@@ -77,7 +79,7 @@ def glass(
     region: Region,
     options: Glass,
     run: Run,
-    rendering: Rendering = Rendering(spp=96),  # noqa: B008
+    rendering: Rendering,
     preview: Annotated[
         bool, typer.Option("--preview", help="Sooner: working size, without its shadow and caustics.")
     ] = False,
@@ -95,7 +97,7 @@ def glass(
     loaded = load_scene(scene)
     found = chosen_region(loaded, region, run)
     if preview:
-        _preview(loaded, found, options, output, rendering.spp, run)
+        _preview(loaded, found, options, output, rendering.spp or PREVIEW_PATHS, run)
         return
     edited = change(loaded, found, options)
     source = edited.provenance["edits"][-1]["thickness"]

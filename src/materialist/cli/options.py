@@ -93,7 +93,10 @@ class Region(Place):
 class Rendering:
     """How an edited scene becomes a picture."""
 
-    spp: Annotated[int, typer.Option(help="Paths per pixel, of each of the two renderings.")] = 128
+    spp: Annotated[
+        int | None,
+        typer.Option(help="Paths per pixel, of both renderings; else 256 for glass and other light, 128 for the rest."),
+    ] = None
     denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")] = True
     full_render: Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")] = False
     save: Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")] = (

@@ -46,7 +46,7 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | N
     from materialist.io.video import ensure_video_writable
 
     save = rendering.save
-    if not 2 <= rendering.spp <= 1_000_000:
+    if rendering.spp is not None and not 2 <= rendering.spp <= 1_000_000:
         raise InputError(f"--spp is a number of paths from 2 to 1000000, not {rendering.spp}.")
     if save is not None:
         if rendering.full_render:
@@ -74,13 +74,14 @@ def write_result(
     from materialist.edits.composite.composite import composite, developed
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import warnings_since
-    from materialist.edits.core.renderer import is_relit
+    from materialist.edits.core.renderer import is_relit, paths_for
     from materialist.io.package import save_scene
 
     start, save = time.monotonic(), rendering.save
+    spp = rendering.spp or paths_for(scene, edited)
     with StageProgress(quiet=run.as_json) as progress:
         picture = composite(
-            scene, edited, spp=rendering.spp, seed=run.seed, full_render=rendering.full_render,
+            scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
             denoise=rendering.denoise, device=run.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=run.force)
@@ -93,7 +94,7 @@ def write_result(
     if save is not None:
         shown.append(f"The edited scene is {save}")
     report_success(
-        command, run.as_json, shown, image=str(output), scene=str(save) if save else None, spp=rendering.spp,
+        command, run.as_json, shown, image=str(output), scene=str(save) if save else None, spp=spp,
         seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings,
     )  # fmt: skip
 

@@ -8,8 +8,11 @@ from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
+from materialist.edits.core.renderer import paths_for
 from materialist.edits.glass.glass import LID, NO_ROOM, SOLID, glass
 from materialist.edits.glass.thickness import object_thickness, objects_in
+from materialist.edits.light.relight import relight
+from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.types import Camera, Materials, Photo, Prediction, Scene
@@ -29,6 +32,12 @@ def test_glass_is_a_body_before_the_continued_wall():
     what = edited.provenance["edits"][-1]
     assert what["kind"] == "glass" and what["thickness"] == "symmetry"
     assert not scene.bodies and "edits" not in scene.provenance
+
+
+def test_glass_and_other_light_take_twice_the_paths():
+    scene = flat_scene()
+    edits = edit(scene, MASK, hue=90), relight(scene, rotate=90), glass(scene, MASK, thickness="symmetry")
+    assert [paths_for(scene, edited) for edited in edits] == [128, 256, 256]
 
 
 def test_glass_that_bends_nothing_is_not_there():

@@ -13,7 +13,7 @@ from materialist.edits.composite.layers import render_layers
 from materialist.edits.composite.output import is_deep
 from materialist.edits.core.emitters import base_of, dimmed_emitters
 from materialist.edits.core.notes import PICTURED, is_pictured
-from materialist.edits.core.renderer import EditRenderer, denoised, rendered
+from materialist.edits.core.renderer import EditRenderer, denoised, paths_for, rendered
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -27,7 +27,7 @@ def composite(
     scene: Scene,
     edited: Scene,
     *,
-    spp: int = 128,
+    spp: int | None = None,
     seed: int = 0,
     full_render: bool = False,
     denoise: bool = True,
@@ -40,7 +40,7 @@ def composite(
     Args:
         scene: the fitted scene; its photo is what stays.
         edited: the same scene after `edit`, `relight`, ...
-        spp: paths per pixel, of each of the two renderings.
+        spp: paths per pixel, of each of the two renderings; None: 256 for new glass and another light, else 128.
         full_render: the plain rendering of the edited scene at working size, as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
         upscale: with `full_render`, a super-resolution of yours that brings the rendering to the photo's native size
@@ -57,6 +57,7 @@ def composite(
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
+    spp = spp or paths_for(scene, edited)
     renderer = EditRenderer(compared(scene, edited), device=device)
     if not full_render:
         return _in_photo(renderer, scene, edited, spp=spp, seed=seed, denoise=denoise, progress=progress)
@@ -65,7 +66,7 @@ def composite(
 
 
 def pictures(
-    scene: Scene, edits: Iterable[Scene], *, spp: int = 64, seed: int = 0, full_render: bool = False,
+    scene: Scene, edits: Iterable[Scene], *, spp: int | None = 64, seed: int = 0, full_render: bool = False,
     denoise: bool = True, device: str = "auto", progress=None, count: int | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
@@ -82,10 +83,11 @@ def pictures(
         if edited is not before:
             if before is None or not _same_base(scene, before, edited):
                 renderer = EditRenderer(compared(scene, edited), device=device)
+            paths = spp or paths_for(scene, edited)
             if full_render:
-                picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
+                picture = full_rendering(renderer, edited, spp=paths, seed=seed, denoise=denoise)
             else:
-                picture = _in_photo(renderer, scene, edited, spp=spp, seed=seed, denoise=denoise)
+                picture = _in_photo(renderer, scene, edited, spp=paths, seed=seed, denoise=denoise)
         before = edited
         yield picture
     tick("frames", total, total)

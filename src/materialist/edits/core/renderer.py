@@ -135,6 +135,12 @@ def is_relit(scene: Scene, edited: Scene) -> bool:
     )  # fmt: skip
 
 
+def paths_for(scene: Scene, edited: Scene) -> int:
+    """Paths a pixel of a composite where none are asked for: twice as many for new glass and another light."""
+    glass = any(is_transparent(body.surface) and body not in scene.bodies for body in edited.bodies)
+    return 256 if glass or is_relit(scene, edited) else 128
+
+
 def new_lamps(scene: Scene, edited: Scene) -> list[str]:
     """Names of the shapes of lamps that `edited` has and `scene` has not; a second one like the first is new."""
     known, names = list(scene.lamps), []
