@@ -108,5 +108,5 @@ def test_scores_are_taken_on_the_validation_split(folder):
     _write(scene, "000")
     write_exr(scene / "000_albedo.exr", np.full((12, 16, 3), 0.75, np.float32))
     (folder / "dataset_85" / "val.txt").write_text("L3D9\n")
-    samples = held_out(InteriorVerse(folder), 3)
+    _, samples = held_out(InteriorVerse(folder), 3)
     assert len(samples) == 1 and samples[0].albedo.mean() == pytest.approx(0.75, rel=1e-3)

@@ -15,9 +15,8 @@ from materialist.errors import InputError
 from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.sample import Options
-from materialist.train import checkpoint, click_views
-from materialist.train.click_views import ClickView, draw_click, worse
-from materialist.train.clicks import click_losses
+from materialist.train import checkpoint
+from materialist.train.clicks import ClickView, click_losses, draw_click, load_views, produce_views, worse
 
 
 @pytest.fixture(scope="module")
@@ -76,17 +75,17 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     for seed, data in enumerate(sets):
         produce_set(data, Options(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
     views = tmp_path / "run" / "views"
-    assert click_views.produce(sets[0], views) == 1
-    (made,) = click_views.load(views)
+    assert produce_views(sets[0], views) == 1
+    (made,) = load_views(views)
     assert made.rgb.shape == (64, 64, 3) and made.rgb.dtype == np.uint8
     length = np.linalg.norm(made.normal.astype(float) / 127, axis=-1)
     assert np.abs(length[made.depth > 0] - 1).max() < 0.03
     assert 1 in np.sign(made.thing)
     before = (views / "0000000.npz").stat().st_mtime_ns
     shutil.move(sets[0], tmp_path / "elsewhere")
-    assert click_views.produce(tmp_path / "elsewhere", views) == 1, "a set may move"
+    assert produce_views(tmp_path / "elsewhere", views) == 1, "a set may move"
     with pytest.raises(InputError, match="seed 11, not 12"):
-        click_views.produce(sets[1], views)
+        produce_views(sets[1], views)
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
 
 
@@ -96,10 +95,10 @@ def test_input_that_cannot_be(folder, tmp_path):
     shutil.copytree(folder, tmp_path / "views")
     os.truncate(tmp_path / "views" / "0000001.npz", 500)
     with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
-        click_views.load(tmp_path / "views")
+        load_views(tmp_path / "views")
     checkpoint.save(tmp_path, {"kind": "matnet"})
     command = ["train", "clicks", "-o", tmp_path, "--data", write_set(tmp_path / "set", 1), "--steps", 1, "--resume"]
     with pytest.raises(InputError, match="holds a run of `train matnet`"):
         CliRunner().invoke(app, [str(word) for word in command], catch_exceptions=False)
     with pytest.raises(InputError, match="describes no data set"):
-        click_views.produce(tmp_path / "set", tmp_path / "other")
+        produce_views(tmp_path / "set", tmp_path / "other")

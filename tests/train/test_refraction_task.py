@@ -1,6 +1,5 @@
 """The training of RefractionNet, on two shapes."""
 
-import json
 import os
 import shutil
 import signal
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from torch.utils.data import default_collate
-from typer.testing import CliRunner
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
@@ -92,11 +90,3 @@ def test_views_that_cannot_be_used(views, tmp_path):
         dataset.produce(tmp_path / "views", dataset.ViewPlan(shapes=1, views=3))
     with pytest.raises(InputError, match="views have 64"):
         RefractionTask(views, None, RECIPE.changed(side=96))
-
-
-def test_the_command_makes_views(tmp_path):
-    options = ["--shapes", "1", "--views", "1", "--heldout", "1", "--data-only", "--json"]
-    result = CliRunner().invoke(app, ["train", "refraction", "-o", str(tmp_path / "run"), *options])
-    assert result.exit_code == 0, result.output
-    assert json.loads(result.stdout.splitlines()[-1])["data"].endswith("views")
-    assert (tmp_path / "run" / "views" / "train" / "00000.npz").is_file()

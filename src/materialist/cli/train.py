@@ -59,7 +59,6 @@ class Views:
     data: Annotated[
         Path | None, typer.Option(help="Folder for the views, used again by later runs; default: RUN/views.")
     ] = None
-    data_only: Annotated[bool, typer.Option("--data-only", help="Make the views, do not train.")] = False
     shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640
     views: Annotated[int, typer.Option(help="Views of each.")] = 24
     heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64
@@ -108,7 +107,9 @@ def refraction(
     learning: Learning = Learning(batch=32, rate=2e-3),  # noqa: B008
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
+    from materialist.predict.refraction.network import RefractionNet
     from materialist.procedural.thickness.dataset import ViewPlan, produce
+    from materialist.train.refraction import RECIPE, RefractionTask
 
     folder = views.data or output / "views"
     lessons, aside = folder / "train", folder / "heldout"
@@ -116,15 +117,6 @@ def refraction(
         aside: ViewPlan(views.heldout, min(views.views, 8), "heldout", training.seed),
         lessons: ViewPlan(views.shapes, views.views, "train", training.seed),
     }
-    if views.data_only:
-        with StageProgress(quiet=training.as_json) as progress:
-            seconds = sum(produce(place, plan, progress) for place, plan in plans.items())
-        lines = [f"{views.shapes} x {views.views} views in {lessons} ({seconds:.0f} s)"]
-        report_success("train refraction", training.as_json, lines, data=str(folder), seconds=seconds)
-        return
-    from materialist.predict.refraction.network import RefractionNet
-    from materialist.train.refraction import RECIPE, RefractionTask
-
     recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
 
     def task(begin: Path | None, progress: Progress) -> Any:
@@ -144,13 +136,12 @@ def clicks(
     learning: Learning,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
-    from materialist.train.click_views import produce
-    from materialist.train.clicks import RECIPE, ClickTask
+    from materialist.train.clicks import RECIPE, ClickTask, produce_views
 
     recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
 
     def task(begin: Path | None, progress: Progress) -> Any:
-        produce(data, output / "views", progress)
+        produce_views(data, output / "views", progress)
         return ClickTask(output / "views", recipe, init=begin)
 
     _train("clicks", task, output, training, init=learning.init, minutes=40)
@@ -176,9 +167,6 @@ def _train(
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
     checkpoint.resumed(output, kind, resume=training.resume)
-    if init is not None and training.resume and checkpoint.exists(output):
-        note(f"--init is where a run begins; that in {output} goes on from its checkpoint.")
-        init = None
     with StageProgress(quiet=training.as_json) as progress:
         trainer = Trainer(
             make_task(init, progress), output, budget=budget, options=options, device=device, resume=training.resume,

@@ -67,7 +67,7 @@ def open_sources(folders: Sequence[Path]) -> Source:
     return SampleFolder(*folders)
 
 
-class InteriorVerse:
+class InteriorVerse(Source):
     """One split of one or both parts of the data set."""
 
     def __init__(self, folder: str | Path, split: str = "train"):

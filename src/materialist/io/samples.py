@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -53,23 +54,39 @@ _DECODED = srgb_to_linear(np.arange(256, dtype=np.float32) / 255)
 """[256] linear values of 8-bit codes: a table is ten times faster than the curve."""
 
 
-class Source(Protocol):
+class Source(ABC):
     """A set of samples."""
 
+    @abstractmethod
     def __len__(self) -> int:
         """How many there are at present."""
-        ...
 
+    @abstractmethod
     def read(self, index: int) -> Sample:
         """Sample number `index`."""
-        ...
 
+    @abstractmethod
     def refresh(self) -> None:
         """Look again: a set may grow while it is used."""
-        ...
+
+    def number(self, index: int) -> int:
+        """What sample number `index` is called; it keeps that number when others come or go."""
+        return index
+
+    def seed(self) -> list[int | None] | None:
+        """The seeds that the set was made with, where there are any."""
+        return None
+
+    def validation(self) -> Source | None:
+        """The set that scores are taken on while this one is trained on, where it has one."""
+        return None
+
+    def notes(self) -> list[str]:
+        """What of the set is not there, in words."""
+        return []
 
 
-class SampleFolder:
+class SampleFolder(Source):
     """Sets of `materialist train data` as one: DIR/dataset.json and DIR/samples/NNNNNNN.npz of each folder DIR.
 
     Samples lie in the order of the folders and of their names. Raises InputError where there are none.

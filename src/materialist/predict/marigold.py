@@ -12,8 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.mix import MixedPredictor
-from materialist.predict.protocol import Part, Predictor
+from materialist.predict.protocol import MixedPredictor, Part, Predictor
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 

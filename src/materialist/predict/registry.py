@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from materialist.errors import InputError
-from materialist.predict.protocol import MAPS, Predictor
+from materialist.predict.protocol import MAPS, MixedPredictor, Predictor
 
 CHOICES = "auto, bundled[:FILE], matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR, constant"
 CLASSES = {
@@ -48,8 +48,6 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
                 f"'{one}' gives only {', '.join(source.gives)}, not {lacking[0]}: use it beside another predictor, "
                 f"with {options}."
             )
-    from materialist.predict.mix import MixedPredictor
-
     found = MixedPredictor(chosen, sources) if len(sources) > 1 else next(iter(sources.values()))
     found.prepare(MAPS)
     return found

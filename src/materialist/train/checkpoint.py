@@ -34,17 +34,12 @@ def save(folder: Path, state: dict[str, Any]) -> None:
         raise OutputError(f"The checkpoint cannot be written to {folder}: {error}.") from error
 
 
-def exists(folder: Path) -> bool:
-    """Whether FOLDER holds a run to go on with."""
-    return (folder / NAME).is_file()
-
-
 def resumed(folder: Path, kind: str, *, resume: bool, device: Any = "cpu") -> dict[str, Any] | None:
     """The state to go on from; None where FOLDER holds no run.
 
     Raises OutputError when it holds one and `resume` is off, else as `load` does.
     """
-    if not exists(folder):
+    if not (folder / NAME).is_file():
         return None
     if not resume:
         raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")

@@ -1,23 +1,34 @@
-"""ClickNet, trained on procedural pictures as the bundled network sees them."""
+"""ClickNet, trained on pictures of `train data` as photographs with the maps that the bundled network finds in them."""
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.io.samples import SampleFolder, claim, read_arrays, read_sample, write_arrays
+from materialist.predict.bundled.predictor import BundledPredictor
+from materialist.predict.clicks.features import features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
-from materialist.train.click_views import ClickView, draw_click, load
+from materialist.procedural.dataset import identity
+from materialist.procedural.photographic import photographic
 from materialist.train.task import Batch, Examples, Recipe, Task
-from materialist.types import Array
+from materialist.types import Array, Camera, Photo
 
+Progress = Callable[[str, int, int], None]
+DESCRIPTION = "views.json"
+"""Of which data set the views beside it are."""
 RECIPE = Recipe(side=224, batch=16, rate=1.5e-3, growth=((0.5, 128),))
 HELD_OUT = 48
 """Views, the last ones, that are only scored, where there are ten times as many."""
@@ -25,6 +36,156 @@ CLICKS = 3
 """Clicks on each held-out view."""
 DRAWS = 100
 """Views tried for one with something to click on."""
+
+
+@dataclass(frozen=True)
+class ClickDraw:
+    """How clicks and crops are drawn; all tuned by eye."""
+
+    fewest_pixels: int = 60  # of a view; smaller things are not clicked on
+    depth_inside: float = 2.5  # pixels from the border of a thing to a click, where the thing is as large
+    things: float = 0.85  # share of clicks on things; the others are on walls, floors and the like
+    several: float = 0.25  # share of examples with two or three clicks
+    smallest_crop: float = 0.4  # smallest part of a view's side that an example shows
+    worsened: float = 0.5  # share with worse maps: the bundled network knows these pictures better than photos
+    blur: tuple[float, float] = (0.008, 0.1)  # of worse maps, as a part of the side, from and to
+    waves: float = 0.25  # largest amplitude of waves on worse normals and, times its spread, on worse log depth
+
+
+DRAW = ClickDraw()
+
+
+@dataclass(frozen=True)
+class ClickView:
+    """One photograph as the package would see it, and its things."""
+
+    rgb: Array
+    """[H, W, 3] uint8 sRGB."""
+    normal: Array
+    """[H, W, 3] int8, 127 for 1: predicted."""
+    depth: Array
+    """[H, W] float16: predicted."""
+    thing: Array
+    """[H, W] int16: number of what is seen, negative for walls and the like, 0 for nothing."""
+
+
+def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None) -> int:
+    """Make the views that FOLDER lacks, by the bundled network; returns how many are there.
+
+    Raises InputError for a data set without a description or without things and for a FOLDER with views of another
+    set, OutputError for one that cannot be written.
+    """
+    source = SampleFolder(data)
+    said = identity(data)
+    claim(folder, DESCRIPTION, said, tuple(said))
+    predictor = BundledPredictor()
+    for number, path in enumerate(source.paths):
+        target = folder / path.name
+        if not target.exists():
+            arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
+            if "thing" not in arrays:
+                raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
+            linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
+            camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
+            found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
+            made = {
+                "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": arrays["thing"],
+                "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
+            }  # fmt: skip
+            write_arrays(target, made)
+        progress("views", number + 1, len(source.paths))
+    return len(source.paths)
+
+
+def load_views(folder: Path) -> list[ClickView]:
+    """All views of a folder, in the order of their names. Raises InputError for one that is damaged."""
+    names = ("rgb", "normal", "depth", "thing")
+    return [ClickView(**read_arrays(path, *names)) for path in sorted(folder.glob("[0-9]*.npz"))]
+
+
+def draw_click(
+    view: ClickView, side: int, rng: np.random.Generator, settings: ClickDraw = DRAW
+) -> tuple[Array, Array] | None:
+    """([C, side, side] features, [side, side] bool) of a random part of a view and a click in it; None without things.
+
+    The part is mirrored or not and recoloured, its maps are made worse at times; some examples have several clicks.
+    """
+    height, width = view.thing.shape
+    size = round(min(height, width) * rng.uniform(settings.smallest_crop, 1.0))
+    top, left = rng.integers(height - size + 1), rng.integers(width - size + 1)
+    part = np.s_[top : top + size, left : left + size]
+    smooth = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
+
+    def scaled(values: Array, method: int) -> Array:
+        return np.asarray(cv2.resize(np.ascontiguousarray(values[part]), (side, side), interpolation=method))
+
+    thing = scaled(view.thing, cv2.INTER_NEAREST)
+    depth = scaled(view.depth.astype(np.float32), cv2.INTER_NEAREST)
+    rgb = scaled(view.rgb.astype(np.float32), smooth) / 255
+    normal = _unit(scaled(view.normal.astype(np.float32), smooth))
+    if rng.random() < 0.5:
+        thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
+        normal = normal[:, ::-1] * [-1, 1, 1]
+    chosen = _chosen(thing, rng, settings)
+    if chosen is None:
+        return None
+    mask = thing == chosen
+    count = int(rng.integers(2, 4)) if rng.random() < settings.several else 1
+    known = mask & (depth > 0)
+    clicks = [place for _ in range(count) if (place := click_in(known, rng, settings.depth_inside)) is not None]
+    if not clicks:
+        return None
+    if rng.random() < settings.worsened:
+        normal, depth = worse(normal, depth, rng, settings)
+    rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
+    return features(rgb, normal, depth, clicks), mask
+
+
+def worse(normal: Array, depth: Array, rng: np.random.Generator, settings: ClickDraw = DRAW) -> tuple[Array, Array]:
+    """Normals [H, W, 3] and depth [H, W] as of a photo that the network understands badly: blurred, with slow waves.
+
+    Pixels without depth keep none.
+    """
+    side, known = max(depth.shape), depth > 0
+    blur = lambda v, s: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)  # noqa: E731
+    sigma = float(np.exp(rng.uniform(*np.log(settings.blur))))
+    logarithm = np.log(np.where(known, depth, 1)) * known
+    share = np.maximum(blur(known, sigma), 1e-3)
+    even = blur(logarithm, sigma) / share
+    waves = blur(rng.normal(size=(*depth.shape, 4)), rng.uniform(0.06, 0.2))
+    waves = waves * (rng.uniform(0, settings.waves) / max(float(waves.std()), 1e-6))
+    spread = float(even[known].std()) if known.any() else 0.0
+    bent = np.where(known, np.exp(even + waves[..., 3] * spread), 0).astype(np.float32)
+    return _unit(blur(normal * known[..., None], sigma) / share[..., None] + waves[..., :3]), bent
+
+
+def _unit(normal: Array) -> Array:
+    """[H, W, 3] of length 1."""
+    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+
+
+def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int, int] | None:
+    """(column, row) of a random pixel of a mask [H, W] bool, `inside` pixels from its border where it is as large."""
+    away = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
+    places = np.argwhere(away > min(inside, 0.5 * float(away.max())))
+    if not len(places):
+        return None
+    row, column = places[rng.integers(len(places))]
+    return int(column), int(row)
+
+
+def _chosen(thing: Array, rng: np.random.Generator, settings: ClickDraw) -> int | None:
+    """The number of something to click on: things rather than walls, large ones somewhat rather than small ones."""
+    numbers, count = np.unique(thing[thing != 0], return_counts=True)
+    large = count >= settings.fewest_pixels
+    numbers, count = numbers[large], count[large]
+    if not len(numbers):
+        return None
+    weight = np.sqrt(count)
+    for kind, share in ((numbers > 0, settings.things), (numbers < 0, 1 - settings.things)):
+        if kind.any():
+            weight[kind] *= share / weight[kind].sum()
+    return int(rng.choice(numbers, p=weight / weight.sum()))
 
 
 class ClickExamples(Examples):
@@ -55,7 +216,7 @@ class ClickTask(Task):
         architecture: UNetArchitecture | None = None,
     ):  # fmt: skip
         """Views to learn from and weights to begin from. Raises InputError for a folder without views."""
-        found = load(views)
+        found = load_views(views)
         if not found:
             raise InputError(f"{views} holds no views to learn from.")
         aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0

@@ -61,7 +61,7 @@ class MapsTask(Task):
             raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
         super().__init__(Pictures(source, self.prepare), recipe, init)
         self.source, self.score_samples = source, score_samples
-        self.notes = (*self.notes, *getattr(source, "notes", list)())
+        self.notes = (*self.notes, *source.notes())
 
     @abstractmethod
     def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
@@ -73,14 +73,14 @@ class MapsTask(Task):
 
     def data(self) -> dict[str, Any]:
         """How many samples there are, and the seeds they were made with."""
-        return {"samples": len(self.source), "seed": getattr(self.source, "seed", lambda: None)()}
+        return {"samples": len(self.source), "seed": self.source.seed()}
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Means over held-out samples, seen as photographs (always the same ones); draws FOLDER/sheet.png.
 
         Of a set that is too small to hold any out, samples that it learns from are scored, and `of` says so.
         """
-        samples = held_out(self.source, self.score_samples) if self.score_samples else []
+        what, samples = held_out(self.source, self.score_samples)
         rows, strips = [], []
         for k, sample in enumerate(samples):
             photo = as_photo(sample, np.random.default_rng((7, k)))
@@ -93,7 +93,7 @@ class MapsTask(Task):
             return {}
         found = summary([row for row in rows if row])
         shown = {name: value for name, value in found.items() if not name.endswith(("_mse", "_raw", "_scale"))}
-        return {"of": TRAINED_ON if none_held_out(self.source) else HELD_OUT, **shown}
+        return {"of": what, **shown}
 
 
 def arrays_of(sample: Sample) -> dict[str, Array]:
@@ -106,36 +106,26 @@ def arrays_of(sample: Sample) -> dict[str, Array]:
 
 
 def trained_on(source: Source) -> list[int]:
-    """Places of the samples to train on; the others are held out. All, when there are too few."""
+    """Places of the samples to train on. Their own numbers say which are held out; none of a set that is too small."""
     count = len(source)
-    return [k for k in range(count) if count < HELD_OUT_EVERY or not _is_held_out(source, k)]
+    return [k for k in range(count) if count < HELD_OUT_EVERY or (source.number(k) + 1) % HELD_OUT_EVERY]
 
 
-def _is_held_out(source: Source, place: int) -> bool:
-    """Whether the sample at a place is never trained on: its own number decides, so that others may come and go."""
-    number = getattr(source, "number", lambda k: k)(place)
-    return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+def held_out(source: Source, most: int) -> tuple[str, list[Sample]]:
+    """What samples are scored, and up to `most` of them, spread over the set.
 
-
-def none_held_out(source: Source) -> bool:
-    """Whether `held_out` has to take samples that are trained on."""
-    return len(trained_on(source)) == len(source) and getattr(source, "validation", lambda: None)() is None
-
-
-def held_out(source: Source, most: int) -> list[Sample]:
-    """Up to `most` samples that are not trained on, spread over the set (the first ones of a tiny set).
-
-    They come from the source's own validation split where it has one. Those that cannot be read are left out.
+    They come from the source's own validation split where it has one; of a set that is too small to hold any out they
+    are the first ones that it learns from. Those that cannot be read are left out.
     """
-    validation = getattr(source, "validation", lambda: None)()
+    what, validation = HELD_OUT, source.validation()
     if validation is not None:
-        chosen, source = list(range(len(validation))), validation
-    else:
-        chosen = sorted(set(range(len(source))) - set(trained_on(source))) or list(range(min(len(source), most)))
+        source, chosen = validation, list(range(len(validation)))
+    elif not (chosen := sorted(set(range(len(source))) - set(trained_on(source)))):
+        what, chosen = TRAINED_ON, list(range(min(len(source), most)))
     found = []
     for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
         try:
             found.append(source.read(chosen[k]))
         except InputError:
             continue
-    return found
+    return what, found

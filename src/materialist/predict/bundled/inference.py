@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,14 +9,14 @@ import cv2
 import numpy as np
 import torch
 
-from materialist.camera import pixel_rays, rays_at
+from materialist.camera import rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
 from materialist.predict.bundled.edges import Guide, weighted_median
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.bundled.relief import with_relief
 from materialist.predict.network import STRIDE
-from materialist.types import Array, Camera, Materials, Prediction
+from materialist.types import Array, Materials, Prediction
 
 _MIRROR = np.array([-1, 1, 1], np.float32)
 
@@ -39,28 +38,25 @@ class InferenceSettings:
 SETTINGS = InferenceSettings()
 
 
-def infer(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu", sides: Sequence[int] = SETTINGS.sides
-) -> Prediction:
+def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu") -> Prediction:
     """Maps of a photo at its own size.
 
-    The network sees the photo and its mirror image at each of `sides`; its answers are averaged, and brought to the
+    The network sees the photo and its mirror image at two sizes; its answers are averaged, and brought to the
     photo's size with the photo as the guide.
 
     Args:
         network: in evaluation mode, on `device`.
         linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-        sides: longest sides, pixels, at which the network sees the photo; at most the photo's own.
 
     Returns:
         A Prediction without a name: albedo linear, depth with a fixed median, 0 where there is no surface.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    small = _network_size(size, max(sides))
+    small = _network_size(size, max(SETTINGS.sides))
     photo = resample.values(linear, small)
-    maps = _mean_answer(network, linear, rays, sides, device)
+    maps = _mean_answer(network, linear, rays, device)
     surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
@@ -100,11 +96,6 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     return depth, normal
 
 
-def rays_of(camera: Camera) -> Array:
-    """[H, W, 2] x and y of the camera rays."""
-    return pixel_rays(camera)[..., :2].copy()
-
-
 def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float = 1e-3) -> Array:
     """Values [h, w] or [h, w, c] in [0, 1] brought to the size of `fine`, with edges where the photo has them.
 
@@ -129,11 +120,9 @@ def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float
     return np.clip(result[0] if values.ndim == 2 else np.stack(result, -1), 0, 1).astype(np.float32)
 
 
-def _mean_answer(
-    network: BundledNetwork, linear: Array, rays: Array, sides: Sequence[int], device: Any
-) -> dict[str, Array]:
+def _mean_answer(network: BundledNetwork, linear: Array, rays: Array, device: Any) -> dict[str, Array]:
     """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes."""
-    sizes = sorted({_network_size(linear.shape[:2], side) for side in sides})
+    sizes = sorted({_network_size(linear.shape[:2], side) for side in SETTINGS.sides})
     answers = []
     for size in sizes:
         photo = resample.values(linear, size)

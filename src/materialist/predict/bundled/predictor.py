@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
 from materialist.predict.bundled import WEIGHTS
-from materialist.predict.bundled.inference import infer, rays_of
+from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.device import on_gpu
 from materialist.predict.protocol import MAPS, Part, Predictor
@@ -54,7 +55,7 @@ class BundledPredictor(Predictor):
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        found = infer(self.network, photo.linear, rays_of(photo.camera), device=self.device)
+        found = infer(self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device)
         maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")

@@ -1,15 +1,18 @@
-"""MatNet: albedo, roughness, metallic, normal and depth from one linear picture (paper, eq. "matnet")."""
+"""MatNet: albedo, roughness, metallic, normal and depth from one linear picture (paper, eq. "matnet").
+
+Its decoders are DPT (Ranftl et al. 2021) as Depth Anything builds it, with the same parameter names.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.predict.matnet.encoder import GRID, Encoder
-from materialist.predict.matnet.head import Head
+from materialist.predict.matnet.encoder import GRID, PATCH, Encoder
 
 
 @dataclass(frozen=True)
@@ -70,3 +73,86 @@ class MatNet(nn.Module):
             "metallic": positive[:, 4:5],
             "normal": F.normalize(torch.tanh(materials[:, 5:]), dim=1, eps=1e-6),
         }
+
+
+class Head(nn.Module):
+    """Features of four encoder layers to one picture.
+
+    Args:
+        width: channels of the features.
+        pyramid: channels at the four scales (4, 2, 1 and 1/2 times the patch grid).
+        fused: channels while the scales are put together.
+        outputs: channels of the result.
+    """
+
+    def __init__(self, width: int, pyramid: Sequence[int], fused: int, outputs: int):
+        super().__init__()
+        self.projects = nn.ModuleList(nn.Conv2d(width, channels, 1) for channels in pyramid)
+        self.resize_layers = nn.ModuleList(
+            [
+                nn.ConvTranspose2d(pyramid[0], pyramid[0], 4, stride=4),
+                nn.ConvTranspose2d(pyramid[1], pyramid[1], 2, stride=2),
+                nn.Identity(),
+                nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1),
+            ]
+        )
+        self.scratch = _Scratch(pyramid, fused, outputs)
+
+    def forward(self, features: Sequence[Tensor]) -> Tensor:
+        """[B, outputs, 14 h, 14 w] without a last activation, from four tensors [B, width, h, w]."""
+        rows, columns = features[0].shape[-2:]
+        steps = zip(features, self.projects, self.resize_layers, strict=True)
+        layers = [resize(project(x)) for x, project, resize in steps]
+        return self.scratch(layers, (rows * PATCH, columns * PATCH))
+
+
+class _Scratch(nn.Module):
+    """From the coarsest scale to the finest, then two convolutions. The name is the checkpoints'."""
+
+    def __init__(self, pyramid: Sequence[int], fused: int, outputs: int):
+        super().__init__()
+        for k, channels in enumerate(pyramid, 1):
+            self.add_module(f"layer{k}_rn", nn.Conv2d(channels, fused, 3, padding=1, bias=False))
+            self.add_module(f"refinenet{k}", _Fusion(fused))
+        self.output_conv1 = nn.Conv2d(fused, fused // 2, 3, padding=1)
+        self.output_conv2 = nn.Sequential(nn.Conv2d(fused // 2, 32, 3, padding=1), nn.ReLU(), nn.Conv2d(32, outputs, 1))
+
+    def forward(self, layers: Sequence[Tensor], size: tuple[int, int]) -> Tensor:
+        """[B, outputs, *size] from the four scales, finest first."""
+        fine = [getattr(self, f"layer{k}_rn")(x) for k, x in enumerate(layers, 1)]
+        fuse = [getattr(self, f"refinenet{k}") for k in range(1, 5)]
+        path = fuse[3](fine[3], None, fine[2].shape[-2:])
+        path = fuse[2](path, fine[2], fine[1].shape[-2:])
+        path = fuse[1](path, fine[1], fine[0].shape[-2:])
+        path = fuse[0](path, fine[0], tuple(2 * n for n in path.shape[-2:]))
+        return self.output_conv2(_resized(self.output_conv1(path), size))
+
+
+class _Fusion(nn.Module):
+    """RefineNet: what comes from the coarser scale, plus this scale's layer, enlarged."""
+
+    def __init__(self, channels: int):
+        super().__init__()
+        self.out_conv = nn.Conv2d(channels, channels, 1)
+        # The coarsest one never uses its first unit, but checkpoints carry it.
+        self.resConfUnit1 = _Residual(channels)
+        self.resConfUnit2 = _Residual(channels)
+
+    def forward(self, path: Tensor, layer: Tensor | None, size: Sequence[int]) -> Tensor:
+        if layer is not None:
+            path = path + self.resConfUnit1(layer)
+        return self.out_conv(_resized(self.resConfUnit2(path), size))
+
+
+class _Residual(nn.Module):
+    def __init__(self, channels: int):
+        super().__init__()
+        self.conv1 = nn.Conv2d(channels, channels, 3, padding=1)
+        self.conv2 = nn.Conv2d(channels, channels, 3, padding=1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return x + self.conv2(F.relu(self.conv1(F.relu(x))))
+
+
+def _resized(x: Tensor, size: Sequence[int]) -> Tensor:
+    return F.interpolate(x, tuple(size), mode="bilinear", align_corners=True)
