@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from materialist.batches.results import file_hash
-from materialist.edits.glass.thickness import METHODS
 from materialist.edits.insert.meshes import files_beside
-from materialist.edits.recipe import Step, read_recipe
-
-FILES = ("mask", "texture", "envmap", "mesh", "background", "thickness")
-"""Options of a step that name a file, or a list of files; `{name}` in them stands for the photo's name."""
+from materialist.edits.recipe import Step, read_recipe, with_files
 
 
 def edits_for(path: str | Path, name: str) -> list[Step]:
-    """The steps of a file (see docs/editing.md) with the photo's name put in. Raises InputError as `read_recipe`."""
-    return [replace(step, options=_named(step.options, name)) for step in read_recipe(path)]
+    """The steps of a file (see docs/editing.md) with the photo's name for `{name}` in the names of files.
+
+    Raises InputError as `read_recipe`.
+    """
+    put = lambda _, value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
+    return [with_files(step, put) for step in read_recipe(path)]
 
 
 def edits_key(path: str | Path, name: str, spp: int | None) -> str:
@@ -37,22 +34,11 @@ def missing_files(path: str | Path, name: str) -> list[str]:
     return [str(file) for file in found if not file.is_file()]
 
 
-def _named(options: dict[str, Any], name: str) -> dict[str, Any]:
-    def put(value: Any) -> Any:
-        if isinstance(value, list):
-            return [put(one) for one in value]
-        return value.replace("{name}", name) if isinstance(value, str) else value
-
-    return {key: put(value) if key in FILES else value for key, value in options.items()}
-
-
-def _files(step: Step) -> Iterator[tuple[str, Path]]:
+def _files(step: Step) -> list[tuple[str, Path]]:
     """(option, file) of the files that a step names."""
-    for key in FILES:
-        value = step.options.get(key, [])
-        for name in value if isinstance(value, list) else [value]:
-            if isinstance(name, str) and not (key == "thickness" and name in METHODS):
-                yield key, step.folder / name
+    named: list[tuple[str, str]] = []
+    with_files(step, lambda option, name: named.append((option, name)))
+    return [(option, step.folder / name) for option, name in named if isinstance(name, str)]
 
 
 def _content(file: Path, key: str) -> list[str] | None:

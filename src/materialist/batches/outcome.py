@@ -1,4 +1,4 @@
-"""The outcome of a batch, its state while it runs, and the tables summary.csv and summary.json."""
+"""The outcome of a batch, its state while it runs, and its reports: summary.csv, summary.json and index.html."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import csv
 import io
 import json
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.results import replace_file, together
+from materialist.batches.results import picture_path, replace_file, scene_path, thumbnail_path, together
 
 COLUMNS = (
     "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
@@ -107,3 +108,52 @@ def _cell(value: Any) -> Any:
     if isinstance(value, float):
         return f"{value:.6g}"
     return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") else value
+
+
+def write_page(outcome: Outcome) -> None:
+    """Write index.html, which shows the thumbnails and opens without a server. Raises OutputError.
+
+    The template escapes whatever came from outside, and a policy in it forbids requests to other places.
+    """
+    from jinja2 import Environment
+
+    assets = files("materialist.batches") / "assets"
+    template = Environment(autoescape=True).from_string((assets / "page.html").read_text("utf-8"))
+    order = {"failed": 0, "done": 1, "open": 2}
+    rows = sorted(outcome.rows, key=lambda row: order[row["status"]])  # what needs a look comes first
+    page = template.render(
+        title=outcome.runs.resolve().name, style=(assets / "page.css").read_text("utf-8"), facts=_facts(outcome),
+        edited=any(row["picture_hash"] for row in outcome.rows), cards=[_card(outcome.runs, row) for row in rows],
+    )  # fmt: skip
+    replace_file(outcome.runs / "index.html", page.encode("utf-8"))
+
+
+def _facts(outcome: Outcome) -> list[tuple[str, str]]:
+    done = outcome.of("done")
+    facts = [("photos", str(len(outcome.rows))), ("done", str(len(done))), ("failed", str(outcome.count("failed")))]
+    if outcome.count("open"):
+        facts.append(("not reached", str(outcome.count("open"))))
+    quality = [row["psnr"] for row in done if row["psnr"] is not None]
+    if quality:
+        facts.append(("mean PSNR", f"{sum(quality) / len(quality):.1f} dB"))
+    if done:
+        facts.append(("a photo", f"{sum(row['seconds'] or 0 for row in done) / len(done):.1f} s"))
+    return facts
+
+
+def _card(runs: Path, row: Row) -> dict[str, Any]:
+    """Values of the template for one photo; links are relative to the page."""
+    if row["status"] != "done":
+        return {"row": row}
+    figures: list[tuple[Any, str]] = [
+        (row["psnr"], "{:.1f} dB"), (row["ssim"], "SSIM {:.3f}"), (row["seconds"], "{:.1f} s"),
+    ]  # fmt: skip
+    shown = [form.format(value) for value, form in figures if value is not None]
+    shown += [f"{row['width']} × {row['height']}"] if row["width"] else []
+    shown += [f"{row['attempts']} attempts"] if (row["attempts"] or 1) > 1 else []
+    scene = scene_path(runs, row["name"]).name
+    links = [("all maps", f"{scene}/overview.png"), ("scene", f"{scene}/")]
+    if row["picture_hash"]:
+        links.insert(0, ("edited photo", picture_path(runs, row["name"]).name))
+    thumbnail = thumbnail_path(runs, row["name"]).relative_to(runs).as_posix()
+    return {"row": row, "figures": " · ".join(shown), "links": links, "thumbnail": thumbnail}

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from materialist.errors import OutputError, SceneError
-from materialist.io.atomic import MARKER
+from materialist.errors import SceneError
+from materialist.io.atomic import MARKER, whole_file
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
 """Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
@@ -32,13 +31,8 @@ def thumbnail_path(runs: Path, name: str) -> Path:
 
 def replace_file(path: Path, content: bytes) -> None:
     """Write a file whole or not at all. Raises OutputError."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(exist_ok=True)
+    with whole_file(path, force=True) as temporary:
         temporary.write_bytes(content)
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def package_hash(path: str | Path) -> str:

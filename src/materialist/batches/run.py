@@ -14,8 +14,7 @@ from typing import Any
 from materialist import __version__, errors
 from materialist.batches.edits import missing_files
 from materialist.batches.ledger import Ledger, open_ledger
-from materialist.batches.outcome import Outcome, Row, Status, write_summary
-from materialist.batches.page import write_pages
+from materialist.batches.outcome import Outcome, Row, Status, write_page, write_summary
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
 from materialist.batches.task import INVERSION, SINGLE_THREAD, PhotoTask, process
@@ -212,7 +211,7 @@ class _Run:
         """Write the summary and the page."""
         outcome = self.outcome()
         write_summary(outcome)
-        write_pages(outcome)
+        write_page(outcome)
         self._written = time.monotonic()
 
     def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -102,6 +103,19 @@ def _step(entry: Any, number: int, path: Path) -> Step:
     if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
         raise InputError(f"Step {number} of {path}: The skip must be true or false, not {options['skip']!r}.")
     return Step(kind, options, path.parent)
+
+
+def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
+    """The step with `use(option, value)` in place of each file that it names; words such as `auto` stay."""
+    known = declarations(OPTIONS[step.kind])
+    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"}
+    words |= {"mask": (), "mesh": ()}
+    options = dict(step.options)
+    for name in [name for name in options if name in words]:
+        given = options[name]
+        put = [one if one in words[name] else use(name, one) for one in (given if isinstance(given, list) else [given])]
+        options[name] = put if isinstance(given, list) else put[0]
+    return replace(step, options=options)
 
 
 def write_recipe(path: str | Path, steps: list[Step]) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.workspace import read_list, store, with_files
+from materialist.studio.workspace import read_list, store, with_plain_files
 
 _MEMBER = re.compile(
     r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
@@ -59,7 +59,7 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
                 return name
             return store(workspace, file, option, suffix)
 
-        return tuple(replace(with_files(step, moved), folder=workspace) for step in steps)
+        return tuple(replace(with_plain_files(step, moved), folder=workspace) for step in steps)
 
 
 def unpack_scene(archive: Path, target: Path, name: str) -> None:
@@ -133,5 +133,5 @@ def _named(steps: Iterable[Step]) -> set[str]:
         return name
 
     for step in steps:
-        with_files(step, noted)
+        with_plain_files(step, noted)
     return names

@@ -11,7 +11,7 @@ import numpy as np
 
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.studio import SETTINGS
+from materialist.io.display import encoded
 from materialist.types import Array, Scene
 
 REPLACE, ADD, REMOVE = "new", "add", "remove"
@@ -49,7 +49,7 @@ class Selection:
         outline[dark > 0] = (20, 30, 60, 200)
         fill = np.zeros((*mask.shape, 4), np.uint8)
         fill[mask] = (255, 255, 255, 255)
-        return {"fill": data_url(fill, ".png", "image/png"), "outline": data_url(outline, ".png", "image/png")}
+        return {name: data_url(encoded(one), "png") for name, one in (("fill", fill), ("outline", outline))}
 
     def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
         """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
@@ -125,11 +125,6 @@ def read_pick(data: Any) -> dict[str, Any]:
     return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}
 
 
-def data_url(pixels: Array, suffix: str, kind: str) -> str:
-    """[H, W, 3 or 4] uint8 as a data URL."""
-    import cv2
-
-    order = [2, 1, 0, 3][: pixels.shape[-1]]
-    quality = [cv2.IMWRITE_JPEG_QUALITY, SETTINGS.jpeg_quality] if suffix == ".jpg" else []
-    data: Any = cv2.imencode(suffix, np.ascontiguousarray(pixels[..., order]), quality)[1]
-    return f"data:{kind};base64,{base64.b64encode(data.tobytes()).decode()}"
+def data_url(data: bytes, kind: str) -> str:
+    """A picture file (`png` or `jpeg`) as a data URL."""
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-from pathlib import Path
 from time import time
 from typing import Any
 
@@ -12,7 +10,8 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import MaterialistError
-from materialist.studio import glass
+from materialist.io import display
+from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList
 from materialist.studio.preview import LIVE
 from materialist.studio.selection import data_url
@@ -42,7 +41,7 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel{off}"
-        return {**shown, "picture": file_url(final.path.with_suffix(".jpg")), "badge": badge}
+        return {**shown, "picture": data_url(final.path.with_suffix(".jpg").read_bytes(), "jpeg"), "badge": badge}
     if current is not None and client is not None and current in steps and glass.is_traced(current):
         client.ask(_others(steps, current), current)
     waiting = client is not None and with_edits and client.state.waiting
@@ -99,19 +98,11 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return data_url(srgb_levels(linear), ".jpg", "image/jpeg")
-
-
-def file_url(path: Path) -> str:
-    """A picture file as a data URL."""
-    kind = "image/png" if path.suffix == ".png" else "image/jpeg"
-    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+    return data_url(display.encoded(srgb_levels(linear), "JPEG", quality=SETTINGS.jpeg_quality), "jpeg")
 
 
 def maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
-    from materialist.io import display
-
     materials = scene.materials
     return [
         (srgb_levels(materials.albedo), "Albedo: colour without light"),

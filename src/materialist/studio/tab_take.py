@@ -17,7 +17,6 @@ from materialist.studio.progress import box
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
 from materialist.studio.widgets import LONG, PageContext, handler
-from materialist.studio.workspace import new_name
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -66,7 +65,7 @@ def wire(context: PageContext) -> None:
             raise InputError("Choose one of the listed things.")
         _ = session.scene
         yield {parts["download"]: gr.update(visible=False)}
-        file = new_name(session.workspace, "take", KINDS[what][1])
+        file = session.workspace / f"take-{what}{KINDS[what][1]}"
         if what == "edits":
             _pack_edits(session, file)
         else:

@@ -11,9 +11,10 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
-from materialist.errors import SetupError
+from materialist.io import display
 from materialist.io.atomic import partial, whole_file
 from materialist.jobs.worker import Reporter
+from materialist.studio import SETTINGS
 from materialist.types import Array, Materials, Prediction, Scene
 
 Steps = tuple[Step, ...]
@@ -52,8 +53,6 @@ def invert(
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     """Pictures of what `invert` has found so far."""
-    from materialist.io import display
-
     if isinstance(value, Prediction):
         shown = {"depth": display.depths(value.depth), "normals": display.normals(value.normal)}
         value = value.materials
@@ -179,12 +178,6 @@ def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
 
 
 def write_pixels(path: Path, pixels: Array) -> None:
-    """[H, W, 3] uint8 as JPEG or PNG, whole."""
-    import cv2
-
-    made, data = cv2.imencode(path.suffix, np.ascontiguousarray(pixels[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 90])
-    if not made:
-        raise SetupError(f"The picture {path.name} cannot be encoded.")
-    temporary = partial(path, f"-{path.name}")
-    temporary.write_bytes(data.tobytes())
-    temporary.replace(path)
+    """[H, W, 3] uint8 as a JPEG, whole."""
+    with whole_file(path, force=True) as file:
+        file.write_bytes(display.encoded(pixels, "JPEG", quality=SETTINGS.jpeg_quality))

@@ -9,8 +9,8 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import tempfile
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.recipe import Step, read_recipe
+from materialist.edits.recipe import Step, read_recipe, with_files
 from materialist.errors import InputError, OutputError
-from materialist.io.atomic import partial
+from materialist.io.atomic import whole_file
+from materialist.io.display import encoded
 from materialist.types import Array
 
 CARD = "project.json"
@@ -28,10 +29,6 @@ CARD = "project.json"
 SCENE = "photo.scene"
 _NAME = re.compile(r"photo-\d{3,6}")
 _PERSON = re.compile(r"[a-z0-9]{2,32}")
-FILES = ("mask", "texture", "envmap", "mesh", "background")
-"""Options that name a file."""
-WORDS = ("thickness", "inpaint")
-"""Options that name a method, or a file."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +65,7 @@ class WorkFolder:
 
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
+        self._lock = threading.Lock()
         _make(self.root)
         self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
         """Uploads and results that are handed over; they go when the studio ends."""
@@ -85,17 +83,10 @@ class WorkFolder:
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere."""
-        taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
-        number = max(taken, default=0) + 1
-        while True:  # two people may ask at once
-            folder = self.root / f"photo-{number:03d}"
-            try:
-                folder.mkdir()
-                break
-            except FileExistsError:
-                number += 1
-            except OSError as error:
-                raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from error
+        with self._lock:  # two people may ask at once
+            taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
+            folder = self.root / f"photo-{max(taken, default=0) + 1:03d}"
+            _make(folder)
         project = Project(folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE)
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
@@ -135,40 +126,23 @@ def _make(folder: Path) -> None:
         raise OutputError(f"The folder {folder} cannot be made: {error.strerror or error}.") from error
 
 
-def new_name(workspace: Path, stem: str, suffix: str) -> Path:
-    """A free place in the workspace: STEM-1SUFFIX, STEM-2SUFFIX, ..."""
-    pattern = re.compile(rf"{re.escape(stem)}-(\d+)\.")
-    taken = [int(m[1]) for p in workspace.iterdir() if (m := pattern.match(p.name))]
-    return workspace / f"{stem}-{max(taken, default=0) + 1}{suffix}"
-
-
 def store(workspace: Path, file: Path, stem: str, suffix: str) -> str:
     """Copy an uploaded file (checked before) to the workspace; returns its name there, which holds its hash."""
-    return _written(workspace / _name(stem, file.read_bytes(), suffix), lambda place: shutil.copyfile(file, place))
+    return _written(workspace, stem, file.read_bytes(), suffix)
 
 
 def write_mask(workspace: Path, mask: Array) -> str:
     """Write a mask [H, W] bool; returns its name, which holds its hash: no other photo has one of that name."""
-    from materialist.io.image import write_png_bytes
-
-    file = workspace / _name("mask", f"{mask.shape}".encode() + np.packbits(mask).tobytes(), ".png")
-    return _written(file, lambda place: write_png_bytes(place, mask.astype(np.uint8) * 255))
+    return _written(workspace, "mask", encoded(mask.astype(np.uint8) * 255), ".png")
 
 
-def _written(file: Path, write: Callable[[Path], Any]) -> str:
+def _written(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
     """Write a file whole unless it exists; returns its name."""
+    file = workspace / f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
     if not file.is_file():
-        temporary = partial(file)
-        try:
-            write(temporary)
-            os.replace(temporary, file)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with whole_file(file, force=True) as temporary:
+            temporary.write_bytes(content)
     return file.name
-
-
-def _name(stem: str, content: bytes, suffix: str) -> str:
-    return f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
 
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
@@ -192,21 +166,17 @@ def confined(step: Step, workspace: Path) -> Step:
             raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
         return name
 
-    return replace(with_files(step, here), folder=workspace)
+    return replace(with_plain_files(step, here), folder=workspace)
 
 
-def with_files(step: Step, use: Callable[[str, str], str]) -> Step:
-    """The step with `use(option, name)` in the place of each file that it names. Raises InputError for odd names."""
+def with_plain_files(step: Step, use: Callable[[str, str], str]) -> Step:
+    """`with_files`, where every file is named without a folder. Raises InputError for other names."""
+    if step.options.get("inpaint", "sd") != "sd":
+        raise InputError("The studio takes no inpainter but 'sd'; change the inpaint of the list of edits.")
 
-    def used(option: str, value: Any) -> Any:
-        if option in WORDS and isinstance(value, str) and re.fullmatch(r"[\w-]{1,60}", value):
-            return value
+    def plain(option: str, value: Any) -> str:
         if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):
             raise InputError(f"The {option} {value!r} must be a plain file name, as in mask-1.png.")
         return use(option, value)
 
-    options = dict(step.options)
-    for option in {*FILES, *WORDS} & {*options}:
-        given = options[option]
-        options[option] = [used(option, value) for value in given] if isinstance(given, list) else used(option, given)
-    return replace(step, options=options)
+    return with_files(step, plain)
