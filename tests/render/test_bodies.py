@@ -95,8 +95,7 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     assert larger.sum() == pytest.approx(16 * np.pi * outline() ** 2, rel=0.02)
 
 
-def test_a_body_behind_a_thing_is_seen_as_if_that_were_not_there():
-    """In its own light: the outline of what hides it may be elsewhere in the photo than in the depth."""
+def test_radiance_is_that_of_the_rays_that_meet_the_body_first():
     from render_scenes import wall
 
     from materialist.render.native import radiance
@@ -104,14 +103,8 @@ def test_a_body_behind_a_thing_is_seen_as_if_that_were_not_there():
     columns = np.indices((CAMERA.height, CAMERA.width))[1]
     geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere
     target = RenderScene(geometry, CAMERA, bodies=(sphere(surface(0.5, 1.0)),))
-    light = np.full((8, 16, 3), 1.0, np.float32)
-    target.set_envmap(light)
+    target.set_envmap(uniform())
     size, box = (CAMERA.height, CAMERA.width), (0, CAMERA.height, 0, CAMERA.width)
-    given = {"spp": 64, "seed": 1, "max_depth": 3, "names": ["body0"]}
-    hidden, shown = radiance(target, size, box, **given), radiance(target, size, box, **given, gap=0.5)
+    seen = radiance(target, size, box, spp=64, seed=1, max_depth=3, names=["body0"])
     left, right = disc() & (columns < CAMERA.width // 2 - 1), disc() & (columns > CAMERA.width // 2)
-    assert (hidden[left] == 0).all() and hidden[right].min() > 0.1
-    np.testing.assert_allclose(shown[right], hidden[right], rtol=1e-4)
-    np.testing.assert_allclose(shown[left].mean(), shown[right].mean(), rtol=0.25)
-    near = radiance(target, size, box, **given, gap=3.5)  # the wall stands 2 to 3 before it: it is what it touches
-    assert (near[left] == 0).all()
+    assert (seen[left] == 0).all() and seen[right].min() > 0.1

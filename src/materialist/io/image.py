@@ -29,14 +29,20 @@ def write_png_bytes(path: str | Path, pixels: Array) -> None:
         Image.fromarray(pixels).save(path, format="PNG")
 
 
-def write_image(path: str | Path, linear: Array, *, force: bool = False) -> None:
+def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: bool = False) -> None:
     """Write linear RGB [H, W, 3] to PATH.png (sRGB) or PATH.exr (linear float32), whole or not at all.
 
-    Raises OutputError when the file exists and `force` is not given, or cannot be written.
+    `deep` PNG have 16 bits a channel, others 8. Raises OutputError when the file exists and `force` is not given, or
+    cannot be written; InputError for another suffix.
     """
     ensure_image_writable(path, force=force)
     with whole_file(path, force) as temporary:
-        (write_exr if temporary.suffix == ".exr" else write_png)(temporary, linear)
+        if deep and temporary.suffix == ".png":
+            import cv2
+
+            temporary.write_bytes(cv2.imencode(".png", srgb_levels(linear, np.uint16)[..., ::-1])[1].tobytes())
+        else:
+            (write_exr if temporary.suffix == ".exr" else write_png)(temporary, linear)
 
 
 def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:

@@ -9,8 +9,6 @@ import numpy as np
 from materialist.render.coverage import Box
 from materialist.types import Array, Camera
 
-PAST = 1e-4
-"""Part of the way to a body that is left for rays which start past what hides it."""
 _PATHS = 2**23
 """Paths traced together: bounds the memory."""
 
@@ -24,13 +22,11 @@ def only(scene, names: Sequence[str]):
 
 
 def radiance(
-    target, size: tuple[int, int], box: Box, *, spp: int, seed: int, max_depth: int, names: Sequence[str] | None = None,
-    gap: float = np.inf,
+    target, size: tuple[int, int], box: Box, *, spp: int, seed: int, max_depth: int, names: Sequence[str]
 ) -> Array:  # fmt: skip
     """[h, w, 3] float32 linear: a part of the picture of a `RenderScene` at another resolution, path traced.
 
-    names: of shapes; the mean is over the rays that meet one of them first, and 0 where none does. gap: what stands by
-    more than this (scene units) before one of them hides it from no ray: its outline may be elsewhere in the photo.
+    names: of shapes; the mean is over the rays that meet one of them first, and 0 where none does.
     """
     mi, camera = target.mi, target.camera
     h, w = box[1] - box[0], box[3] - box[2]
@@ -40,16 +36,15 @@ def radiance(
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": each})
     total = np.zeros((h * w, 4))
-    alone = only(target.mi_scene, names) if names is not None and np.isfinite(gap) else None
     for k in range(passes):
         sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, h * w * each)
-        total += _sums(target.mi_scene, camera, size, box, integrator, sampler, each, names, (alone, gap))
+        total += _sums(target.mi_scene, camera, size, box, integrator, sampler, each, names)
     mean = total[:, :3] / np.maximum(total[:, 3:], 1)
     return np.ascontiguousarray(mean.reshape(h, w, 3), np.float32)
 
 
 def _sums(
-    scene, camera: Camera, size: tuple[int, int], box: Box, integrator, sampler, each: int, names, behind
+    scene, camera: Camera, size: tuple[int, int], box: Box, integrator, sampler, each: int, names: Sequence[str]
 ) -> Array:  # fmt: skip
     """[h * w, 4]: of each pixel's rays that count, the sum of what they bring, and their number."""
     import drjit as dr
@@ -65,18 +60,10 @@ def _sums(
     y = 1 - (mi.Float(pixel // w) + top + inside.y) / size[0] * 2
     direction = dr.normalize(mi.Vector3f(x * half, y * (half * camera.height / camera.width), -1))
     ray = mi.RayDifferential3f(mi.Point3f(0), direction)
-    counts = mi.Bool(names is None)
-    if names is not None:
-        first = scene.ray_intersect(ray)
-        for one in scene.shapes():
-            if one.id() in names:
-                counts |= first.shape == mi.ShapePtr(one)
-        alone, gap = behind
-        if alone is not None:
-            own = alone.ray_intersect(ray)
-            past = ~counts & own.is_valid() & ((own.t - first.t) * -direction.z > gap)
-            ray.o = dr.select(past, own.p - direction * (PAST * own.t), ray.o)
-            counts |= past
+    counts, first = mi.Bool(False), scene.ray_intersect_preliminary(ray)
+    for one in scene.shapes():
+        if one.id() in names:
+            counts |= first.shape == mi.ShapePtr(one)
     light = integrator.sample(scene, sampler, ray, None, counts)[0]
     sums = [dr.zeros(mi.Float, h * w) for _ in range(4)]
     for total, value in zip(sums, (light.x, light.y, light.z, mi.Float(1)), strict=True):

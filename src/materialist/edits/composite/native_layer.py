@@ -97,7 +97,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     pixels = (part[1] - part[0]) * (part[3] - part[2])
     paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // pixels))
     depth = path_depth(edited)
-    picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names, gap=gap))
+    picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))
     if clean:
         guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
         picture = denoised(picture, guide.albedo, guide.normal)

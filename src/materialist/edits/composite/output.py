@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
-from materialist.color import srgb_levels
-from materialist.errors import OutputError
-from materialist.io.atomic import partial
 from materialist.io.decode import RAW_SUFFIXES
-from materialist.io.image import ensure_image_writable, write_image
+from materialist.io.image import write_image
 from materialist.types import Array, Photo
 
 
@@ -21,24 +17,9 @@ def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bo
     A pixel that is the photo's gets the photo's own 8 or 16 bits back, or, as EXR, the value that an HDR file has.
     Whole or not at all. Raises OutputError or InputError as `write_image`.
     """
-    path = Path(path)
-    if path.suffix.lower() == ".exr" and photo.stops:
+    if Path(path).suffix.lower() == ".exr" and photo.stops:
         picture = picture * np.float32(2.0**-photo.stops)
-    if path.suffix.lower() == ".exr" or not is_deep(photo):
-        write_image(path, picture, force=force)
-        return
-    import cv2
-
-    ensure_image_writable(path, force=force)
-    pixels = srgb_levels(picture, np.uint16)
-    temporary = partial(path)
-    try:
-        temporary.write_bytes(cv2.imencode(".png", pixels[..., ::-1])[1].tobytes())
-        os.replace(temporary, path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_image(path, picture, deep=is_deep(photo), force=force)
 
 
 def is_deep(photo: Photo) -> bool:
