@@ -74,14 +74,14 @@ def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
     return out
 
 
-def filter_tables(cache: TransportCache, tables: Tables, guide: Guide, known: list[Tap] | None = None) -> Tables:
+def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:
     """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
     kept = first_filtered()
     stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
     grid = torch.zeros(guide.scale.numel(), stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
-    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide, known=known).view(len(grid), -1)[pixels]
+    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
     levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
     return Tables(smooth[:, :9].contiguous(), torch.stack(list(levels)))
 

@@ -76,14 +76,6 @@ def test_a_bright_rim_is_no_mixture():
     assert (alpha[42:] > 0.95).all() and (alpha[:38] < 0.05).all()
 
 
-def test_without_a_colour_edge_the_mask_decides():
-    mask = np.zeros((15, 15), bool)
-    mask[:, :8] = True
-    alpha = matte(mask, np.full((60, 60, 3), 0.4, np.float32))
-    assert (alpha[:, :26] == 1).all() and (alpha[:, 36:] == 0).all()
-    assert np.all(np.diff(alpha[30]) <= 0)
-
-
 @pytest.mark.parametrize("factor", [1, 3])
 def test_a_window_is_a_part_of_the_whole(factor):
     rng = np.random.default_rng(2)

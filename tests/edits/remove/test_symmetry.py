@@ -73,17 +73,6 @@ def test_a_pattern_goes_on_in_perspective(pattern):
     assert np.abs(filled - picture)[HOLE].mean() < 0.03
 
 
-def test_patches_fill_what_is_left_of_a_hole():
-    depth, picture = slanted(chequers)
-    torn = np.where(HOLE[..., None], 0.9, picture)
-    left = COLUMNS < 55
-    half = np.where(left, sources(torn, depth), -1)
-    filled, alone = (copied(torn, patch_sources(torn, HOLE, ~HOLE, FLAT, known=known)) for known in (half, None))
-    error = [np.abs(p - picture)[HOLE & left].mean() for p in (filled, alone)]
-    assert error[0] < 0.7 * error[1]
-    assert (filled[HOLE & ~left] < 0.89).all()  # none of it is what was in the hole
-
-
 def test_what_does_not_repeat_gives_no_source():
     rng = np.random.default_rng(1)
     spots = rng.random((30, 3)) * [3, 3, 0.12] + [-1.5, -1.5, 0.03]

@@ -28,11 +28,6 @@ def test_several_clicks_and_the_other_object(table):
     assert overlap(select(scene, click=[(50, 50), (60, 80)]), first) > 0.9
 
 
-def test_equal_calls_give_equal_masks(table):
-    scene, *_ = table
-    np.testing.assert_array_equal(select(scene, click=(50, 50)), select(scene, click=(50, 50)))
-
-
 def test_given_masks_are_taken_as_they_are(table, tmp_path):
     scene, first, _ = table
     np.testing.assert_array_equal(select(scene, mask=first), first)
