@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, FieldOfView, Json, Seed, WorkingSize, output_option
+from materialist.cli.generate import add_command
+from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import INTERRUPTED, report_success
 from materialist.errors import MaterialistError
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("batch")(batch)
+    add_command(app, batch)
 
 
 class Interrupted(MaterialistError):
@@ -36,6 +37,7 @@ def batch(
         typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
     ],
     output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
+    computing: Computing,
     apply: Annotated[
         Path | None,
         typer.Option(metavar="EDITS", help="Edits for every photo; {name} in a mask's file name is the photo's."),
@@ -46,14 +48,11 @@ def batch(
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster, or local.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in RUNS.")] = False,
     predictor: Annotated[str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")] = "auto",
-    fov: FieldOfView = "auto",
-    size: WorkingSize = 512,
+    fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
+    size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
     spp: Annotated[
         int | None, typer.Option(help="Paths per pixel of the edits; else 256 for glass and other light, 128.")
     ] = None,
-    seed: Seed = 0,
-    device: DeviceOption = Device.auto,
-    as_json: Json = False,
     force: Annotated[
         bool, typer.Option("--force", help="Begin an earlier batch in RUNS anew; with --resume, under other options.")
     ] = False,
@@ -62,14 +61,15 @@ def batch(
     from materialist.batches.run import batch as run
 
     try:
-        with BatchProgress(quiet=as_json) as progress:
+        with BatchProgress(quiet=computing.as_json) as progress:
             outcome = run(
                 source, output, apply=apply, workers=workers, ray=ray, resume=resume, force=force,
-                predictor=predictor, size=size, fov=fov, seed=seed, device=device.value, spp=spp, progress=progress,
+                predictor=predictor, size=size, fov=fov, seed=computing.seed, device=computing.device, spp=spp,
+                progress=progress,
             )  # fmt: skip
     except KeyboardInterrupt:
         raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None
-    _report(outcome, output, as_json)
+    _report(outcome, output, computing.as_json)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Force, Json, Seed, output_option
+from materialist.cli.generate import add_command
+from materialist.cli.options import Run, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
 
@@ -15,7 +16,7 @@ from materialist.errors import InputError
 def register(app: typer.Typer) -> None:
     """Add the command."""
     settings = {"allow_extra_args": True, "ignore_unknown_options": True}
-    app.command("bench", context_settings=settings)(bench)
+    add_command(app, bench, context_settings=settings)
 
 
 def bench(
@@ -29,11 +30,8 @@ def bench(
         ),
     ],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
+    run: Run,
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,
-    seed: Seed = 0,
-    device: DeviceOption = Device.auto,
-    as_json: Json = False,
-    force: Force = False,
 ) -> None:
     """Run a benchmark. Its own options follow the name, as --scenes 10 or scenes=10."""
     options = parse_extra(context.args)
@@ -41,8 +39,9 @@ def bench(
         raise InputError(f"There is no data folder at {data}.")
     from materialist import bench as benchmarks
 
-    benchmarks.run(name, data=data, output=output, seed=seed, device=device.value, force=force, **options)  # type: ignore[attr-defined]
-    report_success("bench", as_json, [f"Look at {output}"], name=name, report=str(output))
+    how = {"seed": run.seed, "device": run.device, "force": run.force}
+    benchmarks.run(name, data=data, output=output, **how, **options)  # type: ignore[attr-defined]
+    report_success("bench", run.as_json, [f"Look at {output}"], name=name, report=str(output))
 
 
 def parse_extra(arguments: list[str]) -> dict[str, str | bool]:

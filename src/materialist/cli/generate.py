@@ -1,10 +1,9 @@
-"""Commands whose flags come from dataclasses: a parameter that is a dataclass becomes one flag for each field."""
+"""Commands whose flags come from options classes: a parameter of such a class becomes one flag for each field."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
 from enum import StrEnum
 from functools import wraps
 from pathlib import Path
@@ -19,10 +18,9 @@ TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": 
 
 
 def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", **settings: Any) -> None:
-    """Register a function as the command of its name, its dataclass parameters spelled out as flags.
+    """Register a function as the command of its name, its parameters of options classes spelled out as flags.
 
-    Fields of a plain dataclass have typer's annotations; flags of an options class follow from `Option`. Options are
-    read from what was given; fields without a flag take the value of the other parameters of the same name.
+    Options are read from what was given; fields without a flag take the value of the other parameters of that name.
     """
     hints = get_type_hints(function, include_extras=True)
     named = inspect.signature(function).parameters
@@ -30,7 +28,7 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
 
     @wraps(function)
     def command(**values: Any) -> Any:
-        return function(**{key: _value(hints[key], own, values) for key, own in flags.items()})
+        return function(**{key: _value(hints[key], named[key], own, values) for key, own in flags.items()})
 
     every = [flag for own in flags.values() for flag in own]
     command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
@@ -38,39 +36,37 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
     app.command(name or function.__name__, **settings)(command)
 
 
+def _is_options(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, OperationOptions)
+
+
+def _usual(parameter: inspect.Parameter) -> dict[str, Any]:
+    """Other defaults of the fields, where the parameter has a default."""
+    return dict(vars(parameter.default)) if isinstance(parameter.default, OperationOptions) else {}
+
+
 def _flags(kind: Any, parameter: inspect.Parameter, taken: set[str]) -> list[inspect.Parameter]:
-    """The flags of a parameter; the default of a dataclass is an instance with other defaults of its fields.
-
-    An option whose name is `taken` by another parameter gets its value from the function.
-    """
-    if not hasattr(kind, "__dataclass_fields__"):
+    """The flags of a parameter; an option whose name is `taken` by another one gets its value from the function."""
+    if not _is_options(kind):
         return [_parameter(parameter.name, kind, parameter.default)]
-    if issubclass(kind, OperationOptions):
-        declared = {name: told for name, told in declarations(kind).items() if name not in taken}
-        return [flag for name, (told, default) in declared.items() for flag in _option_flags(name, told, default)]
-    hints, given = get_type_hints(kind, include_extras=True), parameter.default
-    defaults = {one.name: getattr(given, one.name) if is_dataclass(given) else one.default for one in fields(kind)}
-    return [
-        _parameter(name, hints[name], inspect.Parameter.empty if default is MISSING else default)
-        for name, default in defaults.items()
-    ]
+    declared = {name: told for name, told in declarations(kind).items() if name not in taken}
+    usual = {name: default for name, (_, default) in declared.items()} | _usual(parameter)
+    return [flag for name, (told, _) in declared.items() for flag in _option_flags(name, told, usual[name])]
 
 
-def _value(kind: Any, flags: list[inspect.Parameter], values: dict[str, Any]) -> Any:
+def _value(kind: Any, parameter: inspect.Parameter, flags: list[inspect.Parameter], values: dict[str, Any]) -> Any:
     """The argument that the flags of a parameter spell."""
     own = {flag.name: values[flag.name] for flag in flags}
-    if not hasattr(kind, "__dataclass_fields__"):
+    if not _is_options(kind):
         return own[flags[0].name]
-    if not issubclass(kind, OperationOptions):
-        return kind(**own)
-    known: dict[str, tuple[Option, Any]] = declarations(kind)
     given = {}
     for key, value in own.items():
-        if value is not None and value is not False and value != []:
+        if value is not None and value != []:
             field, _, word = key.partition("__")  # the flag of a word that a switch also takes
             given[field] = word or value
-    shared = {key: values[key] for key, (told, _) in known.items() if told.flag is None and key in values}
-    return kind.read(given, flags=True, **shared)
+    unspelled = (key for key, (told, _) in declarations(kind).items() if told.flag is None)
+    shared = {key: values[key] for key in unspelled if values.get(key) is not None}
+    return kind.read(given, flags=True, **(_usual(parameter) | shared))
 
 
 def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Parameter]:
@@ -78,10 +74,10 @@ def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Paramet
     if told.flag is None:
         return []
     if told.kind == "switch":
-        words = [
-            _parameter(f"{name}__{w}", _flag(bool, [f"--{w}"], f"{told.help[:-1]}, {w}."), False) for w in told.choices
-        ]
-        return [_parameter(name, _flag(bool, told.spells(name), told.help), False), *words]
+        help = f"{told.help}  [default: on]" if default is True else told.help
+        texts = {name: (told.spells(name), help)}
+        texts |= {f"{name}__{word}": ([f"--{word}"], f"{told.help[:-1]}, {word}.") for word in told.choices}
+        return [_parameter(key, _flag(bool | None, *text), None) for key, text in texts.items()]
     kind: Any = str if told.choices else TYPES.get(told.kind, str)
     if told.kind == "word":
         make: Any = StrEnum  # of a name that is not a literal

@@ -1,31 +1,14 @@
-"""Flags that several commands share, and groups of them."""
+"""Options that several commands share, as options classes; and the arguments beside them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from materialist.options import InvertOptions
-
-
-class Device(StrEnum):
-    """Where to compute."""
-
-    auto = "auto"
-    cpu = "cpu"
-    cuda = "cuda"
-
-
-class Method(StrEnum):
-    """How a region is found."""
-
-    network = "network"
-    grabcut = "grabcut"
-    sam2 = "sam2"
+from materialist.option_kinds import OperationOptions, option
 
 
 def output_option(metavar: str, help: str) -> Any:
@@ -33,45 +16,45 @@ def output_option(metavar: str, help: str) -> Any:
     return typer.Option("-o", "--output", metavar=metavar, help=help)
 
 
-def help_of(name: str) -> str:
-    """The help of an option of `invert`, for other commands that take it."""
-    return str(InvertOptions.__dataclass_fields__[name].metadata["option"].help)
-
-
-Seed = Annotated[
-    int,
-    typer.Option(min=0, max=2**31 - 1, help="Random seed: the same seed on the same machine gives the same result."),
-]
-DeviceOption = Annotated[Device, typer.Option(help="Where to compute; auto takes the GPU when there is one.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace the output when it exists.")]
-FieldOfView = Annotated[str, typer.Option(help=help_of("fov"))]
-WorkingSize = Annotated[int, typer.Option(help=help_of("size"))]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
 PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
 FramesPerSecond = Annotated[int, typer.Option(help="Frames per second.")]
 
+# fmt: off
 
-@dataclass(frozen=True)
-class Run:
+
+@dataclass(frozen=True, kw_only=True)
+class Computing(OperationOptions):
+    """What every command that computes takes."""
+
+    seed: int = option(
+        0, "Random seed: the same seed on the same machine gives the same result.", kind="whole", low=0,
+        high=2**31 - 1)
+    device: str = option(
+        "auto", "Where to compute; auto takes the GPU when there is one.", kind="word",
+        choices=("auto", "cpu", "cuda"))
+    as_json: bool = option(
+        False, "Print the outcome as one line of JSON, the last on stdout.", kind="switch", flag="--json")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Computing):
     """What every command that writes a result takes."""
 
-    seed: Seed = 0
-    device: DeviceOption = Device.auto
-    as_json: Json = False
-    force: Force = False
+    force: bool = option(False, "Replace the output when it exists.", kind="switch")
 
 
-@dataclass(frozen=True)
-class Place:
+@dataclass(frozen=True, kw_only=True)
+class Place(OperationOptions):
     """A region of the photo."""
 
-    mask: Annotated[Path | None, typer.Option("--mask", metavar="PNG", help="The region: white inside.")] = None
-    click: Annotated[
-        list[str] | None,
-        typer.Option("--click", metavar="X,Y", help="A pixel of the object, at working size; more than one helps."),
-    ] = None
-    box: Annotated[str | None, typer.Option("--box", metavar="X0,Y0,X1,Y1", help="A box around the object.")] = None
+    mask: Path | None = option(None, "The region: white inside.", kind="file", metavar="PNG")
+    click: tuple[tuple[float, float], ...] = option(
+        (), "A pixel of the object, at working size; more than one helps.", kind="numbers", count=2, many=True,
+        called="--click", metavar="X,Y")
+    box: tuple[float, float, float, float] | None = option(
+        None, "A box around the object.", kind="numbers", count=4, called="--box", metavar="X0,Y0,X1,Y1")
 
     @property
     def named(self) -> list[str]:
@@ -79,49 +62,43 @@ class Place:
         return [f"--{name}" for name in ("click", "box", "mask") if getattr(self, name)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Region(Place):
     """A region of the photo, found as one likes."""
 
-    method: Annotated[
-        Method,
-        typer.Option("--with", help="network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights."),
-    ] = Method.network
+    method: str = option(
+        "network", "network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights.", kind="word",
+        choices=("network", "grabcut", "sam2"), flag="--with")
 
 
-@dataclass(frozen=True)
-class Rendering:
+@dataclass(frozen=True, kw_only=True)
+class Rendering(OperationOptions):
     """How an edited scene becomes a picture."""
 
-    spp: Annotated[
-        int | None,
-        typer.Option(help="Paths per pixel, of both renderings; else 256 for glass and other light, 128 for the rest."),
-    ] = None
-    denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Clean the renderings (with pyoidn).")] = True
-    full_render: Annotated[bool, typer.Option("--full-render", help="The plain rendering, without the photo.")] = False
-    save: Annotated[Path | None, typer.Option("--save", metavar="SCENE2", help="Write the edited scene as well.")] = (
-        None
-    )
+    spp: int | None = option(
+        None, "Paths per pixel, of both renderings; else 256 for glass and other light, 128 for the rest.",
+        kind="whole", low=2, high=1_000_000, called="--spp")
+    denoise: bool = option(
+        True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")
+    full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
+    save: Path | None = option(None, "Write the edited scene as well.", kind="file", metavar="SCENE2")
 
 
-@dataclass(frozen=True)
-class Training:
+@dataclass(frozen=True, kw_only=True)
+class Training(Computing):
     """How long a network is trained, and where the run goes on."""
 
-    steps: Annotated[int | None, typer.Option(help="Train this many steps more.")] = None
-    minutes: Annotated[float | None, typer.Option(help="Train this many minutes more.")] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in RUN, if there is one.")] = False
-    every: Annotated[float, typer.Option(help="Seconds between checkpoints.")] = 180
-    seed: Seed = 0
-    device: DeviceOption = Device.auto
-    as_json: Json = False
+    steps: int | None = option(None, "Train this many steps more.", kind="whole")
+    minutes: float | None = option(None, "Train this many minutes more.")
+    resume: bool = option(False, "Go on with the run in RUN, if there is one.", kind="switch")
+    every: float = option(180, "Seconds between checkpoints.")
 
 
-@dataclass(frozen=True)
-class Learning:
+@dataclass(frozen=True, kw_only=True)
+class Learning(OperationOptions):
     """How a network learns."""
 
-    batch: Annotated[int, typer.Option(help="Samples a step.")] = 16
-    rate: Annotated[float, typer.Option(help="Peak learning rate.")] = 1.5e-3
-    bfloat16: Annotated[bool, typer.Option("--bfloat16", help="Half as long on processors that have it.")] = False
-    init: Annotated[Path | None, typer.Option(help="Weights of an earlier run to begin from.")] = None
+    batch: int = option(16, "Samples a step.", kind="whole")
+    rate: float = option(1.5e-3, "Peak learning rate.")
+    bfloat16: bool = option(False, "Half as long on processors that have it.", kind="switch")
+    init: Path | None = option(None, "Weights of an earlier run to begin from.", kind="file")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from materialist.cli.options import Method, Place, Region, Rendering, Run
+from materialist.cli.options import Place, Region, Rendering, Run
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import InputError
@@ -28,10 +28,10 @@ def chosen_region(scene: Any, region: Place, run: Run) -> Any:
 
     return select(
         scene,
-        click=[flag_numbers(click, 2, "--click") for click in region.click] if region.click else None,
-        box=flag_numbers(region.box, 4, "--box") if region.box else None,
+        click=list(region.click) or None,
+        box=region.box,
         mask=region.mask,
-        method=region.method if isinstance(region, Region) else Method.network,
+        method=region.method if isinstance(region, Region) else "network",
         device=run.device,
     )
 
@@ -46,8 +46,6 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | N
     from materialist.io.video import ensure_video_writable
 
     save = rendering.save
-    if rendering.spp is not None and not 2 <= rendering.spp <= 1_000_000:
-        raise InputError(f"--spp is a number of paths from 2 to 1000000, not {rendering.spp}.")
     if save is not None:
         if rendering.full_render:
             raise InputError(

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json, Seed
+from materialist.cli.generate import add_command
+from materialist.cli.options import Computing, Json
 from materialist.cli.outcome import BAD_INPUT, report_success
 from materialist.errors import InputError, WeightsError
 
@@ -27,15 +28,15 @@ models = typer.Typer(
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command("doctor")(doctor)
+    add_command(app, doctor)
     app.add_typer(models)
 
 
-def doctor(seed: Seed = 0, device: DeviceOption = Device.auto, as_json: Json = False) -> None:
+def doctor(computing: Computing) -> None:
     """Say what works here, what does not, and the one command that mends it; with --device cuda a GPU must be there."""
     from materialist.doctor import examine
 
-    findings = examine(device)
+    findings, as_json = examine(computing.device), computing.as_json
     broken = [finding for finding in findings if finding.state == "broken"]
     if not as_json:
         _show(findings)

@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.options import Device, DeviceOption, Json
+from materialist.cli.generate import add_command
+from materialist.cli.options import Computing
 from materialist.cli.outcome import report_success
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command("studio")(studio)
+    add_command(app, studio)
 
 
 def studio(
@@ -33,9 +34,7 @@ def studio(
     password: Annotated[str | None, typer.Option(metavar="WORD", help="Ask everyone for it.")] = None,
     everyone: Annotated[bool, typer.Option("--open", help="Let everybody in who can reach --host.")] = False,
     workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1, help="Random seed of inversions.")] = 0,
-    device: DeviceOption = Device.auto,
-    as_json: Json = False,
+    computing: Computing = Computing(),  # noqa: B008
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio.server import check_host, check_port, first_target, new_studio, serve
@@ -43,17 +42,20 @@ def studio(
 
     single_user = check_host(host, password, everyone)
     check_port(host, port)
-    if device is not Device.auto:
+    if computing.device != "auto":
         from materialist.render.variant import setup
 
-        setup(device.value)
-    made = new_studio(work or default_root(), single_user=single_user, workers=workers, seed=seed, device=device.value)
+        setup(computing.device)
+    made = new_studio(
+        work or default_root(), single_user=single_user, workers=workers, seed=computing.seed,
+        device=computing.device,
+    )  # fmt: skip
     made.start = first_target(made.work, target)
-    if not as_json:
+    if not computing.as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")
 
     def on_ready(address: str) -> None:
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
-        report_success("studio", as_json, lines, address=address, work=str(made.work.root))
+        report_success("studio", computing.as_json, lines, address=address, work=str(made.work.root))
 
     serve(made, host=host, port=port, password=password, on_ready=on_ready)

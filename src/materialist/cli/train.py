@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +15,7 @@ from materialist.cli.options import Learning, Training, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import Interrupted
+from materialist.option_kinds import OperationOptions, option
 
 if TYPE_CHECKING:
     from materialist.train.trainer import Progress
@@ -29,39 +29,35 @@ train = typer.Typer(
 )
 
 
-class Config(StrEnum):
-    """Which network and recipe."""
-
-    bundled = "bundled"
-    paper = "paper"
+# fmt: off
 
 
-@dataclass(frozen=True)
-class Recipe:
+@dataclass(frozen=True, kw_only=True)
+class Recipe(OperationOptions):
     """What differs from the recipe of the network."""
 
-    config: Annotated[Config, typer.Option(help="The network that ships, or the paper's.")] = Config.bundled
-    batch: Annotated[int | None, typer.Option(help="Pictures a step; default: the recipe's.")] = None
-    size: Annotated[
-        int | None, typer.Option(help="Side of all crops, pixels; default: the recipe's, small ones first.")
-    ] = None
-    rate: Annotated[float | None, typer.Option(help="Peak learning rate; default: the recipe's.")] = None
-    init: Annotated[
-        Path | None,
-        typer.Option(help="Weights to begin from; bundled: those of a run, paper: Depth Anything or DINOv2."),
-    ] = None
+    config: str = option(
+        "bundled", "The network that ships, or the paper's.", kind="word", choices=("bundled", "paper"))
+    batch: int | None = option(None, "Pictures a step; default: the recipe's.", kind="whole")
+    size: int | None = option(
+        None, "Side of all crops, pixels; default: the recipe's, small ones first.", kind="whole")
+    rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
+    init: Path | None = option(
+        None, "Weights to begin from; bundled: those of a run, paper: Depth Anything or DINOv2.", kind="file")
 
 
-@dataclass(frozen=True)
-class Views:
+@dataclass(frozen=True, kw_only=True)
+class Views(OperationOptions):
     """The views that RefractionNet learns from."""
 
-    data: Annotated[
-        Path | None, typer.Option(help="Folder for the views, used again by later runs; default: RUN/views.")
-    ] = None
-    shapes: Annotated[int, typer.Option(help="Shapes to learn from.")] = 640
-    views: Annotated[int, typer.Option(help="Views of each.")] = 24
-    heldout: Annotated[int, typer.Option(help="Shapes kept aside for the figures.")] = 64
+    data: Path | None = option(
+        None, "Folder for the views, used again by later runs; default: RUN/views.", kind="file")
+    shapes: int = option(640, "Shapes to learn from.", kind="whole")
+    views: int = option(24, "Views of each.", kind="whole")
+    heldout: int = option(64, "Shapes kept aside for the figures.", kind="whole")
+
+
+# fmt: on
 
 
 def register(app: typer.Typer) -> None:
@@ -93,7 +89,7 @@ def matnet(
 
     make: Any
     make, base = {
-        Config.bundled: (bundled.BundledTask, bundled.RECIPE), Config.paper: (paper.PaperTask, paper.RECIPE)
+        "bundled": (bundled.BundledTask, bundled.RECIPE), "paper": (paper.PaperTask, paper.RECIPE)
     }[recipe.config]  # fmt: skip
     chosen = base.changed(batch=recipe.batch, side=recipe.size, rate=recipe.rate)
     task = lambda begin, _: make(open_sources(data), chosen, init=begin, score_samples=score_samples)  # noqa: E731
