@@ -54,7 +54,7 @@ class Option:
         """The value in the type of the field. Raises InputError that names the value and what may be given."""
         called = self.called or name.replace("_", " ")
         if isinstance(value, str) and value in self.choices:
-            return value
+            return str(value)  # of an enum of the command line, too
         check = _CHECKS[self.kind]
         if self.many:
             return tuple(check(self, called, one) for one in several(value))

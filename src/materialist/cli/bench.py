@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -39,8 +39,8 @@ def bench(
         raise InputError(f"There is no data folder at {data}.")
     from materialist import bench as benchmarks
 
-    how = {"seed": run.seed, "device": run.device, "force": run.force}
-    benchmarks.run(name, data=data, output=output, **how, **options)  # type: ignore[attr-defined]
+    how: dict[str, Any] = {"seed": run.seed, "device": run.device, "force": run.force}
+    benchmarks.run(name, data=data, output=output, **how | options)
     report_success("bench", run.as_json, [f"Look at {output}"], name=name, report=str(output))
 
 
