@@ -24,7 +24,8 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
     """
     hints = get_type_hints(function, include_extras=True)
     named = inspect.signature(function).parameters
-    flags = {key: _flags(hints[key], parameter, set(named)) for key, parameter in named.items()}
+    taken = {key for key in named if not _is_options(hints[key])}
+    flags = {key: _flags(hints[key], parameter, taken) for key, parameter in named.items()}
 
     @wraps(function)
     def command(**values: Any) -> Any:
