@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from materialist import bench, metrics
-from materialist.bench.edit import scores
 from materialist.bench.edits import edits, true_scene
 from materialist.procedural.synthetic import make_sample
 
@@ -52,16 +51,6 @@ def test_a_material_edit_of_the_scene_is_the_true_one(cases):
     np.testing.assert_allclose(edited.materials.albedo[inside], stage.truth.materials.albedo[inside], atol=1e-5)
     np.testing.assert_allclose(edited.materials.roughness[inside], stage.truth.materials.roughness[inside], atol=1e-6)
     np.testing.assert_array_equal(edited.materials.albedo[~inside], scene.materials.albedo[~inside])
-
-
-def test_scores_are_inside_and_outside():
-    truth = np.full((4, 4, 3), 0.5, np.float32)
-    inside = np.zeros((4, 4), bool)
-    inside[:2] = True
-    worse = np.where(inside[..., None], 0.6, truth).astype(np.float32)
-    found = scores(worse, truth, inside)
-    assert np.isinf(found["outside"]) and found["inside"] < found["overall"] < np.inf
-    assert np.isnan(scores(worse, truth, np.ones((4, 4), bool))["outside"])
 
 
 def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(mitsuba, monkeypatch, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from materialist import bench
 from materialist.bench import invert
-from materialist.bench.process import materialist
+from materialist.bench.benchmark import materialist
 from materialist.errors import MaterialistError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
@@ -63,12 +63,6 @@ def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data,
     assert rows[1]["peak_mb"] == 700 and rows[1]["psnr"] == 33
     assert rows[1]["seconds_per_mpixel"] == pytest.approx(rows[1]["seconds"] / 96 / 64 * 1e6)
     assert (out / "plot.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_stages_are_added_up_and_the_rest_is_told():
-    spent = invert.stages(REPORT["stages"], seconds=12.0)
-    assert spent["light_s"] == 2.5 and spent["materials_s"] == 3.25 and spent["engine_s"] == 2
-    assert spent["other_s"] == pytest.approx(12 - 12.75)
 
 
 def test_a_failed_command_is_told_in_its_own_words(tmp_path):

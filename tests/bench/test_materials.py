@@ -5,16 +5,12 @@ import json
 import cv2
 import numpy as np
 import pytest
-import torch
 
 from materialist import bench
 from materialist.bench import materials
-from materialist.bench.predictor import forward
 from materialist.bench.report import Report
 from materialist.color import linear_to_srgb
 from materialist.io.exr import write_exr
-from materialist.metrics.lpips import lpips
-from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Camera
 
@@ -76,22 +72,6 @@ def test_samples_are_seen_by_their_own_camera(tmp_path):
     found = list(materials.MaterialsBench(limit=2, photographic=False).samples(tmp_path, report))
     assert [name for name, _, _ in found] == ["0000000", "0000004"]
     assert found[0][1].camera.fov == pytest.approx(48.0, rel=1e-5)
-
-
-def test_lpips_is_left_out_where_it_is_not_installed():
-    picture = np.full((16, 16, 3), 0.5, np.float32)
-    found = lpips(picture, picture)
-    assert found is None or found == pytest.approx(0, abs=1e-4)
-
-
-def test_the_forward_pass_alone():
-    tiny = BundledArchitecture((8, 8, 16, 32), (1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
-    seen = []
-    network = BundledNetwork(tiny).eval()
-    network.register_forward_pre_hook(lambda _, inputs: seen.append([tuple(t.shape) for t in inputs]))
-    forward(network, 70)()
-    assert seen == [[(1, 3, 64, 64), (1, 2, 64, 64)]]
-    assert not torch.is_inference_mode_enabled()
 
 
 def test_the_benchmark_of_time(tmp_path):

@@ -85,7 +85,6 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
         ("glass", {"iors": "0.9"}, "iors is '0.9'"),
         ("glass", {"iors": "abc"}, "iors is 'abc'"),
         ("glass", {"background": "sea"}, "background is 'sea'; choose one of room, envmap"),
-        ("glass", {"model": "open"}, "model is 'open'"),
         ("glass", {"shapes": 0}, "nothing to measure"),
         ("invert", {"sizes": "12,x"}, "with commas"),
         ("invert", {"sizes": "8"}, "with commas"),

@@ -1,16 +1,6 @@
 """`bench studio`: what it refuses; a whole run takes minutes and a browser."""
 
-import pytest
-
 from materialist.bench import studio
-from materialist.errors import SetupError
-
-
-def test_without_a_browser(monkeypatch):
-    pytest.importorskip("playwright", reason="needs playwright")
-    monkeypatch.setattr(studio.shutil, "which", lambda name: None)
-    with pytest.raises(SetupError, match="apt-get install chromium"), studio._browser():
-        pass
 
 
 def test_every_move_changes_the_picture():

@@ -59,11 +59,6 @@ def test_transparent_points_do_not_count(albedo):
     assert np.isnan(error) and count == 0
 
 
-def test_points_on_the_border_are_inside(albedo):
-    judged = {"intrinsic_points": _points((0.0, 0.0), (1.0, 1.0)), "intrinsic_comparisons": [_says(0, 1, "1")]}
-    assert whdr(albedo, judged) == (0.0, 1)
-
-
 def test_the_benchmark_from_a_folder(tmp_path):
     data = tmp_path / "iiw"
     data.mkdir()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.procedural.photographic import photographic, white_balanced
+from materialist.procedural.photographic import photographic
 
 
 def scene():
@@ -29,11 +29,3 @@ def test_equal_states_give_equal_pictures_and_the_input_stays():
     assert np.array_equal(a, b)
     assert not np.array_equal(a, c)
     assert np.array_equal(image, before)
-
-
-def test_balance_pulls_a_cast_towards_grey_and_keeps_brightness():
-    image = np.full((16, 16, 3), 0.3, np.float32) * np.array([1.3, 1.0, 0.7], np.float32)
-    spread = lambda a: np.ptp(np.log(a.mean((0, 1))))  # noqa: E731
-    out = [white_balanced(image, np.random.default_rng(k)) for k in range(40)]
-    assert np.mean([spread(o) for o in out]) < spread(image)
-    np.testing.assert_allclose([o.mean() for o in out], image.mean(), rtol=0.1)

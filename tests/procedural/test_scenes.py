@@ -5,7 +5,7 @@ import pytest
 
 from materialist.procedural import materials, outdoors, packing, rooms, tiles
 from materialist.procedural.objects import furniture, things
-from materialist.procedural.sample import balance, exposure
+from materialist.procedural.sample import exposure
 
 
 def test_the_bank_of_tiles_is_fixed_and_seamless():
@@ -82,10 +82,3 @@ def test_exposure_ignores_the_lamp_in_the_picture():
     lamp[:4, :8] = 50.0
     assert exposure(lamp, rng()) > 0.5 * exposure(room, rng())
     assert 0.05 < 0.01 * exposure(room, rng()) < 0.8
-
-
-def test_balance_makes_coloured_light_whiter():
-    shading = np.tile(np.array([1.4, 1.0, 0.5]), (16, 16, 1))
-    for k in range(20):
-        gains = balance(shading, np.random.default_rng(k))
-        assert np.ptp(np.log(gains * shading[0, 0])) < np.ptp(np.log(shading[0, 0])) + 0.15

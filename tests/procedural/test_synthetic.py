@@ -14,18 +14,6 @@ from materialist.procedural.synthetic import make_sample
 SHARED = Path(__file__).parents[3] / "shared" / "data"
 
 
-def test_maps_are_complete_and_in_range(sample):
-    truth, shape = sample.truth, (40, 56)
-    assert sample.photo.linear.shape == (*shape, 3) and sample.envmap.shape == (256, 512, 3)
-    assert truth.depth.shape == truth.materials.roughness.shape == truth.materials.metallic.shape == shape
-    surface = truth.depth > 0
-    assert 0.3 < surface.mean() < 1
-    assert truth.materials.albedo[surface].min() > 0.02 and truth.materials.albedo.max() <= 0.9
-    assert np.allclose(np.linalg.norm(truth.normal, axis=-1), 1, atol=1e-4)
-    assert sample.photo.linear.min() >= 0 and sample.photo.linear.max() <= 1
-    assert 0.05 < sample.photo.linear.mean() < 0.8
-
-
 def test_the_same_numbers_give_the_same_sample(sample):
     again = make_sample(0, 0, 0, size=(40, 56), seed=0, spp=64)
     assert np.array_equal(again.photo.linear, sample.photo.linear)
@@ -64,16 +52,6 @@ def test_depth_and_normals_agree_on_the_floor(sample):
     assert floor.sum() > 200 and floor_normal[1] > 0.7
     distance = unproject(depth, sample.photo.camera)[floor] @ floor_normal
     assert np.ptp(distance) < 1e-3
-
-
-def test_white_furnace(mitsuba):
-    """Under white light a diffuse white world would be white; ours stays below, and albedo is what is missing."""
-    picture = make_sample(0, 0, 0, size=(16, 24), spp=4)
-    lit = picture.render(np.ones((8, 16, 3), np.float32), spp=256)
-    surface = picture.truth.depth > 0
-    assert (lit[surface] < 1.15).all()
-    assert np.corrcoef(lit[surface].ravel(), picture.truth.materials.albedo[surface].ravel())[0, 1] > 0.65
-    assert np.allclose(lit[~surface & np.roll(~surface, 1, 0) & np.roll(~surface, -1, 0)], 1, atol=0.15)
 
 
 @pytest.mark.parametrize("index", range(3))

@@ -84,12 +84,6 @@ def test_the_image_is_albedo_times_shading_plus_what_does_not_depend_on_albedo()
     np.testing.assert_allclose((bright - dark).mean((0, 1)), 0.4 * shading.mean((0, 1)), rtol=0.02)
 
 
-def test_equal_seeds_give_equal_pictures():
-    a, b, c = (traced(still(), spp=4, seed=k)[0] for k in (3, 3, 4))
-    assert np.array_equal(a, b)
-    assert not np.array_equal(a, c)
-
-
 def test_labels_of_a_ground_seen_from_a_known_camera():
     """Depth and normal against the plane's equation, in the camera frame."""
     colour = (0.5, 0.3, 0.1)
@@ -123,18 +117,6 @@ def test_the_sky_has_no_labels():
     for name in ("depth", "normal", "albedo", "roughness", "metallic"):
         assert not labels[name][sky].any(), name
     assert (labels["depth"][~sky] > 0).all()
-
-
-def test_texture_labels_average_the_part_that_the_centre_sees():
-    probe = {
-        "owner": np.array([[[0, 0, 1, 0]]]), "depth": np.array([[[1.0, 2, 3, 4]]]),
-        "normal": np.zeros((1, 1, 4, 3)), "albedo": np.array([[[[0.1] * 3, [0.2] * 3, [0.9] * 3, [0.6] * 3]]]),
-        "roughness": np.array([[[0.1, 0.2, 0.9, 0.6]]]), "metallic": np.zeros((1, 1, 4)),
-    }  # fmt: skip
-    labels = sample.labels_of(probe)  # the centre of 2 x 2 is the last
-    assert labels["depth"][0, 0] == 4
-    np.testing.assert_allclose(labels["albedo"][0, 0], 0.3)
-    np.testing.assert_allclose(labels["roughness"][0, 0], 0.3)
 
 
 def test_a_second_world_compiles_nothing():
@@ -186,10 +168,3 @@ def test_texture_is_not_printed_into_the_shading():
     assert texture.std() > 0.4 * texture.mean(), "the floor has a texture to print"
     assert abs(np.corrcoef(texture.ravel(), shading.ravel())[0, 1]) < 0.15
     assert shading.std() < 0.04 * shading.mean()
-
-
-def test_the_shading_ends_where_the_surface_does():
-    arrays, probe = developed(still())
-    shading, covered = arrays["shading"].astype(np.float32).mean(-1), (probe["owner"] >= 0).mean(2)
-    assert (covered == 0).sum() > 100 and (covered == 1).sum() > 1000
-    assert np.percentile(shading[covered == 0], 99) < 0.05 * np.median(shading[covered == 1])

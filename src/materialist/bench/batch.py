@@ -20,8 +20,7 @@ from pathlib import Path
 from materialist.batches.photos import list_photos
 from materialist.batches.results import package_hash
 from materialist.batches.task import SINGLE_THREAD
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, numbers
-from materialist.bench.process import materialist
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers
 from materialist.bench.report import Column, Report
 from materialist.errors import MaterialistError
 from materialist.option_kinds import option

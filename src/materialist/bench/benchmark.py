@@ -1,18 +1,20 @@
-"""What every benchmark has: options as the fields of a frozen dataclass, rows, lists of names, times."""
+"""What every benchmark has: options as the fields of a frozen dataclass, rows, lists of names, times, commands."""
 
 from __future__ import annotations
 
 import inspect
+import os
+import subprocess
 import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from materialist.bench.report import Column, Report, write
-from materialist.errors import InputError
+from materialist.errors import InputError, MaterialistError
 from materialist.option_kinds import OperationOptions, option
 
 Row = dict[str, Any]
@@ -89,6 +91,15 @@ def numbers(called: str, text: str, low: float, high: float, kind: type = int) -
     if not all(low <= number <= high for number in found) or not found:
         raise InputError(f"The {called} is {text!r}; give numbers from {low} to {high} with commas.")
     return found
+
+
+def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -> None:
+    """Run `materialist` with more in its environment; raises MaterialistError with its last lines when it fails."""
+    command = [sys.executable, "-m", "materialist", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(environment or {})})
+    if done.returncode:
+        said = f"{done.stdout[-300:]}{done.stderr[-300:]}".strip() or "nothing; it may have run out of memory"
+        raise MaterialistError(f"materialist {' '.join(arguments)} ended with code {done.returncode}: {said}")
 
 
 def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dict[str, float]]:

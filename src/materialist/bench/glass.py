@@ -40,7 +40,6 @@ from materialist.predict.refraction.thickness import Thickness
 from materialist.procedural.synthetic import make_sample
 from materialist.types import Array
 
-MODELS = ("two-interface", "closed")
 DRAWN = ("two_interface, true d", "two_interface, predicted d", "closed, predicted d", "closed, predicted d, inpainted")
 """The methods whose pictures are shown."""
 
@@ -78,7 +77,6 @@ class GlassBench(Benchmark):
     draws: int = option(10, "Noisy thicknesses a case.", **COUNT_OR_0)
     pictures: int = option(6, "Cases that are drawn.", **COUNT_OR_0)
     latency: int = option(0, "Size of the timed preview; 0: none.", **COUNT_OR_0)
-    model: str = option("", "The rows of one model alone.", kind="word", choices=("", *MODELS))
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist.render.variant import setup
@@ -122,7 +120,6 @@ class GlassBench(Benchmark):
         """The rows of all methods for one case; their pictures go into `shown`."""
         scene, true = case.scene, behind["true"]
         d = models.thicknesses(scene, np.clip(case.photo * case.gain, 0, 1), true)
-        chosen = (self.model,) if self.model else MODELS
 
         def row(method: str, picture: Array, found: Thickness | None = None) -> Row:
             shown[method] = picture
@@ -130,25 +127,22 @@ class GlassBench(Benchmark):
 
         for kind, background in behind.items():
             yield row(f"background alone, {kind}", models.plain(case, background))
-        if "closed" in chosen:
-            yield row(f"{CEILING}, true mesh", models.before(case, scene.item.solid, true))
+        yield row(f"{CEILING}, true mesh", models.before(case, scene.item.solid, true))
         again = scene.render(case.envmap, "glass", ior=case.ior, spp=self.spp, seed=4)
         yield row(f"{CEILING}, truth again", again)
         for model in (models.two_interface, models.closed):
             name = model.__name__
-            if name.replace("_", "-") in chosen:
-                for source, found in d.items():
-                    yield row(f"{name}, {source} d", model(case, found, true), found)
-                inpainted = model(case, d["predicted"], behind["inpainted"])
-                yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
-        for source in ("true", "network") if "closed" in chosen else ():
+            for source, found in d.items():
+                yield row(f"{name}, {source} d", model(case, found, true), found)
+            inpainted = model(case, d["predicted"], behind["inpainted"])
+            yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
+        for source in ("true", "network"):
             if source in d:
                 leaning = replace(d[source], back=scene.front.back)
                 yield row(f"closed, {source} d, true back", models.closed(case, leaning, true), leaning)
-        if "two-interface" in chosen:
-            same = models.two_interface(case, d["predicted"], true, papers_back=True)
-            yield row("two_interface, predicted d, back normal = front normal", same, d["predicted"])
-            yield from sensitivity(case, d["predicted"], true, draws=self.draws, seed=self.seed)
+        same = models.two_interface(case, d["predicted"], true, papers_back=True)
+        yield row("two_interface, predicted d, back normal = front normal", same, d["predicted"])
+        yield from sensitivity(case, d["predicted"], true, draws=self.draws, seed=self.seed)
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
         """Rows of the preview: built, its first picture, and one picture after another, as a person changes sliders.

@@ -18,7 +18,7 @@ from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
 from materialist.procedural.synthetic import sensor
-from materialist.procedural.world import Viewpoint
+from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array, Camera
 
 GROUPS = ("symmetric", "asymmetric")
@@ -292,9 +292,4 @@ def _view(solid: Solid, rng: np.random.Generator) -> Viewpoint:
     height = float(solid.vertices[:, 1].max())
     reach = max(height, float(np.abs(solid.vertices[:, [0, 2]]).max()) * 1.6)
     distance = reach / np.tan(np.radians(fov) / 2)
-    back = np.array([np.cos(tilt) * np.sin(azimuth), np.sin(tilt), np.cos(tilt) * np.cos(azimuth)])
-    right = np.cross([0, 1, 0], back)
-    right /= np.linalg.norm(right)
-    return Viewpoint(
-        np.array([0, height / 2, 0]) + distance * back, np.stack([right, np.cross(back, right), back], -1), float(fov)
-    )
+    return orbit(np.array([0, height / 2, 0]), distance, azimuth, tilt, fov)

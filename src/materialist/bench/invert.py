@@ -22,8 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, numbers, timed
-from materialist.bench.process import materialist
+from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.option_kinds import option

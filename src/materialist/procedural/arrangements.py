@@ -11,7 +11,7 @@ from materialist.errors import InputError
 from materialist.procedural import patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.world import Viewpoint
+from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array
 
 
@@ -52,11 +52,8 @@ def view(scene_index: int, view_index: int, *, seed: int) -> Viewpoint:
     fov, tilt = rng.uniform(35, 60), np.radians(rng.uniform(10, 35))
     azimuth = np.radians({0: rng.uniform(-180, 180), 1: rng.uniform(-55, 55), 2: rng.uniform(5, 60)}[scene_index % 3])
     distance = 0.95 / np.tan(np.radians(fov) / 2) + 0.3
-    back = np.array([np.cos(tilt) * np.sin(azimuth), np.sin(tilt), np.cos(tilt) * np.cos(azimuth)])
     target = np.array([rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.35), rng.uniform(-0.1, 0.1)])
-    right = np.cross([0, 1, 0], back)
-    right /= np.linalg.norm(right)
-    return Viewpoint(target + distance * back, np.stack([right, np.cross(back, right), back], -1), fov)
+    return orbit(target, distance, azimuth, tilt, fov)
 
 
 def in_camera(item: Item, camera: Viewpoint) -> Item:

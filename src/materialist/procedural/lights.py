@@ -15,7 +15,7 @@ import numpy as np
 
 from materialist.color import luminance
 from materialist.errors import InputError
-from materialist.procedural.objects.shapes import lumps
+from materialist.procedural.objects.shapes import lumps, turn_upright
 from materialist.types import Array
 
 HEIGHT = 256
@@ -90,9 +90,7 @@ def _step(x: Array, width: float) -> Array:
 
 def _window(d: Array, axis: Array, half: tuple[float, float]) -> Array:
     """[...] 1 inside a rectangular light of angular half sizes (radians) about an axis, soft at its border."""
-    right = np.cross([0, 1, 0], axis)
-    right /= max(np.linalg.norm(right), 1e-9)
-    up = np.cross(axis, right)
+    right, up, _ = turn_upright(axis).T
     front = np.maximum(d @ axis, 1e-6)
     x, y = np.abs(d @ right) / front, np.abs(d @ up) / front
     inside = _step(np.tan(half[0]) - x + 0.02, 0.04) * _step(np.tan(half[1]) - y + 0.02, 0.04)

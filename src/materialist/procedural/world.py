@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.objects.shapes import Solid, turn_upright
 from materialist.types import Array
 
 
@@ -65,12 +65,15 @@ class World:
 def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
     """The camera at `position` [3] that looks at `target` [3], rolled by `roll` radians."""
     back = np.asarray(position, float) - target
-    back /= np.linalg.norm(back)
-    right = np.cross([0, 1, 0], back)
-    right /= max(np.linalg.norm(right), 1e-9)
-    up = np.cross(back, right)
+    upright = turn_upright(back / np.linalg.norm(back))
     c, s = np.cos(roll), np.sin(roll)
-    return Viewpoint(np.asarray(position, float), np.stack([c * right + s * up, c * up - s * right, back], -1), fov)
+    return Viewpoint(np.asarray(position, float), upright @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), fov)
+
+
+def orbit(target: Array, distance: float, azimuth: float, elevation: float, fov: float) -> Viewpoint:
+    """The camera `distance` metres from `target` [3], at an azimuth (from +Z towards +X) and elevation in radians."""
+    back = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
+    return Viewpoint(target + distance * back, turn_upright(back), float(fov))
 
 
 def look_down(
