@@ -10,8 +10,8 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import into_photo, onto_working
 from materialist.edits.composite.layers import Layers, changed_pixels
-from materialist.edits.core.emitters import dimmed_emitters
 from materialist.edits.core.renderer import is_relit
+from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.envmap import environment
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene

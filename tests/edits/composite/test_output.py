@@ -9,7 +9,6 @@ from PIL import Image
 
 from materialist.edits.composite.output import is_deep, write_composite
 from materialist.io.decode import decode
-from materialist.io.exr import read_exr
 
 SCENE = flat_scene()
 
@@ -36,12 +35,6 @@ def test_every_16_bit_value_comes_back(tmp_path):
     back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(back, pixels)
     assert is_deep(photo) and sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
-
-
-def test_exr_keeps_hdr(tmp_path):
-    bright = SCENE.photo.original * 50
-    write_composite(tmp_path / "b.exr", bright, SCENE.photo)
-    np.testing.assert_array_equal(read_exr(tmp_path / "b.exr"), bright)
 
 
 def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):

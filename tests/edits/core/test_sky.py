@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 from edit_scenes import block_mask, flat_scene
-from made_meshes import box_file
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.sky import photo_sky
 from materialist.edits.glass.glass import glass
-from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
 from materialist.geometry.build import build_geometry
 
@@ -58,12 +56,3 @@ def test_under_another_light_the_sky_is_that_light():
     picture = composite(SCENE, edited, spp=16, denoise=False)
     assert picture[INNER].min() > 0.5 and picture[INNER].max() < 0.76  # half of 1 to 1.5, the fitted light
     assert np.ptp(picture[INNER], axis=-1).max() < 0.01
-
-
-def test_inserted_glass_shows_it_too(tmp_path):
-    body = insert(SCENE, box_file(tmp_path / "box.ply"), (36, 30), material="glass")
-    alone = replace(body, bodies=tuple(replace(b, surface=replace(b.surface, ior=1.0)) for b in body.bodies))
-    shown = composite(SCENE, alone, spp=16, denoise=False)
-    high = np.s_[14:20, 33:39]
-    assert (SCENE.depth[high] == 0).all()
-    np.testing.assert_allclose(shown[high], SCENE.photo.linear[high], atol=0.1)

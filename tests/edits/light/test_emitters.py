@@ -10,7 +10,7 @@ from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.into_photo import in_photo
-from materialist.edits.core.emitters import KEY, emitting
+from materialist.edits.core.surfaces import KEY, emitting
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight
 from materialist.errors import InputError

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from edit_scenes import flat_scene
 from PIL import Image
 from table_top import overlap, table_top
 
@@ -64,12 +63,6 @@ def test_sam2_without_weights_says_what_to_do(table, monkeypatch, tmp_path):
     monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path))
     with pytest.raises(MaterialistError, match="leave --with sam2 out"):
         select(table[0], click=(50, 50), method="sam2")
-
-
-def test_a_click_on_the_last_row_of_an_odd_size():
-    scene = flat_scene(171, 256)
-    assert select(scene, click=(30, 170), method="grabcut").any()
-    assert select(scene, click=(255, 170), method="grabcut").any()
 
 
 def around(mask, more):

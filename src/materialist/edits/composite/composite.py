@@ -11,9 +11,9 @@ from materialist import metrics
 from materialist.edits.composite.into_photo import in_photo, into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.composite.output import is_deep
-from materialist.edits.core.emitters import base_of, dimmed_emitters
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.edits.core.renderer import EditRenderer, denoised, paths_for, rendered
+from materialist.edits.core.surfaces import base_of, dimmed_emitters
 from materialist.errors import InputError
 from materialist.types import Array, Materials, Scene
 
@@ -96,7 +96,7 @@ def pictures(
 def compared(scene: Scene, edited: Scene) -> Scene:
     """The scene that an edit is compared with, which shows what the composite's photo shows.
 
-    It is the fitted scene; with in-photo emitters as surfaces where the edit has them (`core.emitters`). Where the
+    It is the fitted scene; with in-photo emitters as surfaces where the edit has them (`core.surfaces`). Where the
     edit discloses hidden places, it carries a photo that is filled there (`remove`): that photo stands in for the
     photo, and the fitted scene without the removed object for the fitted scene.
     """

@@ -178,7 +178,7 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Arr
     Clipped pixels have the estimated radiance of the emitters.
 
     Args:
-        seen: [H, W] bool: where lights are seen. found: `core.emitters.KEY` of the provenance.
+        seen: [H, W] bool: where lights are seen. found: `core.surfaces.KEY` of the provenance.
         before: [H0, W0] share of new bodies, which stand before the lights.
     """
     dim = float(found["dim"])

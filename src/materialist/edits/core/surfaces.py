@@ -1,17 +1,24 @@
-"""Surfaces of bodies, and the names of bodies that stand for something in the photo."""
+"""Surfaces of bodies, and bodies that stand for something in the photo, as its lights (`light.emitters`) do."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from materialist.types import Array, Surface
+from materialist.types import Array, Body, Scene, Surface
 
 PHOTO_LIGHT = "photo light"
 """Names of bodies that are emitters of the photo begin so."""
 PHOTO_GLASS = "photo glass"
 """Names of bodies that are objects of the photo turned to glass begin so."""
+KEY = "photo_lights"
+"""Entry of the provenance of a scene with in-photo emitters: `ambient` (factor on the fitted environment map),
+`radiance` of the emitters, `dim` (the factor that the user asked for), their `share` of the light, `emission`."""
+OFF = 1e-6
+"""Radiance of an emitter that is switched off: the renderer still knows it as an emitter."""
 
 
 def uniform_surface(albedo: Array | float, roughness: float, metallic: float, **fields: Any) -> Surface:
@@ -25,3 +32,33 @@ def triple(values: Array) -> tuple[float, float, float]:
     """Three numbers as a tuple of plain floats, as files and comparisons want them."""
     a, b, c = (float(v) for v in values)
     return a, b, c
+
+
+def dimmed_emitters(scene: Scene, edited: Scene) -> dict | None:
+    """The entry KEY of an edit that dimmed emitters of this scene's photo; None where it did not."""
+    return None if KEY in scene.provenance else edited.provenance.get(KEY) or None
+
+
+def base_of(scene: Scene, edited: Scene) -> Scene:
+    """The scene that an edit is compared with: the fitted scene, with its emitters as surfaces if the edit has them.
+
+    Both give the photo; without the surfaces the light of the emitters is in the environment map.
+    """
+    found = dimmed_emitters(scene, edited)
+    if found is None:
+        return scene
+    white = [[found["radiance"]] * 3] * len(edited.bodies)  # scenes of earlier versions hold no colours
+    emission = found.get("emission", white)
+    lights = [body for body in edited.bodies if body.name.startswith(PHOTO_LIGHT)]
+    return with_emitters(scene, [emitting(body, own) for body, own in zip(lights, emission)], found)
+
+
+def with_emitters(scene: Scene, emitters: Sequence[Body], found: dict) -> Scene:
+    """The scene with emitters as further bodies, and without their light in the environment map."""
+    return replace(scene, envmap=scene.envmap * np.float32(found["ambient"]), bodies=(*scene.bodies, *emitters))
+
+
+def emitting(body: Body, emission: Sequence[float]) -> Body:
+    """The body with an emission [3]; a channel of 0 becomes `OFF`."""
+    red, green, blue = (max(float(c), OFF) for c in emission)
+    return replace(body, surface=replace(body.surface, emission=(red, green, blue)))

@@ -6,10 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.edits.core.emitters import KEY, OFF, emitting, with_emitters
 from materialist.edits.core.notes import is_edited, warned
 from materialist.edits.core.region import checked_region
-from materialist.edits.core.surfaces import PHOTO_LIGHT, triple, uniform_surface
+from materialist.edits.core.surfaces import (
+    KEY,
+    OFF,
+    PHOTO_LIGHT,
+    emitting,
+    triple,
+    uniform_surface,
+    with_emitters,
+)
 from materialist.errors import InputError
 from materialist.render.scene import part
 from materialist.types import Array, Body, Photo, Scene
