@@ -11,8 +11,8 @@ from PIL import Image
 from materialist.batches.results import package_hash
 from materialist.batches.run import batch
 from materialist.batches.task import SINGLE_THREAD
-from materialist.io.examples import example_path
 from materialist.io.package import load_scene
+from materialist.io.photo import example_path
 
 pytest.importorskip("mitsuba")
 OPTIONS = {"size": 64, "envmap_size": [64, 32], "spp": 2, "device": "cpu", "predictor": "constant"}

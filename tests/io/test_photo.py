@@ -394,3 +394,14 @@ def test_float_tiffs_with_channels_apart_are_refused(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", np.zeros((3, 12, 16), np.float32), photometric="rgb", planarconfig="separate")
     with pytest.raises(InputError, match="one after the other"):
         decode_photo(tmp_path / "a.tif")
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_portable_pixmaps_of_8_bits_alone(tmp_path, channels):
+    pixels = picture()[..., :channels]
+    kind = b"P5" if channels == 1 else b"P6"
+    (tmp_path / "a.ppm").write_bytes(kind + b"\n# 65535\n30 20 255\n" + pixels.tobytes())
+    np.testing.assert_allclose(read_photo(tmp_path / "a.ppm").linear, linear8(pixels) * np.ones(3), atol=1e-6)
+    (tmp_path / "b.ppm").write_bytes(kind + b"\n30 20\n65535\n" + pixels.astype(">u2").tobytes())
+    with pytest.raises(InputError, match="more than 8 bits a channel, which is read from PNG and TIFF alone"):
+        read_photo(tmp_path / "b.ppm")

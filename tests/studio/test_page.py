@@ -204,7 +204,7 @@ def _two_people(browser, address):
 @pytest.mark.slow
 def test_the_whole_story(page, running, tmp_path):
     """A dropped photo, cancelled and begun again, reloaded in the middle, edited, traced, taken away."""
-    from materialist.io.examples import example_path
+    from materialist.io.photo import example_path
 
     address, _ = running
     page.set_default_timeout(300_000)

@@ -7,6 +7,7 @@ import pytest
 from studio_scenes import package, png_header
 
 from materialist.errors import InputError
+from materialist.io.decode import image_size
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
 from materialist.studio import StudioSettings, archives, uploads
@@ -42,7 +43,7 @@ def test_no_picture(tmp_path, name, content, message):
 
 def test_sizes_of_other_headers(tmp_path):
     write_exr(tmp_path / "a.exr", np.zeros((12, 40, 3), np.float32))
-    assert uploads.header_size(tmp_path / "a.exr", "a") == (40, 12)
+    assert image_size(tmp_path / "a.exr") == (40, 12)
     (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 50000\n")
     with pytest.raises(InputError, match="2000 megapixels"):
         uploads.checked_picture(tmp_path / "a.hdr", "a.hdr")
@@ -50,11 +51,11 @@ def test_sizes_of_other_headers(tmp_path):
     import cv2  # Pillow does not know the pixels of a float TIFF, and `invert` reads it
 
     cv2.imwrite(str(tmp_path / "a.tif"), np.full((20, 30, 3), 0.5, np.float32))
-    assert uploads.header_size(tmp_path / "a.tif", "a.tif") == (30, 20)
+    assert image_size(tmp_path / "a.tif") == (30, 20)
     assert uploads.checked_picture(tmp_path / "a.tif", "a.tif") == ".tif"
     (tmp_path / "b.tif").write_bytes((tmp_path / "a.tif").read_bytes()[:6])
     with pytest.raises(InputError, match="not an image"):
-        uploads.header_size(tmp_path / "b.tif", "b.tif")
+        uploads.checked_picture(tmp_path / "b.tif", "b.tif")
 
 
 @pytest.mark.parametrize("root", ["", "room.scene/"])

@@ -16,7 +16,7 @@ from materialist.errors import InputError
 from materialist.io.atomic import MARKER
 from materialist.io.bitmap import FORMATS
 from materialist.io.decode import RAW_SUFFIXES
-from materialist.io.examples import PREFIX
+from materialist.io.photo import PREFIX
 
 SUFFIXES = RAW_SUFFIXES | frozenset(
     (".png", ".jpg", ".jpeg", ".heic", ".heif", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".bmp", ".avif", ".mpo")

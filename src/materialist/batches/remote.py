@@ -11,7 +11,7 @@ from typing import Any
 
 from materialist.batches.results import file_hash
 from materialist.errors import InputError, MaterialistError, SetupError
-from materialist.io.examples import PREFIX, example_path
+from materialist.io.photo import PREFIX, example_path
 
 LARGEST = 2 << 30
 """Bytes of a photo that is fetched: no photo within the pixel limit is larger."""

@@ -85,7 +85,7 @@ class StudioBench(Benchmark):
     scene: str = option("", "A scene package that is opened in place of the photo.", kind="name")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.io.examples import PREFIX, example_path
+        from materialist.io.photo import PREFIX, example_path
 
         photo = example_path(self.photo) if self.photo.startswith(PREFIX) else Path(self.photo)
         if not photo.is_file():

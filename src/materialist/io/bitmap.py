@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -76,38 +77,33 @@ def light_and_alpha(light: Array, alpha: Array, warnings: list[str]) -> Decoded:
 
 def read_bitmap(path: Path) -> Decoded:
     """Everything Pillow opens: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
-    from pillow_heif import register_heif_opener
-
-    register_heif_opener()
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
-    with _pixel_limit_lifted(), path.open("rb") as file:
-        try:
-            image = Image.open(file)
-        except UnidentifiedImageError as error:
-            raise InputError(f"{path} is not an image this program can read; give it a {FORMATS} file.") from error
-        with image:
-            check_size(*image.size, path)
-            image.load()  # finds truncation, also for files whose pixels OpenCV reads below
-            warnings = []
-            frames = getattr(image, "n_frames", 1)
-            if frames > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
-                warnings.append(f"The file holds {frames} pictures; the first is used.")
-            tags = image_tags(image)
-            if _is_deep(image, path):
-                linear, scene_linear = _deep(image, path, warnings)
-            else:
-                linear, scene_linear = _shallow(image, warnings), False
+    with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
+        image.load()  # finds truncation, also for files whose pixels OpenCV reads below
+        warnings = []
+        frames = getattr(image, "n_frames", 1)
+        if frames > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
+            warnings.append(f"The file holds {frames} pictures; the first is used.")
+        tags = image_tags(image)
+        if _is_deep(image, path):
+            linear, scene_linear = _deep(image, path, warnings)
+        else:
+            linear, scene_linear = _shallow(image, warnings), False
     return Decoded(_upright(linear, int(tags.get("Orientation", 1) or 1)), scene_linear, tags, warnings)
 
 
 def _is_deep(image: Image.Image, path: Path) -> bool:
     """Whether the file has more than 8 bits a channel (Pillow cuts those to 8 when they are RGB)."""
+    with path.open("rb") as file:
+        head = file.read(4096)
     if image.format == "PNG":
-        with path.open("rb") as file:
-            return file.read(25)[24] == 16
+        return head[24] == 16
     if image.format == "TIFF":
         return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
-    if image.format == "PPM" and image.mode == "I":
+    if image.format == "PPM" and head[:2] in (b"P2", b"P3", b"P5", b"P6"):
+        _, _, _, top, *_ = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
+        if int(top) <= 255:
+            return False
         raise InputError(f"{path} has more than 8 bits a channel, which is read from PNG and TIFF alone.")
     return image.mode in ("I", "F") or image.mode.startswith("I;16")
 
@@ -185,7 +181,7 @@ def _require_interleaved(planar: int, path: Path) -> None:
 def is_float_tiff(path: Path) -> bool:
     """Whether a TIFF holds colour in a layout that Pillow does not know: float channels."""
     try:
-        with _pixel_limit_lifted(), Image.open(path):
+        with pixel_limit_lifted(), Image.open(path):
             return False
     except UnidentifiedImageError:
         return True
@@ -199,7 +195,6 @@ def read_float_tiff(path: Path) -> Decoded:
         page: Any = file.pages[0]
         _require_interleaved(page.tags.valueof(_PLANAR, 1), path)
         extra = np.atleast_1d(page.tags.valueof(_EXTRA, 2))
-        check_size(page.imagewidth, page.imagelength, path)
     colour, alpha = _opencv(path)
     light = np.ascontiguousarray(colour, np.float32)
     if alpha is None:
@@ -241,7 +236,7 @@ def _upright(pixels: Array, orientation: int) -> Array:
 
 
 @contextmanager
-def _pixel_limit_lifted() -> Iterator[None]:
+def pixel_limit_lifted() -> Iterator[None]:
     """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
     before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
     try:

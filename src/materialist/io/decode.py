@@ -4,11 +4,22 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from PIL import Image, UnidentifiedImageError
 
 from materialist.errors import InputError, MaterialistError, SetupError
-from materialist.io.bitmap import Decoded, check_size, is_float_tiff, light_and_alpha, read_bitmap, read_float_tiff
+from materialist.io.bitmap import (
+    FORMATS,
+    Decoded,
+    check_size,
+    is_float_tiff,
+    light_and_alpha,
+    pixel_limit_lifted,
+    read_bitmap,
+    read_float_tiff,
+)  # fmt: skip
 from materialist.io.exif import file_tags
 from materialist.io.exr import read_exr
 
@@ -22,6 +33,42 @@ RAW_SUFFIXES = frozenset(
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 
 
+_EXR, _RADIANCE = b"\x76\x2f\x31\x01", (b"#?RADIANCE", b"#?RGBE")
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+"""How files of these formats begin."""
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """(width, height) from the header of an image, turned or not; of any but camera RAW.
+
+    Raises InputError where there is no size, and whatever the readers raise for a damaged file.
+    """
+    with path.open("rb") as file:
+        head = file.read(65536)
+    if head.startswith(_EXR):
+        low, high = (np.asarray(corner) for corner in _exr_header(path)["dataWindow"])
+        return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+    if head.startswith(_RADIANCE):
+        size = re.search(rb"\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n", head)
+        if size is None:
+            raise InputError(f"{path} has no size in its Radiance header; export it again.")
+        return int(size[2]), int(size[1])
+    if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
+        from tifffile import TiffFile
+
+        with TiffFile(path) as tiff:
+            page: Any = tiff.pages[0]
+            return int(page.imagewidth), int(page.imagelength)
+    from pillow_heif import register_heif_opener
+
+    register_heif_opener()
+    try:
+        with pixel_limit_lifted(), Image.open(path) as image:
+            return image.size
+    except UnidentifiedImageError as error:
+        raise InputError(f"{path} is not an image this program can read; give it a {FORMATS} file.") from error
+
+
 def decode(path: Path) -> Decoded:
     """Read any supported image file. Raises InputError, or SetupError when camera RAW support is not installed."""
     try:
@@ -32,11 +79,12 @@ def decode(path: Path) -> Decoded:
     try:
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
-        if head.startswith(b"\x76\x2f\x31\x01"):
+        check_size(*image_size(path), path)
+        if head.startswith(_EXR):
             return _exr(path)
-        if head.startswith((b"#?RADIANCE", b"#?RGBE")):
+        if head.startswith(_RADIANCE):
             return _hdr(path)
-        if head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")) and is_float_tiff(path):
+        if head.startswith(_TIFF) and is_float_tiff(path):
             return read_float_tiff(path)
         return read_bitmap(path)
     except MaterialistError:
@@ -47,15 +95,18 @@ def decode(path: Path) -> Decoded:
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
 
 
-def _exr(path: Path) -> Decoded:
-    """OpenEXR; alpha is premultiplied there."""
+def _exr_header(path: Path) -> dict[str, Any]:
     import OpenEXR
 
-    warnings: list[str] = []
     with OpenEXR.File(str(path), header_only=True) as file:
-        header = dict(file.header())
+        return dict(file.header())
+
+
+def _exr(path: Path) -> Decoded:
+    """OpenEXR; alpha is premultiplied there."""
+    warnings: list[str] = []
+    header = _exr_header(path)
     low, high = (np.asarray(corner) for corner in header["dataWindow"])
-    check_size(int(high[0] - low[0] + 1), int(high[1] - low[1] + 1), path)
     first, last = (np.asarray(corner) for corner in header.get("displayWindow", (low, high)))
     if (low != first).any() or (high != last).any():
         warnings.append("The file holds a part of its frame, taken for the whole photo; give --fov for that part.")
@@ -73,12 +124,7 @@ def _hdr(path: Path) -> Decoded:
     """Radiance RGBE."""
     import cv2
 
-    source = path.read_bytes()
-    size = re.search(rb"\n[-+]Y (\d+) [-+]X (\d+)\n", source[:65536])
-    if size is None:
-        raise InputError(f"{path} has no size in its Radiance header; export it again.")
-    check_size(int(size[2]), int(size[1]), path)
-    pixels = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_UNCHANGED)
+    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.dtype != np.float32:
         raise InputError(f"{path} is damaged or truncated; export it again.")
     return Decoded(np.ascontiguousarray(pixels[..., ::-1]), True)

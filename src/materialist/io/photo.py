@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError
+from materialist.errors import InputError, SetupError
 from materialist.io.bitmap import MIN_SIDE, Decoded
 from materialist.io.decode import decode
-from materialist.io.examples import PREFIX, example_path
 from materialist.io.exif import horizontal_fov
 from materialist.options import InvertOptions
 from materialist.types import Array, Camera, Photo
@@ -27,6 +27,15 @@ CLIPPED = 1e-3
 """Share of pixels at 1, the brightest value, from which a scene-linear file is a clipped picture."""
 MIDDLE = 0.05
 """The median, where that would leave it darker: a bright window must not make the room black."""
+
+EXAMPLES = {
+    "coffee": ("coffee.png", "Pikolo Espresso Bar, photo by Rachel Michetti, CC0"),
+    "cat": ("chelsea.png", "Chelsea the cat, photo by Stefan van der Walt, CC0"),
+    "astronaut": ("astronaut.png", "Eileen Collins, NASA, public domain"),
+    "rocket": ("rocket.jpg", "Launch of DSCOVR, SpaceX, public domain"),
+}
+"""Name -> (file in skimage/data, credit) of photographs with a stated free licence, which scikit-image carries."""
+PREFIX = "example:"
 
 
 def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None) -> Photo:
@@ -149,3 +158,15 @@ def _require_content(linear: Array, name: str) -> None:
         raise InputError(f"{name} is entirely black; there is no light in it to explain.")
     if np.ptp(linear.reshape(-1, 3), axis=0).max() <= 1e-3 * high or high - low <= 1e-4:
         raise InputError(f"{name} is one flat colour; there is nothing in it to explain.")
+
+
+def example_path(name: str) -> Path:
+    """Where `example:NAME` lies on disk. Raises InputError for an unknown name, SetupError without scikit-image."""
+    key = name.removeprefix(PREFIX)
+    if key not in EXAMPLES:
+        raise InputError(f"There is no example photo {key!r}; choose one of {', '.join(EXAMPLES)}.")
+    spec = find_spec("skimage")  # the package is located, not imported: importing it takes a while
+    path = Path(spec.origin).parent / "data" / EXAMPLES[key][0] if spec and spec.origin else None
+    if path is None or not path.is_file():
+        raise SetupError("The example photos come with scikit-image: pip install --force-reinstall scikit-image")
+    return path

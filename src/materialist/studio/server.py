@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from materialist.errors import InputError, SetupError
-from materialist.io.examples import PREFIX, example_path
+from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.studio import LOCAL_PERSON, Studio

@@ -11,7 +11,7 @@ from typing import Any
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.io.examples import EXAMPLES, example_path
+from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import archives, tasks, uploads
 from materialist.studio.progress import box, follow

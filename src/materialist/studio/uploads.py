@@ -9,7 +9,7 @@ from pathlib import Path
 
 from materialist.errors import InputError, MaterialistError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES
+from materialist.io.decode import RAW_SUFFIXES, image_size
 from materialist.studio import SETTINGS
 
 PHOTOS = frozenset(
@@ -27,7 +27,7 @@ def checked_picture(path: Path, name: str) -> str:
     if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
     check_bytes(path, shown)
-    size = None if suffix in RAW_SUFFIXES else header_size(path, shown)
+    size = None if suffix in RAW_SUFFIXES else _size(path, shown)
     if size is not None:
         width, height = size
         if width * height > SETTINGS.upload_pixels:
@@ -39,37 +39,13 @@ def checked_picture(path: Path, name: str) -> str:
     return suffix
 
 
-def header_size(path: Path, shown: str) -> tuple[int, int]:
+def _size(path: Path, shown: str) -> tuple[int, int]:
     """(width, height) from the header, without decoding. Raises InputError where there is none."""
-    head = path.open("rb").read(4096)
-    if head.startswith((b"#?RADIANCE", b"#?RGBE")):
-        match = re.search(rb"[-+]Y (\d{1,9}) [-+]X (\d{1,9})", head)
-        if match is None:
-            raise InputError(f"{shown} is damaged: its header has no size; export it again.")
-        return int(match[2]), int(match[1])
     try:
-        if head.startswith(b"\x76\x2f\x31\x01"):
-            import OpenEXR
-
-            with OpenEXR.File(str(path), header_only=True) as file:
-                low, high = file.header()["dataWindow"]
-            return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
-        if head.startswith((b"II*\0", b"MM\0*")):  # Pillow does not know some layouts, such as float RGB
-            from tifffile import TiffFile
-
-            with TiffFile(path) as tiff:
-                height, width = tiff.pages[0].shape[:2]
-            return int(width), int(height)
-        from PIL import Image
-        from pillow_heif import register_heif_opener
-
-        register_heif_opener()
-        with Image.open(path) as image:
-            return image.size
+        return image_size(path)
+    except InputError as error:
+        raise InputError(without_paths(str(error), path, shown)) from error
     except Exception as error:  # decoders raise anything
-        if type(error).__name__ == "DecompressionBombError":
-            most = f"{SETTINGS.upload_pixels / 1e6:.0f} megapixels"
-            raise InputError(f"{shown} has far too many pixels; the studio takes up to {most}.") from error
         raise InputError(f"{shown} is not an image this program can read; export it again as PNG or JPEG.") from error
 
 
