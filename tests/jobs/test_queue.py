@@ -32,7 +32,7 @@ def test_order_limit_and_stop(jobs, tmp_path):
     until(lambda: first.stage == "light")
     assert (first.state, second.state) == (RUNNING, QUEUED)
     assert jobs.ahead(second) == 1 and jobs.ahead(third) == 2
-    assert jobs.of("me") == [second, first] and jobs.of("bert", "final") == []
+    assert jobs.unfinished("me", "invert") == [first, second] and jobs.unfinished("bert", "final") == []
     until(lambda: list(tmp_path.glob(f".partial-{first.worker.pid}*")))
     jobs.stop(second)
     jobs.stop(first)

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tempfile
 
 import psutil
 from made_tasks import answer, until
@@ -35,21 +34,18 @@ def told(worker, how, **more):
 
 
 def test_one_process_does_task_after_task_until_it_dies():
-    with tempfile.TemporaryFile() as errors:
-        worker = Worker(environment={"OMP_NUM_THREADS": "7"}, errors=errors)
-        done, kinds = told(worker, "found")
-        assert kinds == [PROGRESS, FOUND] and done.facts["threads"] == "7" and done.facts["pid"] == worker.pid
-        failed, _ = told(worker, "fail")
-        assert (
-            failed.kind == FAILED and failed.facts["reason"] == "It is too dark." and failed.facts["stage"] == "light"
-        )
-        assert failed.facts["error"] == "InputError" and not failed.facts["bug"] and failed.number == 2
-        bug = told(worker, "bug")[0].facts
-        assert bug["bug"] and "RuntimeError: three is not four" in bug["trace"]
-        lost, _ = told(worker, "die")
-        assert lost.kind == LOST and "ended by SIGKILL" in lost.facts["reason"]
-        assert "Its last words: LLVM ERROR: Cannot select" in lost.facts["reason"]
-        assert not worker.running
+    worker = Worker(environment={"OMP_NUM_THREADS": "7"}, keep_errors=True)
+    done, kinds = told(worker, "found")
+    assert kinds == [PROGRESS, FOUND] and done.facts["threads"] == "7" and done.facts["pid"] == worker.pid
+    failed, _ = told(worker, "fail")
+    assert failed.kind == FAILED and failed.facts["reason"] == "It is too dark." and failed.facts["stage"] == "light"
+    assert failed.facts["error"] == "InputError" and not failed.facts["bug"] and failed.number == 2
+    bug = told(worker, "bug")[0].facts
+    assert bug["bug"] and "RuntimeError: three is not four" in bug["trace"]
+    lost, _ = told(worker, "die")
+    assert lost.kind == LOST and "ended by SIGKILL" in lost.facts["reason"]
+    assert "Its last words: LLVM ERROR: Cannot select" in lost.facts["reason"]
+    assert not worker.running
 
 
 def test_of_waiting_tasks_the_newest_is_done_and_the_running_one_knows():

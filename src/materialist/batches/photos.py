@@ -96,14 +96,8 @@ def _of_list(file: Path) -> list[Listed]:
         lines = file.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
-    entries = [_entry(line.strip(), file.parent) for line in lines]
+    entries = [re.split(r"(?:^|\s)#", line.strip(), maxsplit=1)[0].rstrip() for line in lines]
     return [_named(entry, file.parent) for entry in entries if entry]
-
-
-def _entry(line: str, folder: Path) -> str:
-    """A line without its comment. A photo whose name goes on after " #" is one all the same."""
-    name = re.split(r"(?:^|\s)#", line, maxsplit=1)[0].rstrip()
-    return line if name and name != line and os.path.isfile(folder / line) else name
 
 
 def _named(entry: str, folder: Path) -> Listed:

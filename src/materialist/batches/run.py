@@ -20,9 +20,8 @@ from materialist.batches.plan import check_options, plan
 from materialist.batches.task import INVERSION, SINGLE_THREAD, PhotoTask, process
 from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
-from materialist.jobs.pool import LocalPool
+from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
-from materialist.jobs.ray_pool import RayPool
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 Watch = Callable[[Status], None]

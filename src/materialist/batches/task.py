@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import hashlib
-import io
 import resource
 import time
 from collections.abc import Callable
@@ -22,6 +21,7 @@ from materialist.batches.results import file_hash, package_hash, package_size
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable
+from materialist.io.display import encoded
 from materialist.types import Array, Scene
 
 INVERSION = "materialist.pipeline:invert"
@@ -166,6 +166,4 @@ def _write_strip(path: Path, pictures: list[Array]) -> None:
     for one in small:
         strip.paste(one, (left, 0))
         left += one.width + 4
-    encoded = io.BytesIO()
-    strip.save(encoded, "JPEG", quality=85)
-    results.replace_file(path, encoded.getvalue())
+    results.replace_file(path, encoded(np.asarray(strip), "JPEG", quality=85))

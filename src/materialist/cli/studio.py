@@ -25,12 +25,9 @@ def studio(
         str, typer.Option(help="Address to serve on; other than this machine needs --password or --open.")
     ] = ("127.0.0.1"),
     port: Annotated[int, typer.Option(help="Port.")] = 7860,
-    work: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR", help="Where scenes and edits are kept; materialist-studio in this folder unless given."
-        ),
-    ] = None,
+    work: Annotated[Path, typer.Option(metavar="DIR", help="Where scenes and edits are kept.")] = Path(
+        "materialist-studio"
+    ),
     password: Annotated[str | None, typer.Option(metavar="WORD", help="Ask everyone for it.")] = None,
     everyone: Annotated[bool, typer.Option("--open", help="Let everybody in who can reach --host.")] = False,
     workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
@@ -38,7 +35,6 @@ def studio(
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio.server import check_host, check_port, first_target, new_studio, serve
-    from materialist.studio.workspace import default_root
 
     single_user = check_host(host, password, everyone)
     check_port(host, port)
@@ -46,10 +42,7 @@ def studio(
         from materialist.render.variant import setup
 
         setup(computing.device)
-    made = new_studio(
-        work or default_root(), single_user=single_user, workers=workers, seed=computing.seed,
-        device=computing.device,
-    )  # fmt: skip
+    made = new_studio(work, single_user=single_user, workers=workers, seed=computing.seed, device=computing.device)
     made.start = first_target(made.work, target)
     if not computing.as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")

@@ -8,6 +8,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from multiprocessing import Pipe
@@ -34,19 +35,20 @@ class Worker:
 
     def __init__(
         self, *, environment: Mapping[str, str] | None = None, niceness: int = 0, idle: float = 0.0,
-        errors: IO[bytes] | None = None,
+        keep_errors: bool = False,
     ) -> None:  # fmt: skip
         """Start it. Raises OSError where no process can be started.
 
         environment: variables that differ from this process's. niceness: added to this process's. idle: seconds
-        without a task after which it ends by itself; 0: never. errors: file that takes its stderr; else this one's.
+        without a task after which it ends by itself; 0: never. keep_errors: keep its stderr for the report of its end.
         """
+        self._errors = tempfile.TemporaryFile() if keep_errors else None  # noqa: SIM115 - read at its end
         self.connection, theirs = Pipe()
         words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno()), str(niceness), str(idle)]
         try:
             # A new program, not a fork: a renderer that has started does not survive one.
             self._process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stderr=errors, env={**os.environ, **(environment or {})},
+                words, stdin=subprocess.DEVNULL, stderr=self._errors, env={**os.environ, **(environment or {})},
                 pass_fds=(theirs.fileno(),), start_new_session=True,
             )  # fmt: skip
         except OSError:
@@ -54,7 +56,7 @@ class Worker:
             raise
         finally:
             theirs.close()
-        self._errors, self._number = errors, 0
+        self._number = 0
 
     @property
     def pid(self) -> int:

@@ -16,8 +16,6 @@ from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 QUEUED, RUNNING, STOPPED = "queued", "running", "stopped"
 """States of a job, beside DONE and FAILED."""
-KEPT_SECONDS = 3600
-"""How long a finished job is remembered, so that a page that was reloaded can ask for its outcome."""
 NICENESS = 5
 """Of the processes: live previews go before."""
 
@@ -74,9 +72,7 @@ class JobQueue:
     def submit(self, job: Job) -> Job:
         """Put a job in the queue."""
         with self._lock:
-            now = time.monotonic()
-            self._jobs = [j for j in self._jobs if not j.over or now - (j.ended or now) < KEPT_SECONDS]
-            self._jobs.append(job)
+            self._jobs = [*(j for j in self._jobs if not j.over), job]
         self._threads.submit(self._run, job)
         return job
 
@@ -86,10 +82,10 @@ class JobQueue:
             waiting = [j for j in self._jobs if not j.over]
         return waiting.index(job) if job.state == QUEUED and job in waiting else 0
 
-    def of(self, owner: str, kind: str | None = None) -> list[Job]:
-        """The jobs of a person, the last first."""
+    def unfinished(self, owner: str, kind: str) -> list[Job]:
+        """The jobs of a person and a kind that wait or run."""
         with self._lock:
-            return [j for j in reversed(self._jobs) if j.owner == owner and kind in (None, j.kind)]
+            return [j for j in self._jobs if j.owner == owner and j.kind == kind and not j.over]
 
     def stop(self, job: Job) -> None:
         """End a job, in the queue or in the middle; nothing half-written stays."""

@@ -55,29 +55,21 @@ def set_option(session: Session, name: str, value: str | None) -> None:
 def let_fall(session: Session, height: float) -> list[str]:
     """The current object, else the last one, falls where it stands and lies where it comes to rest.
 
-    Each fall has another seed, so an object that is let fall again tumbles in another way. The fall takes seconds, in
-    which the page goes on. Returns sentences on what did not go as expected.
+    Each fall has another seed, so an object that is let fall again tumbles in another way. Returns sentences on what
+    did not go as expected.
 
     Raises:
-        InputError: there is none, it falls beside everything, or the list was changed meanwhile. SetupError: the
-            physics is not installed.
+        InputError: there is none, or it falls beside everything. SetupError: the physics is not installed.
     """
     with session.lock:
-        _ = session.scene
-        edits, live, index = session.edits, session.live, last(session)
-        if index is None or live is None:
+        index, _ = last(session), session.scene
+        if index is None or session.live is None:
             raise InputError("Place an object first; it falls where it stands.")
-        trial = edits.put(index, fallen(edits.steps[index], height, session.falls))
+        known = session.live.edited(session.edits.active).report.warnings
+        after = session.edits.put(index, fallen(session.edits.steps[index], height, session.falls))
         session.falls += 1
-    known = set(live.edited(edits.active).report.warnings)
-    notes = live.edited(trial.active).report.warnings  # kept there: the picture that follows finds it
-    with session.lock:
-        if session.edits.steps != edits.steps:
-            raise InputError("The list of edits was changed while the object fell; let it fall again.")
-        session.remember("fall")
-        session.edits = trial
-        session.save()
-    return [note for note in notes if note not in known]
+        session.change("fall", after)
+        return [note for note in session.live.edited(after.active).report.warnings if note not in known]
 
 
 def fallen(step: Step, height: float, seed: int) -> Step:

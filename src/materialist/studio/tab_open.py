@@ -191,7 +191,7 @@ def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[
     """Open a project, or follow its inversion if that still runs."""
     studio = context.studio
     project = studio.project(name, session.person)
-    running = [j for j in studio.jobs.of(session.person, "invert") if j.folder == project.folder and not j.over]
+    running = [j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder]
     if running:
         yield from _follow_inversion(context, session, project, running[0])
     if project.ready:
@@ -227,7 +227,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:
     """Titles and names of the projects that can be continued."""
     found = context.studio.projects(session.person)
-    running = {j.folder for j in context.studio.jobs.of(session.person, "invert") if not j.over}
+    running = {j.folder for j in context.studio.jobs.unfinished(session.person, "invert")}
     return [
         (f"{p.title} · {p.name}" + ("" if p.ready else " (in work)"), p.name)
         for p in found

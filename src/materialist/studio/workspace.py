@@ -97,13 +97,6 @@ class WorkFolder:
         return project
 
 
-def default_root() -> Path:
-    """`materialist-studio` in the current directory, or in the temporary folder where that cannot be written."""
-    here = Path.cwd()
-    base = here if os.access(here, os.W_OK) else Path(tempfile.gettempdir())
-    return base / "materialist-studio"
-
-
 def _read(folder: Path) -> Project | None:
     """The project in a folder, or None where its card is missing or damaged."""
     try:
