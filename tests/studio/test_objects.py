@@ -8,11 +8,11 @@ from studio_scenes import click, named
 from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio import objects
+from materialist.studio.controls import control_values
 from materialist.studio.glass import GlassState
 from materialist.studio.objects import library_file
 from materialist.studio.preview import LivePreview
 from materialist.studio.stage import stage
-from materialist.studio.widgets import control_values
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):

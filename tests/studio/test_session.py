@@ -8,11 +8,12 @@ from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
+from materialist.studio.controls import control_values
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.tab_light import place_lamp
-from materialist.studio.widgets import commands, control_values
+from materialist.studio.widgets import commands
 
 
 def test_an_edit_from_click_to_recipe(session):

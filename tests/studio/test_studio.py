@@ -9,7 +9,7 @@ from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import progress
+from materialist.studio import widgets
 from materialist.studio.server import check_host, check_port, first_target, new_studio
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
@@ -115,8 +115,8 @@ def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
 
 def test_the_end_of_a_job_is_said_and_cannot_carry_html(tmp_path):
     queue, job = JobQueue(1), Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
-    assert "Done in" in list(progress.follow(queue, job))[-1]
+    assert "Done in" in list(widgets.follow(queue, job))[-1]
     job.state, job.message = FAILED, "<script>alert(1)</script>"
-    assert "<script>" not in progress.shown(queue, job) and 'role="alert"' in progress.shown(queue, job)
-    assert progress.words("light 2") == "Finding the light" and progress.words("odd") == "Odd"
+    assert "<script>" not in widgets.shown(queue, job) and 'role="alert"' in widgets.shown(queue, job)
+    assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
     queue.close()

@@ -40,7 +40,6 @@ class Job:
     """One sentence where it failed."""
     found: list[dict[str, Any]] = field(default_factory=list)
     """Intermediate results."""
-    result: Any = None
     began: float = field(default_factory=time.monotonic)
     ended: float | None = None
     worker: Worker | None = field(default=None, repr=False)
@@ -125,7 +124,6 @@ class JobQueue:
             _sweep(job.folder, worker.pid)
         with self._lock:
             if message.kind == DONE:
-                job.result = message.facts
                 job.end(DONE)
             else:
                 job.end(FAILED, sentence(message.facts))

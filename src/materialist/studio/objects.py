@@ -83,6 +83,11 @@ def file_of(name: str) -> str:
     return f"thing-{name.lower()}.ply"
 
 
+def library_name(file: Any) -> str | None:
+    """The name of the computed mesh that lies in a file; None for another file."""
+    return next((name for name in LIBRARY if file_of(name) == file), None)
+
+
 def library_file(session: Session, name: str) -> str:
     """A computed mesh as a file in the workspace, +Y up."""
     file = session.workspace / file_of(name)

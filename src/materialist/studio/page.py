@@ -19,10 +19,9 @@ from materialist.studio import (
     tab_object,
     tab_open,
     tab_take,
-    tasks,
 )
 from materialist.studio.selection import read_pick, sam_missing
-from materialist.studio.session import FinalPicture, Session
+from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
 from materialist.studio.widgets import LIVE, LONG, PageContext, handler, steps
@@ -160,17 +159,9 @@ def _wire_final(context: PageContext) -> None:
         def run(request: gr.Request) -> Any:
             session = context.session(request)
             _ = session.scene
-            steps_now = session.edits.active
-            if not steps_now or session.project is None:
+            if not session.edits.active:
                 raise InputError("There is no edit to render yet: change something first.")
-            target = context.studio.final_file(session)
-            job = context.studio.submit(
-                session, tasks.final, target.parent, scene=str(session.project.scene), steps=steps_now,
-                output=str(target), spp=spp,
-            )  # fmt: skip
-            yield from context.following(job, "progress", "stop")
-            if job.state == "done":
-                session.final = FinalPicture(steps_now, target, spp)
+            if (yield from context.traced(session, spp, "progress", "stop")) is not None:
                 yield {context["stage"]: stage(session), context["steps"]: steps(session)}
 
         return run

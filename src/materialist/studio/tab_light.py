@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import gradio as gr
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.options import Relight
 from materialist.studio import SETTINGS, lights, uploads
+from materialist.studio.controls import SUN, number_text, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LIVE, SUN, PageContext, default, handler, number_text, slider
+from materialist.studio.widgets import LIVE, PageContext, handler
 from materialist.studio.workspace import store
 from materialist.types import Array
 
@@ -31,15 +31,15 @@ def layout(context: PageContext) -> None:
             label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150, elem_id="own_map",
             file_types=[".exr", ".hdr", ".png", ".jpg"],
         )  # fmt: skip
-        parts["rotate"] = slider(Relight, "rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
-        parts["ambient"] = slider(Relight, "ambient", "Dim or brighten", 0.02, maximum=2)
+        parts["rotate"] = slider("rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
+        parts["ambient"] = slider("ambient", "Dim or brighten", 0.02, maximum=2)
         with gr.Accordion("Sun", open=False):
             parts["sun_on"] = gr.Checkbox(False, label="A sun in the sky")
             parts["azimuth"] = gr.Slider(
                 -180, 180, SUN[0], step=1, label="Right of straight ahead, degrees", buttons=[]
             )
             parts["elevation"] = gr.Slider(0, 90, SUN[1], step=1, label="Above the horizon, degrees", buttons=[])
-            parts["sun_power"] = slider(Relight, "sun_power", "Strength", 0.05, maximum=5)
+            parts["sun_power"] = slider("sun_power", "Strength", 0.05, maximum=5)
         with gr.Accordion("Lamps", open=False):
             gr.Markdown("Choose the tool **Place a lamp** and click in the photo. Lamps show in path-traced pictures.")
             parts["kelvin"] = gr.Slider(1700, 12000, 2700, step=100, label="Colour, kelvin: warm to cold", buttons=[])
@@ -69,8 +69,7 @@ def wire(context: PageContext) -> None:
 
     parts["lights"].select(choose, None, context.picture_parts, **LIVE)
     context.on_upload("own_map", _uploaded)
-    for name in ("rotate", "ambient"):
-        context.on(parts[name].input, partial(_moved, name), parts[name])
+    context.bind("rotate", "ambient")
     sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]
     for part in sunny:
         context.on(part.input, _sun, sunny)
@@ -78,10 +77,6 @@ def wire(context: PageContext) -> None:
     for part in lamp:
         part.input(lamp_settings, lamp, None, **LIVE)
     context.on(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
-
-
-def _moved(name: str, session: Session, value: float) -> None:
-    session.light(**{name: None if value == default(Relight, name) else number_text(value)})
 
 
 def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: float) -> None:

@@ -9,10 +9,9 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.studio import tasks
-from materialist.studio.progress import follow
 from materialist.studio.session import Session
 from materialist.studio.stage import maps, picture, report
-from materialist.studio.widgets import LONG, PageContext, handler
+from materialist.studio.widgets import LONG, PageContext, follow, handler
 from materialist.types import Array
 
 MESH = "mesh.glb"

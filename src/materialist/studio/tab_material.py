@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import gradio as gr
 
-from materialist.options import MaterialEdit
 from materialist.studio import uploads
+from materialist.studio.controls import hex_colour, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import PageContext, hex_colour, number_text, slider
+from materialist.studio.widgets import PageContext
 from materialist.studio.workspace import store
-
-SLIDERS = ("hue", "saturation", "value", "roughness", "metallic", "texture_scale")
 
 
 def layout(context: PageContext) -> None:
     """The components."""
     parts = context.parts
     with gr.Tab("Material", id="material"):
-        parts["hue"] = slider(MaterialEdit, "hue", "Hue, degrees", 1, minimum=-180, maximum=180)
-        parts["saturation"] = slider(MaterialEdit, "saturation", "Saturation", 0.02)
-        parts["value"] = slider(MaterialEdit, "value", "Brightness", 0.02)
-        parts["roughness"] = slider(MaterialEdit, "roughness", "Roughness: mirror to chalk", 0.01, value=0.5)
-        parts["metallic"] = slider(MaterialEdit, "metallic", "Metallic", 0.01, value=0)
+        parts["hue"] = slider("hue", "Hue, degrees", 1, minimum=-180, maximum=180)
+        parts["saturation"] = slider("saturation", "Saturation", 0.02)
+        parts["value"] = slider("value", "Brightness", 0.02)
+        parts["roughness"] = slider("roughness", "Roughness: mirror to chalk", 0.01, value=0.5)
+        parts["metallic"] = slider("metallic", "Metallic", 0.01, value=0)
         with gr.Row():
             parts["colour"] = gr.ColorPicker("#808080", label="One colour instead", min_width=120)
             parts["own"] = gr.Button("Own colours again", size="sm", min_width=120)
@@ -32,27 +29,20 @@ def layout(context: PageContext) -> None:
             parts["texture"] = gr.File(
                 label="A picture to lay on the surface", type="filepath", height=150, file_types=sorted(uploads.PHOTOS)
             )
-            parts["texture_scale"] = slider(
-                MaterialEdit, "texture_scale", "Size of the texture", 0.05, minimum=0.1, maximum=4
-            )
+            parts["texture_scale"] = slider("texture_scale", "Size of the texture", 0.05, minimum=0.1, maximum=4)
         parts["as_fitted"] = gr.Button("Roughness and metallic as they were found", size="sm")
 
 
 def wire(context: PageContext) -> None:
     """The events."""
     parts = context.parts
-    for name in SLIDERS:
-        context.on(parts[name].input, partial(_moved, name), parts[name])
+    context.bind("hue", "saturation", "value", "roughness", "metallic", "texture_scale")
     context.on(parts["colour"].input, _coloured, parts["colour"])
     colours = dict.fromkeys(("albedo", "texture", "hue", "saturation", "value"))
     context.on(parts["own"].click, lambda session: session.set("edit", **colours), everything=True)
     found = dict.fromkeys(("roughness", "metallic"))
     context.on(parts["as_fitted"].click, lambda session: session.set("edit", **found), everything=True)
     context.on_upload("texture", _textured, everything=True)
-
-
-def _moved(name: str, session: Session, value: float) -> None:
-    session.set("edit", **{name: number_text(value)})
 
 
 def _coloured(session: Session, value: str) -> None:

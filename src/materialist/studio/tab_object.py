@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import gradio as gr
 
-from materialist.options import Drop, Glass, Insertion
 from materialist.studio import objects, uploads
-from materialist.studio.progress import box
+from materialist.studio.controls import hex_colour, option_text, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LONG, PageContext, handler, hex_colour, number_text, slider, tint_text
+from materialist.studio.widgets import LONG, PageContext, box, handler
 from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
-_GLASS: dict[str, Callable[[Any], str | None]] = {
-    "ior": number_text, "transmission": number_text, "roughness": lambda v: number_text(v) if v else None,
-    "tint": tint_text, "hollow": lambda kind: kind or None,
-}  # fmt: skip
-"""Option of glass -> the value of its control as the list of edits has it."""
+_GLASS = ("ior", "transmission", "roughness", "tint", "hollow")
+"""Options of glass that have a control."""
 
 
 def layout(context: PageContext) -> None:
@@ -34,8 +29,8 @@ def layout(context: PageContext) -> None:
             elem_id="own_mesh", label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
             file_types=[".glb", ".ply", ".obj", ".stl"],
         )  # fmt: skip
-        parts["scale"] = slider(Insertion, "scale", "Size", 0.05, minimum=0.1, maximum=5)
-        parts["turn"] = slider(Insertion, "turn", "Turn, degrees", 1, minimum=-180, maximum=180)
+        parts["scale"] = slider("scale", "Size", 0.05, minimum=0.1, maximum=5)
+        parts["turn"] = slider("turn", "Turn, degrees", 1, minimum=-180, maximum=180)
         with gr.Row():
             parts["made_of"] = gr.Dropdown(list(objects.MATERIALS), value="as-is", label="Material", min_width=120)
             parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
@@ -47,17 +42,16 @@ def layout(context: PageContext) -> None:
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
         with gr.Accordion("Let it fall", open=False):
             gr.Markdown("The object falls where it stands. Needs the physics extra.")
-            parts["height"] = slider(Drop, "height", "How high above, in its own sizes", 0.1, maximum=5)
+            parts["height"] = slider("height", "How high above, in its own sizes", 0.1, maximum=5)
             parts["rest"] = gr.Button("Let it fall, and lie there", elem_id="rest", size="sm")
             gr.Markdown("Once more, and it tumbles in another way.")
             parts["fall_progress"] = gr.HTML("", js_on_load=None)
 
 
 def _layout_glass(parts: dict[str, Any]) -> None:
-    ior = slider(Glass, "ior", "Index of refraction", 0.01, maximum=2.5, elem_id="glass_ior")
-    through = slider(Glass, "transmission", "How much light goes through", 0.01, elem_id="glass_transmission")
-    rough = slider(Glass, "roughness", "Roughness: clear to frosted", 0.01, elem_id="glass_roughness")
-    parts |= {"glass_ior": ior, "glass_transmission": through, "glass_roughness": rough}
+    parts["glass_ior"] = slider("glass_ior", "Index of refraction", 0.01, maximum=2.5)
+    parts["glass_transmission"] = slider("glass_transmission", "How much light goes through", 0.01)
+    parts["glass_roughness"] = slider("glass_roughness", "Roughness: clear to frosted", 0.01)
     parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
     parts["glass_hollow"] = gr.Radio(_INSIDE, value="", label="Inside", elem_id="glass_hollow")
     parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
@@ -79,8 +73,7 @@ def wire(context: PageContext) -> None:
 
     context.on(parts["thing"].input, choose, parts["thing"], more=(parts["tool"], parts["own_mesh"]))
     context.on_upload("own_mesh", uploaded, more=(parts["tool"], parts["thing"]))
-    for name in ("scale", "turn"):
-        context.on(parts[name].input, partial(_moved, name), parts[name])
+    context.bind("scale", "turn", *(f"glass_{name}" for name in _GLASS))
     for part in (parts["made_of"], parts["thing_colour"]):
         context.on(part.input, _made_of, [parts["made_of"], parts["thing_colour"]])
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
@@ -88,8 +81,6 @@ def wire(context: PageContext) -> None:
     # Sliders of glass change the current glass; without one they are for the next.
     values = [parts[f"glass_{name}"] for name in _GLASS]
     context.on(parts["glass"].click, _make_glass, values, everything=True)
-    for name, part in zip(_GLASS, values):
-        context.on(part.input, partial(_change_glass, name), part)
     _wire_following(context)
     _wire_fall(context)
 
@@ -108,10 +99,6 @@ def _take_mesh(session: Session, file: Path) -> None:
     objects.set_option(session, "mesh", kept.name)
 
 
-def _moved(name: str, session: Session, value: float) -> None:
-    objects.set_option(session, name, number_text(value))
-
-
 def _made_of(session: Session, kind: str, colour: str) -> None:
     objects.set_option(session, "material", hex_colour(colour) if kind == "colour" else kind)
 
@@ -121,15 +108,7 @@ def _remove(session: Session, shadow: bool) -> None:
 
 
 def _make_glass(session: Session, *values: Any) -> None:
-    session.set("glass", **{name: text(v) for (name, text), v in zip(_GLASS.items(), values)})
-
-
-def _change_glass(name: str, session: Session, value: Any) -> dict[Any, Any] | bool:
-    """Change the current glass; without one the control is for the next, and nothing is shown anew."""
-    if session.current_kind != "glass":
-        return False
-    session.set("glass", **{name: _GLASS[name](value)})
-    return {}
+    session.set("glass", **{name: option_text(f"glass_{name}", value) for name, value in zip(_GLASS, values)})
 
 
 def _wire_following(context: PageContext) -> None:

@@ -14,10 +14,9 @@ from materialist.errors import InputError
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import archives, tasks, uploads
-from materialist.studio.progress import box, follow
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
-from materialist.studio.widgets import LONG, PREDICTORS, PageContext, handler
+from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box, follow, handler
 from materialist.studio.workspace import Project
 
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +10,12 @@ import gradio as gr
 
 from materialist.errors import InputError
 from materialist.jobs.queue import Job
+from materialist.jobs.worker import DONE
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
-from materialist.studio.progress import box
-from materialist.studio.session import EDITS, FinalPicture, Session
+from materialist.studio.session import EDITS, Session
 from materialist.studio.stage import stage
-from materialist.studio.widgets import LONG, PageContext, handler
+from materialist.studio.widgets import LONG, PageContext, box, handler
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -68,18 +67,16 @@ def wire(context: PageContext) -> None:
         file = session.workspace / f"take-{what}{KINDS[what][1]}"
         if what == "edits":
             _pack_edits(session, file)
+        elif what in ("png", "exr"):
+            final = yield from context.traced(session, SETTINGS.final_spp, "make_progress", "make_stop")
+            if final is None:
+                return
+            shutil.copyfile(final.path.with_suffix(file.suffix), file)
         else:
-            steps, final = session.edits.active, session.final
             job = _asked(context, session, what, file)
-            if job is not None:
-                yield from context.following(job, "make_progress", "make_stop")
-                if job.state != "done":
-                    return
-            if what in ("png", "exr"):
-                if job is not None:
-                    final = session.final = FinalPicture(steps, context.studio.final_file(session), SETTINGS.final_spp)
-                assert final is not None
-                shutil.copyfile(final.path.with_suffix(file.suffix), file)
+            yield from context.following(job, "make_progress", "make_stop")
+            if job.state != DONE:
+                return
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
             parts["download"]: gr.update(value=context.studio.public_copy(file), label=label, visible=True),
@@ -92,19 +89,14 @@ def wire(context: PageContext) -> None:
     context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})
 
 
-def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job | None:
-    """The job that makes the file; None where the final picture is there already."""
+def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job:
+    """The job that makes a file."""
     assert session.project is not None
-    submit = partial(context.studio.submit, session)
-    given = {"scene": str(session.project.scene), "steps": session.edits.active}
-    if what in ("png", "exr"):
-        final = session.final
-        if final is not None and final.of(session.edits.active) and final.spp >= SETTINGS.final_spp:
-            return None
-        target = context.studio.final_file(session)
-        return submit(tasks.final, target.parent, output=str(target), spp=SETTINGS.final_spp, **given)
-    more: dict[str, Any] = {"frames": SETTINGS.video_frames, "spp": SETTINGS.video_spp} if what == "turn" else {}
-    return submit(tasks.take, session.workspace, output=str(file), what=what, **given, **more)
+    more = {"frames": SETTINGS.video_frames, "spp": SETTINGS.video_spp} if what == "turn" else {}
+    return context.studio.submit(
+        session, tasks.take, session.workspace, scene=str(session.project.scene), steps=session.edits.active,
+        output=str(file), what=what, **more,
+    )  # fmt: skip
 
 
 def _pack_edits(session: Session, file: Path) -> None:

@@ -18,23 +18,23 @@ from materialist.studio import SETTINGS
 from materialist.types import Array, Materials, Prediction, Scene
 
 Steps = tuple[Step, ...]
-Task = Callable[..., dict[str, Any]]
-"""task(report, **arguments) -> what the studio is told."""
+Task = Callable[..., None]
+"""task(report, **arguments)."""
 
 
-def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> dict[str, Any]:
+def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> None:
     """Do a task on a device of `invert`, which is set for the whole process."""
     if device != "auto":
         from materialist.render.variant import setup
 
         setup(device)
-    return task(report, **arguments)
+    task(report, **arguments)
 
 
 def invert(
     report: Reporter, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
     fov: float | str = "auto", seed: int = 0,
-) -> dict[str, Any]:  # fmt: skip
+) -> None:  # fmt: skip
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
     from dataclasses import replace
 
@@ -48,7 +48,6 @@ def invert(
     done = pipeline.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
     report("save", 0, 1)
     save_scene(done, scene, force=True)
-    return {"scene": scene, "psnr": done.report.metrics.get("rerender_psnr_path")}
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
@@ -69,11 +68,10 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
         report.found(name=title, file=file.name)
 
 
-def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> dict[str, Any]:
+def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.core.notes import warnings_since
 
     loaded, edited = _edited(report, scene, steps)
     picture = composite(loaded, edited, spp=spp, seed=seed, progress=report)
@@ -81,11 +79,9 @@ def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 25
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
     write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
-    notes = warnings_since(loaded, edited)
-    return {"picture": str(out.with_suffix(".png")), "spp": spp, "warnings": notes}
 
 
-def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> dict[str, Any]:
+def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> None:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
     from materialist.exporters.glb import glb_bytes
     from materialist.exporters.parts import scene_parts
@@ -95,17 +91,13 @@ def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> 
     loaded = load_scene(scene)
     with whole_file(output, force=True) as file:
         file.write_bytes(glb_bytes(loaded, scene_parts(loaded, triangles)[:1]))
-    return {"file": output}
 
 
-def take(
-    report: Reporter, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36
-) -> dict[str, Any]:
+def take(report: Reporter, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36) -> None:
     """One thing to take away, as a single file at `output` (its suffix included)."""
     maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
     loaded, edited = _edited(report, scene, steps)
     maker.get(what, _exported)(report, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
-    return {"file": output}
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:

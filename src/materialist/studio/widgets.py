@@ -4,29 +4,28 @@ from __future__ import annotations
 
 import functools
 import inspect
-import re
+import time
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from pathlib import Path
 from shlex import quote
 from typing import Any
 
 import gradio as gr
-import numpy as np
 
 from materialist.errors import MaterialistError
-from materialist.jobs.queue import Job
-from materialist.option_kinds import ON, OperationOptions, declarations, parse_colour
-from materialist.options import Glass, Insertion, MaterialEdit, Relight
-from materialist.studio import SETTINGS, objects
+from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.jobs.worker import DONE, FAILED
+from materialist.studio import SETTINGS, tasks
+from materialist.studio.controls import CONTROLS, control_values, set_option
 from materialist.studio.edit_list import summary
-from materialist.studio.progress import follow
-from materialist.studio.session import EDITS, Session
+from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
+from materialist.studio.uploads import without_paths
 
 LIVE: dict[str, Any] = {
     "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
@@ -34,20 +33,12 @@ LIVE: dict[str, Any] = {
 """Events that skip the queue; while one request is under way only the newest value waits."""
 LONG: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
 """Events that take long, and send updates meanwhile."""
-NUMBERS: dict[str, tuple[type[OperationOptions], str]] = {
-    **{name: (MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic", "texture_scale")},
-    **{name: (Relight, name) for name in ("rotate", "ambient", "sun_power")},
-    **{f"glass_{name}": (Glass, name) for name in ("ior", "transmission", "roughness")},
-    **{name: (Insertion, name) for name in ("scale", "turn")},
-}
-"""Slider -> the operation and the option that it sets."""
-CONTROLS = (
-    *NUMBERS, "colour", "sun_on", "azimuth", "elevation", "glass_tint", "glass_hollow", "thing", "made_of",
-    "thing_colour", "height",
-)  # fmt: skip
-"""Components that show the current step."""
-SUN = (45.0, 40.0)
-"""Where a new sun stands: degrees right of ahead, and above the horizon."""
+_WORDS = {
+    "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
+    "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
+    "materials": "Finding the materials", "rerender": "Rendering the result", "save": "Saving", "load": "Loading",
+    "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
+}  # fmt: skip
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 
 
@@ -151,6 +142,11 @@ class PageContext:
         outputs = [*(self.all_parts if everything else self.picture_parts), *more]
         return event(run, inputs, outputs, **{**LIVE, **how})
 
+    def bind(self, *names: str) -> None:
+        """Let controls set the options that they stand for."""
+        for name in names:
+            self.on(self[name].input, partial(set_option, name), self[name])
+
     def on_upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
         """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""
         sent = self.on(self[name].upload, lambda session, file: change(session, Path(file)), self[name], **how)
@@ -160,6 +156,24 @@ class PageContext:
         """Updates of the component `words` and of the button `stop` until a job is over."""
         for html in follow(self.studio.jobs, job):
             yield {self[words]: html, self[stop]: gr.update(visible=not job.over)}
+
+    def traced(self, session: Session, spp: int, words: str, stop: str) -> Generator[Any, Any, FinalPicture | None]:
+        """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
+
+        Returns the picture, which the session keeps; None where the job failed or was stopped.
+        """
+        steps, known, project = session.edits.active, session.final, session.project
+        if known is not None and known.of(steps) and known.spp >= spp:
+            return known
+        assert project is not None
+        target = self.studio.final_file(session)
+        given = {"scene": str(project.scene), "steps": steps, "output": str(target), "spp": spp}
+        job = self.studio.submit(session, tasks.final, target.parent, **given)
+        yield from self.following(job, words, stop)
+        if job.state != DONE:
+            return None
+        session.final = FinalPicture(steps, target, spp)
+        return session.final
 
     def stops(self, button: str, *kinds: str) -> None:
         """Let a button stop the jobs of some kinds that its page asked for."""
@@ -171,16 +185,54 @@ class PageContext:
         self[button].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 
-def slider(kind: type[OperationOptions], name: str, label: str, step: float, **narrower: Any) -> Any:
-    """A slider for an option, by its range and default; `narrower` are arguments of Gradio's slider instead."""
-    declared, default = declarations(kind)[name]
-    given = {"minimum": declared.low, "maximum": declared.high, "value": default, "elem_id": name, **narrower}
-    return gr.Slider(step=step, label=label, buttons=[], **given)
+def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
+    """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
+    last = ""
+    while not job.over:
+        text = shown(jobs, job)
+        if text != last:
+            last = text
+            yield text
+        time.sleep(SETTINGS.poll_seconds)
+    yield shown(jobs, job)
 
 
-def default(kind: type[OperationOptions], name: str) -> Any:
-    """The default of an option."""
-    return declarations(kind)[name][1]
+def shown(jobs: JobQueue, job: Job) -> str:
+    """One state as HTML."""
+    if job.state == QUEUED:
+        return box(f"Waiting: {jobs.ahead(job)} before yours.", 0.0)
+    if job.state == STOPPED:
+        return box("Stopped; nothing was changed.")
+    if job.state == FAILED:
+        return box(failure(job), bad=True)
+    if job.over:
+        return box(f"Done in {job.seconds:.0f} s.")
+    return box(f"{words(job.stage)} … {job.seconds:.0f} s", min(1.0, job.done / job.total) if job.total else 0.0)
+
+
+def failure(job: Job) -> str:
+    """The reason of a failure; it names files without their folders, and the photo by its title."""
+    text = job.message
+    for step in job.arguments.get("steps", ()):
+        text = text.replace(f"{step.folder}/", "")
+    for key in ("photo", "scene", "output"):
+        if key in job.arguments:
+            file = Path(job.arguments[key])
+            title = job.arguments.get("title", file.name) if key == "photo" else file.name
+            text = without_paths(text, file, str(title))
+    return text
+
+
+def words(stage: str) -> str:
+    """A stage in words; names such as `light 2` or `materials: albedo` go by their first word."""
+    return _WORDS.get(stage) or _WORDS.get(stage.replace(":", " ").partition(" ")[0], stage.capitalize())
+
+
+def box(text: str, part: float | None = None, bad: bool = False) -> str:
+    """A line of text, with a bar where there is something to measure."""
+    bar = "" if part is None else f'<div class="bar"><i style="width:{100 * part:.0f}%"></i></div>'
+    kind, role = ("progress bad", "alert") if bad else ("progress", "status")
+    return f'<div class="{kind}" role="{role}">{escape(text)}{bar}</div>'
 
 
 def steps(session: Session) -> list[dict[str, Any]]:
@@ -189,81 +241,6 @@ def steps(session: Session) -> list[dict[str, Any]]:
         {"text": summary(step), "on": not step.skipped, "current": k == session.edits.current}
         for k, step in enumerate(session.edits.steps)
     ]
-
-
-def control_values(session: Session) -> dict[str, Any]:
-    """Values of the controls as the current step, or the light, has them.
-
-    Without a current edit its controls show what was fitted under the selection; those of glass and of objects then
-    stay as they are, for the next.
-    """
-    step, light = session.edits.current_step, session.edits.light
-    kind, options = (step.kind, step.options) if step is not None else ("", {})
-    given: dict[type[OperationOptions], dict[str, Any]] = {MaterialEdit: options if kind == "edit" else {}}
-    given[Relight] = session.edits.steps[light].options if light is not None else {}
-    given |= {Glass: options} if kind == "glass" else {Insertion: options} if kind in objects.KINDS else {}
-    values: dict[str, Any] = {}
-    for name, (operation, option) in NUMBERS.items():
-        if operation in given:
-            with suppress(TypeError, ValueError):
-                values[name] = float(given[operation].get(option, default(operation, option)))
-    for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
-        if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
-            mask, fitted = session.selection.mask, getattr(session.scene.materials, name)
-            values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
-    colour = str(given[MaterialEdit].get("albedo", ""))
-    values["colour"] = colour if colour.startswith("#") else "#808080"
-    sun = given[Relight].get("sun")
-    values["sun_on"] = sun is not None
-    with suppress(TypeError, ValueError):
-        values["azimuth"], values["elevation"] = (float(v) for v in sun or SUN)
-    with suppress(TypeError, ValueError):
-        if Glass in given:
-            hollow = str(options.get("hollow", "")).lower()
-            values["glass_hollow"] = hollow if hollow == "open" else "true" if hollow in ON else ""
-            values["glass_tint"] = tint_colour(options.get("tint", "1,1,1"))
-        if Insertion in given:
-            known = (name for name in objects.LIBRARY if objects.file_of(name) == options.get("mesh"))
-            made_of = options.get("material", "as-is")
-            coloured = made_of not in [value for _, value in objects.MATERIALS]
-            values |= {"thing": next(known, None), "made_of": "colour" if coloured else made_of}
-            if coloured:
-                values["thing_colour"] = tint_colour(made_of)
-            if "height" in options:
-                values["height"] = float(options["height"])
-    return values
-
-
-def hex_colour(value: str) -> str:
-    """A colour picker's text (#rrggbb or rgba(r, g, b, a)) as #rrggbb."""
-    if re.fullmatch(r"#[0-9a-fA-F]{6}", value):
-        return value.lower()
-    numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]
-    if len(numbers) == 3 and all(0 <= v <= 255 for v in numbers):
-        return "#" + "".join(f"{round(v):02x}" for v in numbers)
-    return "#808080"
-
-
-def tint_text(colour: str) -> str | None:
-    """A picked colour as the option `tint` of glass, linear; None for white."""
-    linear = parse_colour(hex_colour(colour))
-    return None if min(linear) >= 1 else ",".join(f"{v:.4g}" for v in linear)
-
-
-def tint_colour(tint: Any) -> str:
-    """The option `tint`, linear numbers or #rrggbb, as #rrggbb."""
-    from materialist.color import linear_to_srgb
-
-    if isinstance(tint, str) and tint.startswith("#"):
-        return tint
-    numbers = tint.split(",") if isinstance(tint, str) else tint
-    encoded = np.round(255 * linear_to_srgb(np.array([float(v) for v in numbers], np.float32)))
-    return "#" + "".join(f"{int(v):02x}" for v in encoded)
-
-
-def number_text(value: float) -> str:
-    """A number as the list of edits has it."""
-    return f"{float(value):.4g}"
 
 
 def commands(session: Session) -> str:

@@ -1,0 +1,149 @@
+"""Controls of the page, each for one option of an operation: how a value goes to the list of edits, and back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import gradio as gr
+import numpy as np
+
+from materialist.option_kinds import ON, OperationOptions, declarations
+from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight
+from materialist.studio import objects
+from materialist.studio.session import Session
+
+SUN = (45.0, 40.0)
+"""Where a new sun stands: degrees right of ahead, and above the horizon."""
+WHITE = "#ffffff"
+
+
+def number_text(value: float) -> str:
+    """A number as the list of edits has it."""
+    return f"{float(value):.4g}"
+
+
+def hex_colour(value: str) -> str:
+    """A colour picker's text (#rrggbb or rgba(r, g, b, a)) as #rrggbb."""
+    if re.fullmatch(r"#[0-9a-fA-F]{6}", value):
+        return value.lower()
+    numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]
+    if len(numbers) == 3 and all(0 <= v <= 255 for v in numbers):
+        return "#" + "".join(f"{round(v):02x}" for v in numbers)
+    return "#808080"
+
+
+def picked_colour(colour: Any) -> str:
+    """A colour of the list of edits, linear numbers or #rrggbb, as #rrggbb. Raises ValueError for other words."""
+    from materialist.color import linear_to_srgb
+
+    if isinstance(colour, str) and colour.startswith("#"):
+        return colour
+    numbers = colour.split(",") if isinstance(colour, str) else colour
+    encoded = np.round(255 * linear_to_srgb(np.array([float(v) for v in numbers], np.float32)))
+    return "#" + "".join(f"{int(v):02x}" for v in encoded)
+
+
+def _inside(hollow: Any) -> str:
+    text = str(hollow).lower()
+    return text if text == "open" else "true" if text in ON else ""
+
+
+def _material(material: str) -> str:
+    return material if material in [value for _, value in objects.MATERIALS] else "colour"
+
+
+@dataclass(frozen=True)
+class Control:
+    """A component and its option."""
+
+    operation: type[OperationOptions]
+    option: str
+    text: Callable[[Any], str | None] = number_text
+    """Value of the component -> the option in the list of edits; None clears it."""
+    value: Callable[[Any], Any] = float
+    """The option -> value of the component; a TypeError or ValueError leaves the component as it is."""
+
+    @property
+    def default(self) -> Any:
+        """The default of the option."""
+        return declarations(self.operation).get(self.option, (None, None))[1]
+
+
+CONTROLS = {
+    **{name: Control(MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic")},
+    "texture_scale": Control(MaterialEdit, "texture_scale"),
+    "colour": Control(MaterialEdit, "albedo", hex_colour, lambda v: v if str(v).startswith("#") else "#808080"),
+    **{name: Control(Relight, name) for name in ("rotate", "ambient", "sun_power")},
+    "sun_on": Control(Relight, "sun", value=lambda sun: sun is not None),
+    "azimuth": Control(Relight, "sun", value=lambda sun: float((sun or SUN)[0])),
+    "elevation": Control(Relight, "sun", value=lambda sun: float((sun or SUN)[1])),
+    **{f"glass_{name}": Control(Glass, name) for name in ("ior", "transmission", "roughness")},
+    "glass_tint": Control(Glass, "tint", lambda v: None if hex_colour(v) == WHITE else hex_colour(v), picked_colour),
+    "glass_hollow": Control(Glass, "hollow", lambda v: v or None, _inside),
+    **{name: Control(Insertion, name) for name in ("scale", "turn")},
+    "thing": Control(Insertion, "mesh", value=objects.library_name),
+    "made_of": Control(Insertion, "material", value=_material),
+    "thing_colour": Control(Insertion, "material", value=picked_colour),
+    "height": Control(Drop, "height"),
+}
+"""Name of a component -> what it stands for."""
+
+
+def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
+    """A slider for a control, by the range and default of its option; `narrower` are arguments of Gradio's instead."""
+    control = CONTROLS[name]
+    declared = declarations(control.operation)[control.option][0]
+    given = {"minimum": declared.low, "maximum": declared.high, "value": control.default, "elem_id": name, **narrower}
+    return gr.Slider(step=step, label=label, buttons=[], **given)
+
+
+def option_text(name: str, value: Any) -> str | None:
+    """The option that a control sets, as the list of edits has it; None for the default."""
+    control = CONTROLS[name]
+    return None if value == control.default else control.text(value)
+
+
+def set_option(name: str, session: Session, value: Any) -> bool | None:
+    """Set the option of a control; False where it is for the next glass, and nothing changes yet."""
+    control, text = CONTROLS[name], option_text(name, value)
+    kind = control.operation.operation
+    if control.operation is Relight:
+        session.light(**{control.option: text})
+    elif control.operation is Insertion:
+        objects.set_option(session, control.option, text)
+    elif control.operation is not Glass or session.current_kind == kind:
+        session.set(kind, **{control.option: text})
+    else:
+        return False
+    return None
+
+
+def control_values(session: Session) -> dict[str, Any]:
+    """Values of the controls as the current step, or the light, has them.
+
+    Without a current edit its controls show what was fitted under the selection; those of glass and of objects then
+    stay as they are, for the next.
+    """
+    step, light = session.edits.current_step, session.edits.light
+    kind, options = (step.kind, step.options) if step is not None else ("", {})
+    given: dict[type[OperationOptions], dict[str, Any]] = {MaterialEdit: options if kind == "edit" else {}}
+    given[Relight] = session.edits.steps[light].options if light is not None else {}
+    given |= {
+        operation: options
+        for operation, kinds in ((Glass, ("glass",)), (Insertion, objects.KINDS), (Drop, ("drop",)))
+        if kind in kinds
+    }
+    values: dict[str, Any] = {}
+    for name, control in CONTROLS.items():
+        if control.operation in given:
+            with suppress(TypeError, ValueError):
+                values[name] = control.value(given[control.operation].get(control.option, control.default))
+    for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
+        if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
+            mask, fitted = session.selection.mask, getattr(session.scene.materials, name)
+            values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
+    return values
