@@ -63,24 +63,22 @@ def test_free_fall_is_newtons():
 
 def test_energy_is_only_lost():
     things = [Thing((BOX,), np.array([0, 0, 0.5]), np.array([1.0, 3.0, 0.5]))]
-    energy = np.array(
-        [poses[0].energy for poses in fall(things, blocks(FLAT, flat=1e-4, depth=0.4), frames=60, fps=60)]
-    )
+    energy = np.array([poses[0].energy for poses in fall(things, blocks(FLAT, metres=0.2), frames=60, fps=60)])
     assert (np.diff(energy) < 0.01 * energy[0]).all() and energy[-1] < 0.5 * energy[0]
 
 
 @pytest.mark.parametrize("height", [1.0, 8.0])
 def test_nothing_tunnels(height):
     rough = np.random.default_rng(0).normal(0, 0.003, (65, 65))
-    ground = blocks(Field(FLAT.corner, FLAT.cell, rough), flat=1e-3, depth=0.4)
-    poses = list(fall([Thing((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=60, fps=20))
+    ground = blocks(Field(FLAT.corner, FLAT.cell, rough), metres=0.2)
+    poses = list(fall([Thing((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=45, fps=20))
     z = np.array([pose[0].centre[2] for pose in poses])
     assert z.min() > 0.04 and abs(z[-1] - z[-10]) < 1e-3
 
 
 def test_over_an_edge_it_falls_to_the_lower_floor():
     height = np.where(np.arange(65)[None, :] < 32, 0.3, 0.0) * np.ones((65, 1))
-    ground = blocks(Field(FLAT.corner, FLAT.cell, height), flat=1e-4, depth=0.4)
+    ground = blocks(Field(FLAT.corner, FLAT.cell, height), metres=0.2)
     start = np.array([0.06, 0, 0.6])  # more of it beyond the edge than on the table
     poses = list(fall([Thing((BOX,), start, np.zeros(3))], ground, frames=50, fps=20))
     assert poses[-1][0].centre[2] < 0.2
@@ -109,24 +107,12 @@ def test_things_rest_on_bodies_that_are_there(box):
     assert low > 0.9 * size or low < 0.02 * size  # on top of it, or it has slid off onto the floor
 
 
-def floating(scene, box, height, **options):
-    """The scene with a box whose lowest point is `height` over the floor."""
-    (body,) = insert(scene, box, (48.0, 50.0), **options).bodies
-    return replace(scene, bodies=(replace(body, vertices=(body.vertices + height * UP).astype(np.float32)),))
-
-
-def test_under_a_table_it_starts_under_the_table(box):
-    scene = floor_scene(96, 72)
-    size = extent(insert(scene, box, (48.0, 50.0)).bodies)
-    film = drop(floating(scene, box, 1.5 * size, scale=3), [box], (48.0, 50.0), frames=24, spin=0)
-    first, last = (frame.bodies[-1].vertices @ UP + 2 for frame in (film[0], film[-1]))
-    assert 0.05 * size < first.min() and first.max() < 1.5 * size
-    assert abs(last.min()) < 0.02 * size
-
-
 def test_inside_of_something_there_is_no_room(box):
-    with pytest.raises(InputError, match="no room for box at 48,50"):
-        drop(floating(floor_scene(96, 72), box, 0.01, scale=8), [box], (48.0, 50.0), frames=2)
+    scene = insert(floor_scene(96, 72), box, (48.0, 50.0), scale=8)
+    (body,) = scene.bodies  # its base must not be one with the floor
+    scene = replace(scene, bodies=(replace(body, vertices=(body.vertices + 0.01 * UP).astype(np.float32)),))
+    with pytest.raises(InputError, match="no room at 48,50"):
+        drop(scene, [box], (48.0, 50.0), frames=2)
 
 
 def test_it_spins_about_its_centre_of_mass():
@@ -140,7 +126,7 @@ def test_it_spins_about_its_centre_of_mass():
 
 def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    ground = blocks(FLAT, flat=1e-4, depth=0.4)
+    ground = blocks(FLAT, metres=0.2)
     rod = BOX * np.array([1, 0.2, 0.1])
     spun = lambda turns: fall(  # noqa: E731
         [Thing((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))], ground, frames=48, fps=24

@@ -13,7 +13,7 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.convex import convex_pieces, hull
-from materialist.edits.drop.ground import Surroundings, blocks_of, middle
+from materialist.edits.drop.ground import blocks, depth_in, ground_field
 from materialist.edits.drop.physics import Pose, Thing, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
@@ -150,14 +150,21 @@ def prepared(
     direction = down(scene, stood[0][1], wanted.gravity)
     to_up = upright(direction)
     factor = wanted.metres / max(longest for *_, longest in stood)
-    around = Surroundings.of(scene, to_up, factor)
     points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
-    names = [f"{model.name} at {place[0]:g},{place[1]:g}" for model, place in zip(models, places)]
-    shifts, tops = _starts(around, points, wanted, names)
-    field = around.ground([middle(p) for p in points], tops, wanted.metres)
-    starts = [(bodies, shift) for (bodies, *_), shift in zip(stood, shifts)]
+    lifts = _lifts(points, wanted.height * wanted.metres)
+    high = np.array([own[:, 2].max() + lift for own, lift in zip(points, lifts)])
+    middles = np.array([(own.min(0) + own.max(0))[:2] / 2 for own in points])
+    field = ground_field(scene, to_up, factor, places=middles, tops=high + wanted.metres, metres=wanted.metres)
+    # What would start in a bump lifts them all.
+    clear = max(0.0, *(depth_in(field, own + np.array([0, 0, lift])) for own, lift in zip(points, lifts)))
+    if clear >= wanted.metres:
+        raise InputError(
+            f"There is no room at {places[0][0]:g},{places[0][1]:g}: the things would start inside of something; "
+            "choose another place, or a larger height."
+        )
+    starts = [(bodies, np.array([0, 0, lift + clear])) for (bodies, *_), lift in zip(stood, lifts)]
     things = _things(starts, to_up, factor, wanted)
-    ground = [hull(block) for block in blocks_of(field, wanted.metres)]
+    ground = [hull(block) for block in blocks(field, metres=wanted.metres)]
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
         **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
@@ -207,34 +214,21 @@ def _places(at: Any, count: int) -> list[tuple[float, float]]:
     return places
 
 
-def _starts(
-    around: Surroundings, points: list[Array], wanted: Drop, names: list[str]
-) -> tuple[list[Array], list[float]]:
-    """For each thing the shift [3] to where it starts, and the z from which its ground is seen.
-
-    points: [n, 3] of each thing as it stands. It starts clear of the things below it and of what is in the scene.
-    Raises InputError where it cannot.
-    """
+def _lifts(points: list[Array], height: float) -> list[float]:
+    """How far each thing, that stands with its points [n, 3], is lifted: by `height`, or clear of those below it."""
     boxes: list[tuple[Array, Array]] = []
-    shifts, tops = [], []
-    for own, name in zip(points, names):
+    lifts = []
+    for own in points:
         low, high = own.min(0), own.max(0)
-        least = 0.0
-        for other_low, other_high in boxes:
-            if (low[:2] < other_high[:2]).all() and (high[:2] > other_low[:2]).all():
-                least = max(least, other_high[2] - low[2] + 0.25 * (high[2] - low[2]))
-        lift = max(least, wanted.height * wanted.metres)
-        found = around.start(own, lift, least, wanted.metres)
-        if found is None:
-            raise InputError(
-                f"There is no room for {name}: it would start inside of something; choose another place, or a larger "
-                "height."
-            )
-        shift, top = found
-        boxes.append((low + shift, high + shift))
-        shifts.append(shift)
-        tops.append(top)
-    return shifts, tops
+        over = [
+            top[2] - low[2] + 0.25 * (high[2] - low[2]) for bottom, top in boxes
+            if (low[:2] < top[:2]).all() and (high[:2] > bottom[:2]).all()
+        ]  # fmt: skip
+        lift = float(max([height, *over]))
+        lifts.append(lift)
+        up = np.array([0, 0, lift])
+        boxes.append((low + up, high + up))
+    return lifts
 
 
 def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[Thing]:
@@ -246,17 +240,11 @@ def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: 
         centre = (points.min(0) + points.max(0)) / 2
         axis = rng.normal(size=3)
         turning = 2 * np.pi * wanted.spin * axis / np.linalg.norm(axis)
-        pieces = _pieces(bodies, to_up, factor, shift, wanted.seed)
+        corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
+        faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
+        pieces = convex_pieces(points, faces, seed=wanted.seed)
         things.append(Thing(tuple(piece - centre for piece in pieces), centre, turning))
     return things
-
-
-def _pieces(bodies: tuple[Body, ...], to_up: Array, factor: float, shift: Array, seed: int) -> list[Array]:
-    """Convex pieces [n, 3] of a thing, metres, z up."""
-    corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
-    faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
-    vertices = np.concatenate([body.vertices for body in bodies]).astype(np.float64) @ to_up.T * factor + shift
-    return convex_pieces(vertices, faces, seed=seed)
 
 
 def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, pose: Pose) -> Body:
