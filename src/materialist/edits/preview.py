@@ -58,9 +58,7 @@ class Preview:
         self._tables = self._engine.tables(scene.envmap)
         self._taps = list(taps(self._engine.guide))
         self._other: tuple[Array, Tables] | None = None
-        self._part: tuple[Array, Any] | None = None
-        self._base = base = self._shaded(scene.materials, self._tables)
-        self._base_picture = self._image(base, self._sky(scene.envmap))
+        self._base = self._image(self._shaded(scene.materials, self._tables), self._sky(scene.envmap))
 
     def render(self, edited: Scene) -> Array:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
@@ -70,12 +68,13 @@ class Preview:
         self._check(edited)
         edited = self._seen(edited)
         fitted = np.array_equal(edited.envmap, self.scene.envmap)
-        return self._image((self._reshaded if fitted else self._relit)(edited), self._sky(edited.envmap))
+        shaded = self._shaded(edited.materials, self._tables) if fitted else self._relit(edited)
+        return self._image(shaded, self._sky(edited.envmap))
 
     def layers(self, edited: Scene) -> Layers:
         """What `composite.into_photo` needs, from the cache."""
         picture = self.render(edited)
-        base = self._base_picture
+        base = self._base
         relit = is_relit(self.scene, edited)
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
@@ -139,34 +138,21 @@ class Preview:
         share = ((r - low) / (high - low)).clamp(0, 1)
         return torch.cat([smooth[:, :3], lobes[:, 3:] + share * (smooth - lobes)[:, 3:]], -1)
 
-    def _reshaded(self, edited: Scene):
-        """[P, 3] under the fitted light: pixels whose materials changed are shaded anew, the others known."""
-        from materialist.transport.cache import Tables
-
-        pixels = self._engine.cache.pixels
-        moved = np.flatnonzero(changed_pixels(self.scene, edited).reshape(-1)[pixels])
-        if self._part is None or not np.array_equal(self._part[0], moved):
-            self._part = (moved, Tables(self._tables.diffuse[moved], self._tables.specular[:, moved]))
-        shaded = self._base.clone()
-        shaded[moved] = self._shaded(edited.materials, self._part[1], pixels[moved])
-        return shaded
-
-    def _shaded(self, materials: Materials, tables, pixels: Array | None = None):
-        """[P, 3] torch radiance of the surface pixels, or of some of them."""
+    def _shaded(self, materials: Materials, tables):
+        """[P, 3] torch radiance of the surface pixels."""
         import torch
 
         from materialist.transport.shading import shade
 
         with torch.no_grad():
-            return shade(tables, *self._maps(materials, pixels))
+            return shade(tables, *self._maps(materials))
 
-    def _maps(self, materials: Materials, pixels: Array | None = None):
-        """Albedo [P, 3], roughness and metallic [P] of the surface pixels, or of some of them; torch."""
+    def _maps(self, materials: Materials):
+        """Albedo [P, 3], roughness and metallic [P] of the surface pixels; torch."""
         import torch
 
-        pixels = self._engine.cache.pixels if pixels is None else pixels
-        take = lambda m, n: torch.from_numpy(np.ascontiguousarray(m.reshape(-1, *([n] if n > 1 else [])))[pixels])  # noqa: E731
-        return take(materials.albedo, 3), take(materials.roughness, 1), take(materials.metallic, 1)
+        maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
+        return [torch.from_numpy(values[self._engine.cache.pixels]) for values in maps]
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""
