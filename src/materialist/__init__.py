@@ -47,50 +47,43 @@ _HOME = {
 }
 """Public name -> module that defines it."""
 
-__all__ = ["__version__", *sorted(_HOME)]
+__all__ = [
+    "Body", "Camera", "Drop", "FitReport", "Geometry", "Glass", "InputError", "Insertion", "InvertOptions", "Lamp",
+    "MaterialEdit", "MaterialistError", "Materials", "Mesh", "OutputError", "Photo", "Prediction", "Relight",
+    "Removal", "Scene", "SceneError", "SetupError", "Surface", "WeightsError", "__version__", "batch", "composite",
+    "drop", "edit", "export", "glass", "insert", "invert", "lamp", "load_scene", "read_photo", "relight", "remove",
+    "render_scene", "save_scene", "select", "settle",
+]  # fmt: skip
 
 if TYPE_CHECKING:
-    from materialist.batches.run import batch as batch
-    from materialist.edits.composite.composite import composite as composite
-    from materialist.edits.drop.drop import drop as drop
-    from materialist.edits.drop.drop import settle as settle
-    from materialist.edits.glass.glass import glass as glass
-    from materialist.edits.insert.insert import insert as insert
-    from materialist.edits.light.relight import lamp as lamp
-    from materialist.edits.light.relight import relight as relight
-    from materialist.edits.material.material import edit as edit
-    from materialist.edits.remove.remove import remove as remove
-    from materialist.edits.select.select import select as select
-    from materialist.errors import InputError as InputError
-    from materialist.errors import MaterialistError as MaterialistError
-    from materialist.errors import OutputError as OutputError
-    from materialist.errors import SceneError as SceneError
-    from materialist.errors import SetupError as SetupError
-    from materialist.errors import WeightsError as WeightsError
-    from materialist.exporters.run import export as export
-    from materialist.io.package import load_scene as load_scene
-    from materialist.io.package import save_scene as save_scene
-    from materialist.io.photo import read_photo as read_photo
-    from materialist.options import Drop as Drop
-    from materialist.options import Glass as Glass
-    from materialist.options import Insertion as Insertion
-    from materialist.options import InvertOptions as InvertOptions
-    from materialist.options import MaterialEdit as MaterialEdit
-    from materialist.options import Relight as Relight
-    from materialist.options import Removal as Removal
-    from materialist.pipeline import invert as invert
-    from materialist.pipeline import render_scene as render_scene
-    from materialist.types import Body as Body
-    from materialist.types import Camera as Camera
-    from materialist.types import FitReport as FitReport
-    from materialist.types import Geometry as Geometry
-    from materialist.types import Lamp as Lamp
-    from materialist.types import Materials as Materials
-    from materialist.types import Mesh as Mesh
-    from materialist.types import Photo as Photo
-    from materialist.types import Prediction as Prediction
-    from materialist.types import Scene as Scene
-    from materialist.types import Surface as Surface
+    from materialist.batches.run import batch
+    from materialist.edits.composite.composite import composite
+    from materialist.edits.drop.drop import drop, settle
+    from materialist.edits.glass.glass import glass
+    from materialist.edits.insert.insert import insert
+    from materialist.edits.light.relight import lamp, relight
+    from materialist.edits.material.material import edit
+    from materialist.edits.remove.remove import remove
+    from materialist.edits.select.select import select
+    from materialist.errors import InputError, MaterialistError, OutputError, SceneError, SetupError, WeightsError
+    from materialist.exporters.run import export
+    from materialist.io.package import load_scene, save_scene
+    from materialist.io.photo import read_photo
+    from materialist.options import Drop, Glass, Insertion, InvertOptions, MaterialEdit, Relight, Removal
+    from materialist.pipeline import invert, render_scene
+    from materialist.types import (
+        Body,
+        Camera,
+        FitReport,
+        Geometry,
+        Lamp,
+        Materials,
+        Mesh,
+        Photo,
+        Prediction,
+        Scene,
+        Surface,
+    )  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
@@ -103,4 +96,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__

@@ -143,7 +143,7 @@ def test_a_preview_is_a_picture_that_says_so(run, folder, tmp_path):
     assert "A preview: 48 x 36" in shown and "without the shadow" in shown and "thickness: symmetry" in shown
     truth = GlassPreview(load_scene(folder / "a.scene"), MASK, thickness="symmetry")
     np.testing.assert_allclose(
-        read_exr(tmp_path / "p.exr"), truth.picture(ior=1.4, tint=(1, 0.5, 0.5), spp=96), rtol=1e-5
+        read_exr(tmp_path / "p.exr"), truth.picture(ior=1.4, tint=(1, 0.5, 0.5), spp=16), rtol=1e-5
     )
 
 

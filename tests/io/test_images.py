@@ -149,21 +149,18 @@ def test_a_depth_is_no_photo(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("shape", "settings", "words"),
+    ("pixels", "settings", "words"),
     [
-        ((3, 20, 30), {"photometric": "rgb", "planarconfig": "separate"}, "one after the other"),
-        ((20, 30), {"photometric": "miniswhite"}, "inverted"),
-        ((20, 30, 4), {"photometric": "rgb", "extrasamples": ["assocalpha"]}, "premultiplied"),
+        (np.zeros((3, 20, 30), np.uint16), {"photometric": "rgb", "planarconfig": "separate"}, "one after the other"),
+        (np.zeros((3, 20, 30), np.float32), {"photometric": "rgb", "planarconfig": "separate"}, "one after the other"),
+        (np.zeros((20, 30), np.uint16), {"photometric": "miniswhite"}, "inverted"),
+        (np.zeros((20, 30, 4), np.uint16), {"photometric": "rgb", "extrasamples": ["assocalpha"]}, "premultiplied"),
     ],
 )
-def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, shape, settings, words):
+def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words):
     import tifffile
 
-    shape = {"separate": (3, 20, 30)}.get(
-        settings.get("planarconfig"), (20, 30, 4 if "extrasamples" in settings else 3)
-    )
-    data = np.zeros(shape if settings["photometric"] == "rgb" else (20, 30), np.uint16)
-    tifffile.imwrite(tmp_path / "a.tif", data, **settings)
+    tifffile.imwrite(tmp_path / "a.tif", pixels, **settings)
     with pytest.raises(InputError, match=words):
         decode(tmp_path / "a.tif")
 

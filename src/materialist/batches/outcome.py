@@ -69,10 +69,6 @@ class Status:
     done: int
     """Including photos that an earlier call finished."""
     failed: int
-    rate: float
-    """Photos per second of this call; 0 before the first ends."""
-    left: float | None
-    """Seconds to go at that rate; None while it is not known."""
     running: dict[str, str] = field(default_factory=dict)
     """Name -> stage, of photos at work."""
     news: str | None = None

@@ -185,7 +185,7 @@ class _Run:
         self._stages: dict[str, str] = {}
         self._tries: dict[str, int] = {}
         self._ended: dict[str, str] = {}
-        self.start = self._worked = self._written = time.monotonic()
+        self.start = self._written = time.monotonic()
 
     def work(self, pool: LocalPool | RayPool) -> None:
         """Run until every photo is over, or an error occurs that would fail all of them."""
@@ -262,10 +262,8 @@ class _Run:
         """Report the state, and what has happened."""
         total, failed = len(self._photos), list(self._ended.values()).count(FAILED)
         over = self._kept + len(self._ended)
-        rate = len(self._ended) / max(time.monotonic() - self._worked, 1e-9)
-        left = (total - over) / rate if rate else None
         running = {self._tasks[id].name: stage for id, stage in self._stages.items()}
-        self._watch(Status(total, over - failed, failed, rate, left, running, news, urgent))
+        self._watch(Status(total, over - failed, failed, running, news, urgent))
 
     def _row(self, photo: Listed) -> Row:
         entry, task = self._ledger.last.get(photo.id, {}), self._tasks.get(photo.id)

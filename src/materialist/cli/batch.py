@@ -89,7 +89,7 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
 
 
 class BatchProgress:
-    """Context manager and callback: a bar over all photos with rate, time left and failures.
+    """Context manager and callback: a bar over all photos with failures and what is at work.
 
     Where stderr is no terminal there is a line for each photo instead, and with `quiet` nothing.
     """
@@ -99,11 +99,13 @@ class BatchProgress:
         self._bar: Progress | None = None
         if not quiet and sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
             self._bar = Progress(
-                BarColumn(bar_width=16), TextColumn("{task.description}", markup=False), console=Console(stderr=True)
-            )
+                BarColumn(bar_width=16), MofNCompleteColumn(), TimeRemainingColumn(),
+                TextColumn("{task.description}", markup=False), console=Console(stderr=True),
+                speed_estimate_period=3600,
+            )  # fmt: skip
 
     def __enter__(self) -> BatchProgress:
         if self._bar is not None:
@@ -123,23 +125,8 @@ class BatchProgress:
         if self._bar is not None:
             if status.news and status.urgent:
                 self._bar.console.print(status.news, markup=False, highlight=False)
-            words = f"{over}/{status.total}  {_note(status)}"
-            self._bar.update(self._all, completed=over, total=status.total, description=words)
+            words = [f"{status.failed} failed"] if status.failed else []
+            words += [f"{name}: {stage}" for name, stage in list(status.running.items())[:3]]
+            self._bar.update(self._all, completed=over, total=status.total, description=", ".join(words))
         elif status.news and not self._quiet:
             typer.echo(f"[{over}/{status.total}] {status.news}", err=True)
-
-
-def _note(status: Status) -> str:
-    parts = [f"{status.failed} failed"] if status.failed else []
-    if status.rate and status.left is not None:
-        parts += [f"{status.rate * 60:.1f} a minute", f"{_span(status.left)} left"]
-    parts += [f"{name}: {stage}" for name, stage in list(status.running.items())[:3]]
-    return ", ".join(parts)
-
-
-def _span(seconds: float) -> str:
-    """A duration as a person says it."""
-    minutes = round(seconds / 60)
-    if minutes < 2:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 120 else f"{minutes / 60:.1f} h"

@@ -72,9 +72,8 @@ def relight(
     if frames is not None:
         from materialist.edits.light.relight import moving_light
 
-        start, film = time.monotonic(), moving_light(loaded, frames, wanted, suns=tuple(suns))
-        last, _ = _written(loaded, film, output, rendering, run, frames=frames, fps=fps)
-        _report("relight", loaded, last, output, run, frames=frames, fps=fps, seconds=time.monotonic() - start)
+        film = moving_light(loaded, frames, wanted, suns=tuple(suns))
+        _write_film("relight", loaded, film, output, rendering, run, frames=frames, fps=fps)
         return
     from materialist.edits.light.relight import relight as change
 
@@ -97,57 +96,54 @@ def drop(
     rendering: Rendering = Rendering(spp=32),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
-    from materialist.edits.composite.composite import developed
     from materialist.edits.drop.drop import drop as simulate
     from materialist.edits.insert.meshes import read_model
-    from materialist.io.package import load_scene, save_scene
+    from materialist.io.package import load_scene
 
     check_before(output, rendering, run, video=fps)
-    start, save = time.monotonic(), rendering.save
     places: Any = [flag_numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = load_scene(scene)
     film = simulate(loaded, models, places, options, frames=frames, fps=fps)
-    last, picture = _written(loaded, film, output, rendering, run, frames=frames, fps=fps)
-    if save is not None:
-        save_scene(developed(loaded, last, picture, seed=run.seed, device=run.device), save, force=run.force)
-    _report(
-        "drop", loaded, last, output, run, frames=frames, fps=fps, scene=str(save) if save else None,
-        edits=last.provenance.get("edits", []), seconds=time.monotonic() - start,
-    )  # fmt: skip
+    _write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)
 
 
-def _written(
-    scene: Any, film: Iterable[Any], output: Path, rendering: Rendering, run: Run, *, frames: int, fps: int
-) -> tuple[Any, Any]:
-    """Render and write a film, one scene in memory at a time; (the last scene, its picture)."""
-    from materialist.edits.composite.composite import pictures
+def _write_film(
+    command: str, loaded: Any, film: Iterable[Any], output: Path, rendering: Rendering, run: Run, *, frames: int,
+    fps: int,
+) -> None:  # fmt: skip
+    """Render and write a film, one scene in memory at a time; save the last scene where asked; report."""
+    from materialist.edits.composite.composite import developed, pictures
+    from materialist.edits.core.notes import warnings_since
+    from materialist.io.package import save_scene
     from materialist.io.video import write_frames
 
-    last: list[Any] = [scene, None]
+    start, save, last = time.monotonic(), rendering.save, loaded
+    picture: Any = None
 
     def scenes() -> Iterator[Any]:
+        nonlocal last
         for frame in film:
-            last[0] = frame
+            last = frame
             yield frame
 
     def taken(progress: Any) -> Iterator[Any]:
-        for picture in pictures(
-            scene, scenes(), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
+        nonlocal picture
+        for made in pictures(
+            loaded, scenes(), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
             full_render=rendering.full_render, progress=progress, count=frames,
         ):  # fmt: skip
-            last[1] = picture
-            yield picture
+            picture = made
+            yield made
 
     with StageProgress(quiet=run.as_json) as progress:
         write_frames(output, taken(progress), fps=fps, force=run.force)
-    return last[0], last[1]
-
-
-def _report(command: str, loaded: Any, last: Any, output: Path, run: Run, **facts: Any) -> None:
-    from materialist.edits.core.notes import warnings_since
-
+    if save is not None:
+        save_scene(developed(loaded, last, picture, seed=run.seed, device=run.device), save, force=run.force)
     warnings = warnings_since(loaded, last)
     lines = [*(f"Note: {note}" for note in warnings), f"Look at {output}"]
-    lines += [f"The edited scene is {facts['scene']}"] if facts.get("scene") else []
-    report_success(command, run.as_json, lines, video=str(output), warnings=warnings, **facts)
+    lines += [f"The edited scene is {save}"] if save is not None else []
+    report_success(
+        command, run.as_json, lines, video=str(output), warnings=warnings, frames=frames, fps=fps,
+        scene=str(save) if save else None, edits=last.provenance.get("edits", []), seconds=time.monotonic() - start,
+    )  # fmt: skip
