@@ -76,14 +76,6 @@ def test_nothing_tunnels(height):
     assert z.min() > 0.04 and abs(z[-1] - z[-10]) < 1e-3
 
 
-def test_over_an_edge_it_falls_to_the_lower_floor():
-    height = np.where(np.arange(65)[None, :] < 32, 0.3, 0.0) * np.ones((65, 1))
-    ground = blocks(Field(FLAT.corner, FLAT.cell, height), metres=0.2)
-    start = np.array([0.06, 0, 0.6])  # more of it beyond the edge than on the table
-    poses = list(fall([Thing((BOX,), start, np.zeros(3))], ground, frames=50, fps=20))
-    assert poses[-1][0].centre[2] < 0.2
-
-
 def test_gravity(box):
     scene = floor_scene(96, 72)
     support = support_at(scene, (48.0, 50.0))

@@ -7,10 +7,9 @@ from PIL import Image
 
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
-from materialist.edits.recipe import apply, glass_arguments, read_recipe
+from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
-from materialist.options import Glass
 
 SCENE = flat_scene()
 MASK = block_mask(36, 48)
@@ -110,21 +109,6 @@ def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
     )
     apply(SCENE, read_recipe(folder / "edits.yaml"), seed=9)
     assert asked == [9, 4, 9, 9, 0]
-
-
-def test_tints_are_spelled_as_on_the_command_line(folder):
-    one, other = (
-        glass_arguments(SCENE, read_step(folder, f"- glass: {{mask: block.png, hollow: yes, tint: {tint}}}"))[1]
-        for tint in ("'#ff8000'", "[1, 0.2158605, 0]")
-    )
-    assert one.hollow is True and other == Glass(hollow=True, tint=other.tint)
-    assert other.tint == pytest.approx(one.tint, abs=1e-6)
-    assert glass_arguments(SCENE, read_step(folder, "- glass: {mask: block.png, hollow: open}"))[1].hollow == "open"
-
-
-def read_step(folder, text):
-    (folder / "one.yaml").write_text(text)
-    return read_recipe(folder / "one.yaml")[0]
 
 
 @pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",

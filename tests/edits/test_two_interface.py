@@ -156,17 +156,6 @@ def test_tint_scales_what_is_behind():
     assert np.median(mirror[maps[2]]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
 
 
-def test_the_front_reflects_what_is_behind_where_its_reflection_meets_that():
-    """A pane that leans away: its mirror image is the right border of the background, not the environment."""
-    depth, normal, mask, thick = pane(CAMERA, 0.1, tilt=1.2)
-    middle = SHAPE[0] // 2, SHAPE[1] // 2
-    mask = mask & (depth > 0) & (depth < 5)
-    seen = shown((depth, normal, mask), thick, 6.0, gradient(CAMERA), tint=(0.0, 0.0, 0.0))[middle]
-    cosine = -normal[middle] @ ti._unit(pixel_rays(CAMERA).astype(float)[middle])
-    share = float(ti.fresnel_dielectric(np.array([cosine]), 1.5)[0])
-    assert mask[middle] and seen[0] == pytest.approx(share * (1 - 0.5 / SHAPE[1]), rel=0.03)
-
-
 @pytest.mark.parametrize(("roughness", "tilt"), [(0.3, 75.0), (0.6, 45.0), (1.0, 0.0)])
 def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
     """F D G / (4 cos_i cos_o) over the upper hemisphere, by quadrature: nothing is reflected below the surface."""
@@ -223,9 +212,3 @@ def test_total_reflection_keeps_its_light():
     total = inner @ outward < np.sqrt(1 - 1 / 2.4**2)
     assert total.all()
     np.testing.assert_allclose(crossing.share, 1 - crossing.reflectance)
-
-
-def test_maps_of_another_size_are_refused():
-    *maps, thick = pane(CAMERA, 0.1)
-    with pytest.raises(InputError, match="thickness has shape"):
-        shown(maps, thick[1:], 3.0, gradient(CAMERA))

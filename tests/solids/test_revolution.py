@@ -60,19 +60,6 @@ def test_the_hole_of_a_ring_stays_open():
     assert error(body.thickness(front.depth.astype(float), inside, RAYS), front, inside) < 0.05
 
 
-def test_a_cup_has_a_bottom():
-    outer, inner = lines((0, 0), (0.3, 0), (0.3, 0.55)), lines((0.22, 0.55), (0.22, 0.05), (0, 0.05))
-    body, *_ = revolved(turned(np.concatenate([outer, arc((0.26, 0.55), 0.04, 0, 180, 30), inner])))
-    assert body.profile.at(np.array([[0.26, 0.3], [0.15, 0.01]])).max() < 0  # wall and bottom are full
-
-
-def test_edges_keep_their_normals(pot):
-    shell = pot[0].body(CAMERA)
-    height = (shell.vertices - FOOT) @ UP
-    assert np.abs(shell.normals[(height > 0.05) & (height < 0.65)] @ UP).max() < 0.05
-    assert volume(shell) == pytest.approx(np.pi * 0.3**2 * 0.7, rel=0.03)
-
-
 def test_a_cylinder_becomes_an_open_pot(pot):
     body, wall = pot[0], 0.05
     shell = body.body(CAMERA, wall=wall, open_top=True)

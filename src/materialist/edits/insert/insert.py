@@ -68,6 +68,8 @@ def put(
 
     The side is the model's own, in scene units; see `insert`.
     """
+    from scipy.spatial.transform import Rotation
+
     low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
@@ -75,7 +77,7 @@ def put(
     footprint = unit * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     support = support_at(scene, at, footprint)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    turned = frame(support) @ about_up(turn)
+    turned = frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
     bodies = tuple(moved(part, turned * unit, support.point - (turned * unit) @ base) for part in model.parts)
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
     if nearest < SETTINGS.nearest * support.depth:
@@ -104,12 +106,6 @@ def frame(support: Support) -> Array:
     return np.stack([np.cross(up, front), up, front], -1)
 
 
-def about_up(degrees: float) -> Array:
-    """[3, 3] rotation about +Y."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-
-
 def moved(body: Body, linear: Array, shift: Array) -> Body:
     """The body under x -> linear x + shift; `linear` [3, 3] is a rotation times a factor."""
     factor = np.cbrt(np.linalg.det(linear))
@@ -120,12 +116,8 @@ def moved(body: Body, linear: Array, shift: Array) -> Body:
 
 def surface_points(body: Body) -> Array:
     """[n, 3] points evenly over the body's surface, always the same ones."""
-    corners = body.vertices[body.faces].astype(np.float64)  # [F, 3, 3]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    if not area.sum() > 0:
-        return corners[:, 0]
-    rng = np.random.default_rng(0)
-    face = rng.choice(len(area), SETTINGS.samples, p=area / area.sum())
-    u, v = np.sqrt(rng.random(SETTINGS.samples)), rng.random(SETTINGS.samples)
-    weights = np.stack([1 - u, u * (1 - v), u * v], -1)
-    return (corners[face] * weights[..., None]).sum(1)
+    from trimesh import Trimesh, sample
+
+    return np.asarray(
+        sample.sample_surface(Trimesh(body.vertices, body.faces, process=False), SETTINGS.samples, seed=0)[0]
+    )
