@@ -16,7 +16,8 @@ import pytest
 from materialist.errors import InputError, OutputError
 from materialist.procedural.dataset import produce, read_description, sample_path, write_data_sheet
 from materialist.procedural.objects import things
-from materialist.procedural.sample import HELD_OUT, KINDS, Options, make_sample, make_world
+from materialist.procedural.options import HELD_OUT, KINDS, DataSetOptions
+from materialist.procedural.sample import make_sample, make_world
 
 SIZE = 32
 CONTRACT = {
@@ -28,7 +29,7 @@ CONTRACT = {
 
 @pytest.fixture(scope="module")
 def options():
-    return Options(size=SIZE, seed=11, spp=4, device="cpu")
+    return DataSetOptions(size=SIZE, seed=11, spp=4, device="cpu")
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +90,7 @@ def test_a_sample_depends_on_seed_and_number_alone(made, options, tmp_path):
     stored = arrays(made, 4)
     for name in CONTRACT:
         assert np.array_equal(again[name], stored[name]), name
-    other = make_sample(4, Options(size=SIZE, seed=12, spp=4, device="cpu"))
+    other = make_sample(4, DataSetOptions(size=SIZE, seed=12, spp=4, device="cpu"))
     assert not np.array_equal(other["albedo"], stored["albedo"])
 
 
@@ -127,7 +128,7 @@ def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
 
 
 def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
-    options = Options(size=SIZE, seed=11, spp=1, device="cpu", only="still-life")
+    options = DataSetOptions(size=SIZE, seed=11, spp=1, device="cpu", only="still-life")
     train, aside = make_sample(3, options), make_sample(3, replace(options, split="heldout"))
     assert train["fov"] != aside["fov"] and not np.array_equal(train["thing"], aside["thing"])
 
@@ -140,14 +141,14 @@ def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
 )  # fmt: skip
 def test_options_that_cannot_be(wrong, said):
     with pytest.raises(InputError, match=said):
-        Options(**wrong)
+        DataSetOptions(**wrong)
 
 
 def test_folders_and_counts_that_cannot_be(options, tmp_path):
     with pytest.raises(InputError, match="count is 0"):
         produce(tmp_path / "x", options, count=0)
     with pytest.raises(InputError, match=r"\.ply"):
-        Options(meshes=tmp_path)
+        DataSetOptions(meshes=tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be written"):
         produce(tmp_path / "file/set", options, count=1)
@@ -170,7 +171,7 @@ def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
     assert len(things.mesh(tmp_path / "meshes" / "chair.ply").faces) == 1
     (tmp_path / "meshes" / "vase.ply").write_text(text)
-    options = Options(size=SIZE, device="cpu", meshes=tmp_path / "meshes")
+    options = DataSetOptions(size=SIZE, device="cpu", meshes=tmp_path / "meshes")
     with pytest.raises(InputError, match=r"vase\.ply .*; mend it"):
         produce(tmp_path / "set", options, count=1)
     assert not (tmp_path / "set").exists()
@@ -179,7 +180,7 @@ def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
 def test_the_splits_share_no_file(tmp_path):
     for name in (*sorted(HELD_OUT), "teapot", "vase"):
         (tmp_path / f"{name}.ply").touch()
-    train, aside = (Options(meshes=tmp_path, split=split).mesh_files for split in ("train", "heldout"))
+    train, aside = (DataSetOptions(meshes=tmp_path, split=split).mesh_files for split in ("train", "heldout"))
     assert [p.stem for p in train] == ["teapot", "vase"]
     assert {p.stem for p in aside} == HELD_OUT
 

@@ -53,7 +53,7 @@ def test_a_data_folder_without_captures_is_refused(tmp_path):
 
 def test_skies_have_a_mean_of_one_and_are_lighter_above():
     for k in range(4):
-        envmap = lights.levelled(lights.sky(np.random.default_rng(k)))
+        envmap = lights.outdoors(np.random.default_rng(k))
         weight = np.sqrt(np.maximum(1 - lights.directions(len(envmap))[..., 1] ** 2, 0))
         assert (luminance(envmap) * weight).sum() / weight.sum() == pytest.approx(1, rel=0.02)
         assert luminance(envmap[: len(envmap) // 2]).mean() > luminance(envmap[len(envmap) // 2 :]).mean()

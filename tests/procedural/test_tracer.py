@@ -11,6 +11,7 @@ from materialist.errors import InputError
 from materialist.procedural import packing, sample, tiles, tracer
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes as s
+from materialist.procedural.options import DataSetOptions
 from materialist.procedural.world import ScenePart, World, look, one_thing
 from materialist.types import Camera
 
@@ -154,7 +155,7 @@ def developed(world):
     rng = np.random.default_rng(0)
     seen = tracer.SampleTracer(packing.pack(world, rng), Camera(64, 64, world.view.fov), device="cpu")
     probe = seen.probe(sample.PROBE)
-    return sample._developed(world, probe, seen, rng, sample.Options(size=64, device="cpu")), probe
+    return sample._developed(world, probe, seen, rng, DataSetOptions(size=64, device="cpu")), probe
 
 
 def test_texture_is_not_printed_into_the_shading():

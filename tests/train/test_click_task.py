@@ -14,7 +14,7 @@ from materialist.cli import app
 from materialist.errors import InputError
 from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
-from materialist.procedural.sample import Options
+from materialist.procedural.options import DataSetOptions
 from materialist.train import checkpoint
 from materialist.train.clicks import ClickView, click_losses, draw_click, load_views, produce_views, worse
 
@@ -73,7 +73,7 @@ def test_scores_of_views_kept_aside(folder, tmp_path):
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
-        produce_set(data, Options(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
+        produce_set(data, DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
     views = tmp_path / "run" / "views"
     assert produce_views(sets[0], views) == 1
     (made,) = load_views(views)

@@ -17,7 +17,8 @@ from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import SampleFolder, claim, described, write_arrays
 from materialist.procedural.objects import things
-from materialist.procedural.sample import Options, make_sample
+from materialist.procedural.options import DataSetOptions
+from materialist.procedural.sample import make_sample
 
 FORMAT = 1
 CONTENT = 6
@@ -38,7 +39,7 @@ class Made:
 
 
 def produce(
-    folder: str | Path, options: Options, *, count: int, workers: int = 1, resume: bool = False,
+    folder: str | Path, options: DataSetOptions, *, count: int, workers: int = 1, resume: bool = False,
     progress: Progress | None = None,
 ) -> Made:  # fmt: skip
     """Render the samples 0 .. count - 1 that `folder` lacks.
@@ -74,7 +75,7 @@ def sample_path(folder: Path, index: int) -> Path:
     return folder / "samples" / f"{index:07d}.npz"
 
 
-def _rendered(folder: Path, options: Options, missing: list[int], workers: int) -> Iterator[int]:
+def _rendered(folder: Path, options: DataSetOptions, missing: list[int], workers: int) -> Iterator[int]:
     if workers == 1 or len(missing) < 2:
         yield from (_write(folder, options, k) for k in missing)
         return
@@ -99,12 +100,12 @@ def _one_thread_each() -> Iterator[None]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
-def _write(folder: Path, options: Options, index: int) -> int:
+def _write(folder: Path, options: DataSetOptions, index: int) -> int:
     write_arrays(sample_path(folder, index), make_sample(index, options))
     return index
 
 
-def _description(options: Options) -> dict[str, Any]:
+def _description(options: DataSetOptions) -> dict[str, Any]:
     from materialist import __version__
 
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}

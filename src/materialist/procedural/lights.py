@@ -15,7 +15,7 @@ import numpy as np
 
 from materialist.color import luminance
 from materialist.errors import InputError
-from materialist.procedural.objects.shapes import lumps, turn_upright
+from materialist.procedural.objects.shapes import turn_upright
 from materialist.types import Array
 
 HEIGHT = 256
@@ -189,17 +189,21 @@ def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array
         picture = captured(rng, captures)
         if luminance(picture[: len(picture) // 3]).mean() > 0.8 * luminance(picture).mean():
             return picture
-    return levelled(sky(rng))
+    return procedural(rng, (_sky, _overcast))
 
 
 def around(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
     """[h, 2h, 3] float32: any surroundings: captures mostly, a studio, a room, a sky."""
     if captures and rng.random() < 0.65:
         return captured(rng, captures)
-    if rng.random() < 0.4:
-        return levelled(sky(rng))
-    radiance = environment(int(rng.integers(4)), seed=int(rng.integers(2**31)), data=None)
-    return levelled(radiance(directions(ROWS)).astype(np.float32))
+    return procedural(rng)
+
+
+def procedural(
+    rng: np.random.Generator, kinds: tuple[Callable[[np.random.Generator], Radiance], ...] = _KINDS
+) -> Array:
+    """[ROWS, 2 ROWS, 3] float32: one of the kinds, each as likely; its mean luminance is 1."""
+    return levelled(kinds[rng.integers(len(kinds))](rng)(directions(ROWS)).astype(np.float32))
 
 
 def captured(rng: np.random.Generator, captures: tuple[Path, ...]) -> Array:
@@ -223,36 +227,3 @@ def levelled(envmap: Array) -> Array:
     rows = np.sin((np.arange(len(envmap)) + 0.5) / len(envmap) * np.pi)
     mean = float((luminance(envmap).mean(1) * rows).sum() / rows.sum())
     return (envmap / max(mean, 1e-9)).astype(np.float32)
-
-
-def sky(rng: np.random.Generator) -> Array:
-    """[ROWS, 2 ROWS, 3]: clear, cloudy, overcast or dusk, with or without a sun, over ground."""
-    d = directions(ROWS)
-    y, up = d[..., 1:2], np.clip(d[..., 1:2], 0, 1)
-    elevation = np.radians(rng.uniform(4, 70))
-    low = np.clip(1 - elevation / 0.6, 0, 1)
-    away = np.arccos(np.clip(d @ _axis(rng.uniform(-np.pi, np.pi), elevation), -1, 1))[..., None]
-    zenith = np.array([0.18, 0.36, 0.85]) * rng.uniform(0.7, 1.2) * (1 - 0.5 * low)
-    horizon = np.array([0.75, 0.85, 1.0]) * (1 - low) + np.array([1.0, 0.75, 0.5]) * low
-    halo = np.array([1.0, 0.8, 0.55]) * np.exp(-away / rng.uniform(0.1, 0.5)) * rng.uniform(0.2, 1.5)
-    clear = horizon + (zenith - horizon) * up ** rng.uniform(0.35, 0.7) + halo
-    cover = rng.choice([0.0, rng.uniform(0.2, 0.7), 1.0], p=[0.3, 0.4, 0.3])
-    cloud = _clouds(rng, d, cover)
-    total = clear * (1 - cloud) + rng.uniform(0.6, 1.3) * (0.6 + 0.5 * up) * cloud
-    ground = np.array([0.35, 0.3, 0.22]) * rng.uniform(0.2, 1.0) * rng.uniform(0.8, 1.2, 3)
-    total = np.where(y < 0, ground * (0.6 + 0.4 * np.clip(1 + y, 0, 1)), total)
-    if cover < 1 and rng.random() < 0.85:
-        colour = np.array([1.0, 0.93, 0.8]) * (1 - low) + np.array([1.0, 0.55, 0.25]) * low
-        radius = np.radians(rng.uniform(0.6, 2.0))
-        power = rng.uniform(1.0, 5.0) * (1 - 0.7 * low)  # irradiance, where the sky gives about 2
-        total = total + np.clip((radius + 0.005 - away) / 0.01, 0, 1) * colour * power / (np.pi * radius**2)
-    return np.maximum(total, 0).astype(np.float32)
-
-
-def _clouds(rng: np.random.Generator, d: Array, cover: float) -> Array:
-    """[h, w, 1] opacity of clouds on a plane overhead, for directions d [h, w, 3]."""
-    if cover in (0.0, 1.0):
-        return np.full((*d.shape[:2], 1), cover)
-    plane = d / np.maximum(d[..., 1:2], 0.08)
-    field = sum(lumps(rng, 1.0 / 2**k, 0.25 * 2**k, 8)(plane) for k in range(4))
-    return np.clip((field / 0.9 + 2 * cover - 1) * 2, 0, 1)[..., None] * np.clip(d[..., 1:2] / 0.1, 0, 1)

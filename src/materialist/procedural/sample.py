@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance
-from materialist.errors import InputError
 from materialist.procedural import outdoors, packing, rooms
+from materialist.procedural.options import SPLITS, DataSetOptions
 from materialist.procedural.world import World
 from materialist.render.denoise import denoise
 from materialist.types import Array, Camera
@@ -20,82 +17,16 @@ PROBE = 4
 """Label rays a pixel and axis."""
 ATTEMPTS = 6
 """Cameras that see too little are thrown away at most that often."""
-_KINDS: tuple[tuple[str, Callable[..., World], float], ...] = (
-    ("room", rooms.room, 0.45),
-    ("table", rooms.table_top, 0.175),
-    ("still-life", outdoors.still_life, 0.15),
-    ("outdoor", outdoors.outdoor, 0.225),
-)
-"""Name, maker and share of a set."""
-KINDS = tuple(name for name, *_ in _KINDS)
-SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
-"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
+MAKERS: dict[str, tuple[Callable[..., World], float]] = {
+    "room": (rooms.room, 0.45),
+    "table": (rooms.table_top, 0.175),
+    "still-life": (outdoors.still_life, 0.15),
+    "outdoor": (outdoors.outdoor, 0.225),
+}
+"""Kind of scene -> its maker, and its share of a set."""
 
 
-HELD_OUT = frozenset((
-    "binoculars", "capsule", "fandisk", "lightbulb", "spot_cow", "train",
-    "aristea_wreck_puresky", "brown_photostudio_06", "dikhololo_night", "kiara_dawn", "museum", "st_fagans_interior",
-    "venice_sunset",
-))  # fmt: skip
-"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """What decides, with the number of a sample, what it shows.
-
-    Raises InputError for values or folders that cannot be used.
-    """
-
-    size: int = 256
-    """Pixels on a side."""
-    seed: int = 0
-    spp: int = 16
-    """Samples per pixel before denoising."""
-    split: str = "train"
-    meshes: Path | None = None
-    """Folder with .ply files."""
-    envmaps: Path | None = None
-    """Folder with .exr files."""
-    device: str = "auto"
-    only: str = ""
-    """One of KINDS, where all samples are to be of it."""
-
-    def __post_init__(self) -> None:
-        if not 32 <= self.size <= 2048 or self.size % 4:
-            raise InputError(f"The size is {self.size}; give 32 to 2048 pixels, a multiple of 4.")
-        if not 1 <= self.spp <= 4096:
-            raise InputError(f"spp is {self.spp}; give 1 to 4096 samples per pixel.")
-        if self.seed < 0:
-            raise InputError(f"The seed is {self.seed}; give 0 or more.")
-        if self.only and self.only not in KINDS:
-            raise InputError(f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none.")
-        if self.split not in SPLITS:
-            raise InputError(f"The split is {self.split!r}; choose one of {', '.join(SPLITS)}.")
-        _ = self.mesh_files, self.envmap_files  # which raise where a folder cannot be used
-
-    @cached_property
-    def mesh_files(self) -> tuple[Path, ...]:
-        """The meshes that the split may use, sorted by name."""
-        return self._files(self.meshes, ".ply")
-
-    @cached_property
-    def envmap_files(self) -> tuple[Path, ...]:
-        """The HDR captures that the split may use, sorted by name."""
-        return self._files(self.envmaps, ".exr")
-
-    def _files(self, folder: Path | None, ending: str) -> tuple[Path, ...]:
-        if folder is None:
-            return ()
-        if not Path(folder).is_dir():
-            raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
-        wanted = [p for p in Path(folder).rglob(f"*{ending}") if (p.stem in HELD_OUT) == (self.split == "heldout")]
-        if not wanted:
-            raise InputError(f"{folder} holds no {ending} file for the split {self.split!r}; give another or none.")
-        return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
-
-
-def make_sample(index: int, options: Options) -> dict[str, Array]:
+def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
     """The arrays of sample `index`, as they are stored (docs/training_data.md); the same for the same arguments.
 
     Raises SetupError where Mitsuba or the denoiser is missing.
@@ -109,14 +40,14 @@ def make_sample(index: int, options: Options) -> dict[str, Array]:
     return _developed(world, probe, tracer, rng, options)
 
 
-def make_world(rng: np.random.Generator, options: Options) -> World:
+def make_world(rng: np.random.Generator, options: DataSetOptions) -> World:
     """A random scene of the kinds' shares, or of the one kind that the options name."""
-    names, makers, shares = zip(*_KINDS)
-    weight = np.array([float(name == options.only) for name in names] if options.only else shares)
+    makers, shares = zip(*([MAKERS[options.only]] if options.only else MAKERS.values()))
+    weight = np.array(shares)
     return makers[rng.choice(len(makers), p=weight / weight.sum())](rng, options.mesh_files, options.envmap_files)
 
 
-def _look(world: World, rng: np.random.Generator, options: Options):
+def _look(world: World, rng: np.random.Generator, options: DataSetOptions):
     from materialist.procedural.tracer import SampleTracer
 
     camera = Camera(options.size, options.size, world.view.fov)
@@ -135,7 +66,7 @@ def worth_seeing(probe: dict[str, Array]) -> bool:
     return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
 
 
-def _developed(world: World, probe, tracer, rng: np.random.Generator, options: Options) -> dict[str, Array]:
+def _developed(world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions) -> dict[str, Array]:
     """Render, denoise, expose, quantise."""
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)

@@ -1,0 +1,70 @@
+"""What a data set holds: options of `materialist train data`; nothing slow is imported here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from materialist.errors import InputError
+from materialist.option_kinds import OperationOptions, option
+
+KINDS = ("room", "table", "still-life", "outdoor")
+"""Kinds of scenes."""
+SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
+"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
+HELD_OUT = frozenset((
+    "binoculars", "capsule", "fandisk", "lightbulb", "spot_cow", "train",
+    "aristea_wreck_puresky", "brown_photostudio_06", "dikhololo_night", "kiara_dawn", "museum", "st_fagans_interior",
+    "venice_sunset",
+))  # fmt: skip
+"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataSetOptions(OperationOptions):
+    """What decides, with the number of a sample, what it shows.
+
+    Raises InputError for values or folders that cannot be used.
+    """
+
+    operation = "The data set"
+
+    size: int = option(256, "Pixels on a side, a multiple of 4.", kind="whole", low=32, high=2048)
+    spp: int = option(16, "Samples per pixel, before denoising.", kind="whole", low=1, high=4096)
+    meshes: Path | None = option(None, "Folder of .ply meshes to use as well.", kind="file")
+    envmaps: Path | None = option(None, "Folder of .exr HDR captures to use as well.", kind="file")
+    split: str = option(
+        "train", "heldout uses only the files kept aside for testing.", kind="word", choices=tuple(SPLITS)
+    )
+    only: str = option("", f"Only one kind of scenes: {', '.join(KINDS)}.", kind="name", metavar="KIND")
+    seed: int = option(0, "Same seed, same samples.", kind="whole", low=0, flag=None)
+    device: str = option("auto", "Where it renders.", kind="word", choices=("auto", "cpu", "cuda"), flag=None)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.size % 4:
+            raise InputError(f"The size is {self.size}; give a multiple of 4.")
+        if self.only and self.only not in KINDS:
+            raise InputError(f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none.")
+        _ = self.mesh_files, self.envmap_files  # which raise where a folder cannot be used
+
+    @cached_property
+    def mesh_files(self) -> tuple[Path, ...]:
+        """The meshes that the split may use, sorted by name."""
+        return self._files(self.meshes, ".ply")
+
+    @cached_property
+    def envmap_files(self) -> tuple[Path, ...]:
+        """The HDR captures that the split may use, sorted by name."""
+        return self._files(self.envmaps, ".exr")
+
+    def _files(self, folder: Path | None, ending: str) -> tuple[Path, ...]:
+        if folder is None:
+            return ()
+        if not folder.is_dir():
+            raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
+        wanted = [p for p in folder.rglob(f"*{ending}") if (p.stem in HELD_OUT) == (self.split == "heldout")]
+        if not wanted:
+            raise InputError(f"{folder} holds no {ending} file for the split {self.split!r}; give another or none.")
+        return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
