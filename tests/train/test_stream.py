@@ -2,15 +2,12 @@
 
 import made_runs
 import made_samples
-import numpy as np
 import pytest
 import torch
 
 from materialist.errors import InputError
 from materialist.io.samples import SampleFolder
-from materialist.predict.bundled.network import srgb
 from materialist.train import maps
-from materialist.train.bundled import relative_log_depth
 from materialist.train.stream import epoch
 
 ARGS = {"number": 1, "side": 32, "seed": 0}
@@ -75,11 +72,3 @@ def test_scores_say_what_they_are_of(tmp_path):
     assert made_runs.bundled(enough, samples=1).scores(network, tmp_path)["of"] == maps.HELD_OUT
     with pytest.raises(InputError, match="--score-samples is -1"):
         made_runs.bundled(enough, samples=-1)
-
-
-def test_targets_of_the_bundled_network():
-    values = torch.tensor([0.0, 0.002, 0.18, 1.0])
-    np.testing.assert_allclose(srgb(values), [0, 0.02584, 0.46135, 1], atol=1e-4)
-    depth = torch.tensor([1.0, 2.0, 4.0, 0.0]).view(1, 1, 2, 2)
-    found = relative_log_depth(depth, (depth > 0).float()).flatten()
-    np.testing.assert_allclose(found, [-np.log(2), 0, np.log(2), 0], atol=1e-6)

@@ -2,7 +2,6 @@
 
 import cv2
 import numpy as np
-import pytest
 
 from materialist.predict.bundled.edges import Guide, weighted_median
 
@@ -63,11 +62,3 @@ def test_a_slanted_plane_stays():
     rows = np.mgrid[:40, :60][0].astype(np.float32)
     inner = (slice(12, -12), slice(12, -12))
     np.testing.assert_allclose(weighted_median(rows, Guide(photo, radius=6))[inner], rows[inner], atol=0.5)
-
-
-@pytest.mark.parametrize("level", [0.0, 3.5])
-def test_a_constant_is_kept(level):
-    photo, side = two_sides()
-    np.testing.assert_array_equal(
-        weighted_median(np.full(side.shape, level, np.float32), Guide(photo, radius=4)), level
-    )

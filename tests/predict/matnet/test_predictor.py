@@ -89,11 +89,6 @@ def test_missing_extra_and_misshapen_tensors_are_named(tmp_path, state):
     refused(saved(tmp_path / "none.pth", {"a": bias}), "Missing", "Unexpected")
 
 
-def test_broken_numbers_are_refused(tmp_path, state):
-    state["pretrained.norm.bias"][3] = float("nan")
-    refused(saved(tmp_path / "nan.pth", state), "NaN", "pretrained.norm.bias")
-
-
 def test_what_is_no_checkpoint_is_refused(tmp_path, state):
     whole = saved(tmp_path / "w.pth", state).read_bytes()
     for name, content in {
@@ -165,11 +160,11 @@ def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     """SiLog makes the output depth; the published weights' output falls with distance, and is turned round."""
     photo = made_photo(42, 56)
     write_weights(tmp_path / "own.safetensors", state, {"format": FORMAT})
-    published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu")
+    published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu", input_size=28)
     output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
-    own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu").predict(photo).depth
+    own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu", input_size=28).predict(photo).depth
     np.testing.assert_allclose(own, np.maximum(output, 1e-3), rtol=1e-2, atol=1e-2 * output.max())
 
 

@@ -8,7 +8,7 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
 from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction import WEIGHTS, best_thickness, thickness
-from materialist.predict.refraction.crop import BACK_X, CHANNELS, MARGIN, MASK, MIRROR, SIDE, Window, features
+from materialist.predict.refraction.crop import BACK_X, CHANNELS, MASK, MIRROR, SIDE, Window
 from materialist.predict.refraction.network import LEAST, RefractionNet
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
@@ -65,38 +65,6 @@ def test_thickness_is_in_scene_units(plain):
     photo, mask, normal, depth, _ = ball(camera)
     one, ten = (thickness(photo, mask, normal, s * depth, camera, weights=plain).solid for s in (1, 10))
     np.testing.assert_allclose(ten, 10 * one, rtol=1e-3, atol=1e-4)
-
-
-def test_features_do_not_depend_on_place_or_scale():
-    views = []
-    for centre, fov in (((0.0, 0, -3), 45), ((0.0, 0, -3), 60)):
-        camera = Camera(200, 200, fov)
-        photo, mask, normal, depth, _ = ball(camera, centre)
-        window = Window.around(mask)
-        views.append(features(window.cut(photo, mask, normal, depth, pixel_rays(camera))))
-    a, b = views
-    assert a.shape == (CHANNELS, SIDE, SIDE)
-    both = (a[MASK] > 0) & (b[MASK] > 0)
-    assert both.mean() > 0.5 and np.mean(a[MASK] != b[MASK]) < 0.06
-    inner = both & (a[7] > 0.4)
-    for channel in range(3, CHANNELS):
-        np.testing.assert_allclose(a[channel][inner].mean(), b[channel][inner].mean(), atol=0.09)
-    assert np.abs(a[3] + a[3][:, ::-1])[both & both[:, ::-1]].mean() < 0.03  # straight ahead: x is odd
-
-
-def test_windows_frame_small_objects_as_they_frame_large_ones():
-    """A disc of any size takes the same part of the window, to a pixel of the picture, and stands in its middle."""
-    for radius in (6.3, 14.2, 31.7, 80.4):
-        y, x = np.mgrid[:200, :240] - np.array([97.3, 121.8])[:, None, None]
-        inside = np.hypot(x, y) < radius
-        maps = np.ones((*inside.shape, 3), np.float32)
-        window = Window.around(inside)
-        view = window.cut(maps, inside, maps, maps[..., 0], pixel_rays(Camera(240, 200, 40)))
-        wide, tall = view.inside.any(0).sum(), view.inside.any(1).sum()
-        assert max(wide, tall) == pytest.approx(SIDE / (1 + 2 * MARGIN), abs=1.01)
-        rows, columns = np.nonzero(view.inside)
-        pixel = SIDE / window.side  # of the picture, in those of the window
-        assert max(abs(rows.mean() - (SIDE - 1) / 2), abs(columns.mean() - (SIDE - 1) / 2)) < 0.5 + 0.5 * pixel
 
 
 def test_windows_reach_over_the_border_and_come_back():
