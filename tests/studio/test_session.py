@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from studio_scenes import block, click, room
+from studio_scenes import block, click, named, room
 
-from materialist.edits.recipe import apply, read_recipe
+from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.studio.controls import control_values
+from materialist.studio.edit_list import EditList
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -132,17 +133,14 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
 
 
 def test_each_change_of_light_is_taken_back_alone(session):
-    before = len(session._past)
     for x in (10, 25, 40):
         place_lamp(session, x, 40)
-    assert len(session._past) == before + 3
     session.undo()
     assert len(session.edits.steps[0].options["lamps"]) == 2
     for name in ("a.exr", "b.exr"):
         write_exr(session.workspace / name, np.ones((32, 64, 3), np.float32))
-    for envmap in ("a.exr", "b.exr", "b.exr"):
+    for envmap in ("a.exr", "b.exr", "b.exr"):  # the same again changes nothing
         session.light(envmap=envmap, gain="auto")
-    assert len(session._past) == before + 4  # the same again changes nothing
     session.undo()
     assert session.edits.steps[0].options["envmap"] == "a.exr"
 
@@ -152,15 +150,14 @@ def test_a_colour_is_dragged_and_a_texture_is_not(session):
         write_png_bytes(session.workspace / name, np.full((8, 8, 3), 90, np.uint8))
     click(session)
     session.set("edit", hue="10")
-    before = len(session._past)
     for colour in ("#101010", "#202020", "#303030"):
         session.set("edit", texture=None, albedo=colour)
-    assert len(session._past) == before + 1
     for texture in ("a.png", "b.png"):
         session.set("edit", albedo=None, texture=texture)
-    assert len(session._past) == before + 3 and "albedo" not in session.edits.steps[0].options
-    session.undo()
-    assert session.edits.steps[0].options["texture"] == "a.png"
+    for left in ({"texture": "a.png"}, {"albedo": "#303030"}, {}):
+        session.undo()
+        options = session.edits.steps[0].options
+        assert {name: options[name] for name in ("texture", "albedo") if name in options} == left
 
 
 def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session):
@@ -176,3 +173,69 @@ def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session)
             act()
         assert session.edits == stack and session._past == past
     assert "rotate" in (session.workspace / "edits.yaml").read_text()
+
+
+def loaded(session, folder, text):
+    """The session with a list of edits from a file."""
+    file = folder / "edits.yaml"
+    file.write_text(text)
+    session.read_edits(file)
+    return session
+
+
+@pytest.mark.parametrize("where", ["box: [12, 12, 40, 36]", "click: [25, 24], with: grabcut"])
+def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
+    loaded(session, tmp_path, f"- edit: {{{where}, hue: 50}}")
+    session.act("choose", 0)
+    assert (session.selection.mask & block()).sum() > 0.8 * block().sum()
+    click(session, 50, 40, "add")
+    (step,) = read_recipe(session.workspace / "edits.yaml")
+    assert set(step.options) == {"mask", "hue"}
+    changed = (apply(room(), [step]).materials.albedo != room().materials.albedo).any(-1)
+    assert np.array_equal(changed, session.selection.mask) and changed[40, 50]
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [("edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 5}", "exactly one"), ("relight: {rotate: abc}", "rotate"),
+     ("relight: {lamps: [[a, b, 1, 2700, 1]]}", "lamp"), ("insert: {mesh: thing-cube.ply}", "at")],
+)  # fmt: skip
+def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, words):
+    (session.workspace / "thing-cube.ply").touch()
+    (session.workspace / "edits.yaml").write_text(f"- edit: {{click: [25, 24], hue: 50}}\n- {bad}\n")
+    other = Session("me")
+    other.open(session.project)
+    other.live.wait()
+    shown = named().everything(other)
+    assert len(shown["steps"]) == 2 and shown["stage"]["picture"] and shown["stage"]["bad"]
+    assert words in shown["stage"]["badge"] and shown["steps"][1]["text"] in shown["stage"]["badge"]
+    other.act("remove", 1)
+    assert stage(other)["badge"] == "Live preview" and not stage(other)["bad"]
+    other.close()
+    (session.workspace / "thing-cube.ply").unlink()
+
+
+A, B, C = (
+    Step("edit", {"mask": "mask-1.png", "hue": "20"}),
+    Step("relight", {"rotate": "90"}),
+    Step("edit", {"hue": "1"}),
+)
+
+
+def test_add_move_toggle_remove():
+    edits = EditList().add(A).add(B).add(C)
+    assert edits.current == 2 and edits.steps == (A, B, C)
+    assert edits.moved(2, -1).steps == (A, C, B) and edits.moved(2, -1).current == 1
+    assert edits.moved(0, -1) is edits and edits.moved(2, 1) is edits
+    off = edits.toggled(1)
+    assert off.active == (A, C) and off.steps[1].skipped and off.toggled(1).steps == edits.steps
+    assert edits.without(0).steps == (B, C) and edits.without(0).current is None
+    assert edits.current_step == C and edits.without(0).current is None
+
+
+def test_ticking_and_moving_leave_the_current_one():
+    edits = EditList((A, B, C), 2)
+    assert edits.toggled(0).current == 2 and edits.toggled(0).toggled(0).current == 2
+    assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
+    assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
+    assert EditList((A, B, C)).moved(0, 1).current is None and EditList((A, B, C)).toggled(1).current is None
