@@ -66,16 +66,13 @@ def let_fall(session: Session, height: float) -> list[str]:
         if index is None or session.live is None:
             raise InputError("Place an object first; it falls where it stands.")
         known = session.live.edited(session.edits.active).report.warnings
-        after = session.edits.put(index, fallen(session.edits.steps[index], height, session.falls))
+        step = session.edits.steps[index]
+        kept = {name: value for name, value in step.options.items() if name in {*STEPS["drop"], "skip"}}
+        options = {**kept, "height": f"{height:.3g}", "seed": str(session.falls)}
+        after = session.edits.put(index, replace(step, kind="drop", options=options))
         session.falls += 1
         session.change("fall", after)
         return [note for note in session.live.edited(after.active).report.warnings if note not in known]
-
-
-def fallen(step: Step, height: float, seed: int) -> Step:
-    """The `drop` that takes the place of an `insert` or an earlier `drop`."""
-    kept = {name: value for name, value in step.options.items() if name in {*STEPS["drop"], "skip"}}
-    return replace(step, kind="drop", options={**kept, "height": f"{height:.3g}", "seed": str(seed)})
 
 
 def file_of(name: str) -> str:
@@ -89,20 +86,15 @@ def library_name(file: Any) -> str | None:
 
 
 def library_file(session: Session, name: str) -> str:
-    """A computed mesh as a file in the workspace, +Y up."""
-    file = session.workspace / file_of(name)
-    if not file.is_file():
-        shape(name).export(file)
-    return file.name
-
-
-def shape(name: str) -> Any:
-    """One of the library as a trimesh, +Y up, longest side 1."""
+    """A computed mesh as a file in the workspace: +Y up, longest side 1."""
     import numpy as np
     from trimesh import creation, transformations
 
-    maker, options = _SHAPES[name]
-    mesh = getattr(creation, maker)(**options)
-    # trimesh builds along +Z; a ring lies flat as it is.
-    mesh.apply_transform(transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
-    return mesh
+    file = session.workspace / file_of(name)
+    if not file.is_file():
+        maker, options = _SHAPES[name]
+        mesh = getattr(creation, maker)(**options)
+        # trimesh builds along +Z; a ring lies flat as it is.
+        mesh.apply_transform(transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
+        mesh.export(file)
+    return file.name

@@ -113,10 +113,13 @@ def _wire(context: PageContext) -> None:
         context[name].change(None, context[name], None, js=script, api_visibility="private")
 
     @handler
-    def pick(sam: bool, event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
+    def pick(
+        sam: bool, kelvin: float, power: float, before: float, event: gr.EventData, request: gr.Request
+    ) -> dict[Any, Any]:
         session, wanted = context.session(request), read_pick(event._data)
         if wanted["tool"] == "lamp":
-            tab_light.place_lamp(session, *wanted["at"])
+            x, y = wanted["at"]
+            tab_light.place_lamp(session, x, y, kelvin, power, before)
         elif wanted["tool"] == "place":
             objects.place(session, *wanted["at"])
         else:
@@ -131,7 +134,8 @@ def _wire(context: PageContext) -> None:
         return {**context.everything(session), **(_turned_to(context, session) if what == "choose" else {})}
 
     every = {**LIVE, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
-    context["stage"].pick(pick, context["sam"], context.all_parts, **every)
+    settings = [context[name] for name in ("sam", "kelvin", "power", "before")]
+    context["stage"].pick(pick, settings, context.all_parts, **every)
     context["steps"].act(act, None, [*context.all_parts, context["tabs"], context["glass_part"]], **every)
     context.on(context["undo"].click, _undo, everything=True, trigger_mode="multiple")
     context.on(context["deselect"].click, Session.deselect, everything=True, trigger_mode="once")

@@ -58,8 +58,6 @@ class Session:
         """Options of the next object that is placed."""
         self.falls = 0
         """How many falls were begun here: each tumbles in its own way."""
-        self.lamp = (2700.0, 1.0, 0.75)
-        """Kelvin, power, and the share of the way to the surface, of the next lamp."""
         self.edits = EditList()
         self._past: list[tuple[str, EditList, Selection]] = []
         self.running: list[Job] = []

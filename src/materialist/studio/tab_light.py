@@ -63,19 +63,12 @@ def wire(context: PageContext) -> None:
             session.light(envmap=_written(session, lights.names()[int(event.index) - 1]), gain="auto")
         return context.picture(session)
 
-    @handler
-    def lamp_settings(kelvin: float, power: float, before: float, request: gr.Request) -> None:
-        context.session(request).lamp = (float(kelvin), float(power), float(before))
-
     parts["lights"].select(choose, None, context.picture_parts, **LIVE)
     context.on_upload("own_map", _uploaded)
     context.bind("rotate", "ambient")
     sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]
     for part in sunny:
         context.on(part.input, _sun, sunny)
-    lamp = [parts[name] for name in ("kelvin", "power", "before")]
-    for part in lamp:
-        part.input(lamp_settings, lamp, None, **LIVE)
     context.on(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
 
 
@@ -89,9 +82,10 @@ def _uploaded(session: Session, file: Path) -> None:
     session.light(envmap=store(session.workspace, file, "light", suffix), gain="auto")
 
 
-def place_lamp(session: Session, x: float, y: float) -> None:
-    """Hang a lamp before the surface at a pixel. Raises InputError where there is none."""
-    kelvin, power, before = session.lamp
+def place_lamp(
+    session: Session, x: float, y: float, kelvin: float = 2700, power: float = 1, before: float = SETTINGS.lamp_share
+) -> None:
+    """Hang a lamp before the surface at a pixel, `before` its share of the way. Raises InputError without a surface."""
     depth = float(session.scene.depth[int(y), int(x)])
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
