@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.edits.composite.into_photo import into_photo, onto_working
+from materialist.edits.composite.into_photo import onto_working
 from materialist.edits.composite.layers import Layers, changed_pixels
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
@@ -65,31 +65,19 @@ class Preview:
 
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
-        self._check(edited)
+        if edited.geometry is not self.scene.geometry:
+            raise InputError("The preview was built for another geometry; build one for this scene.")
         edited = self._seen(edited)
         fitted = np.array_equal(edited.envmap, self.scene.envmap)
         shaded = self._shaded(edited.materials, self._tables) if fitted else self._relit(edited)
         return self._image(shaded, self._sky(edited.envmap))
 
-    def layers(self, edited: Scene) -> Layers:
-        """What `composite.into_photo` needs, from the cache."""
-        picture = self.render(edited)
-        base = self._base
-        relit = is_relit(self.scene, edited)
+    def picture(self, edited: Scene) -> Array:
+        """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
+        picture, base = self.render(edited), self._base
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
-        return Layers(base, picture, differs, changed, relit)
-
-    def picture(self, edited: Scene, *, quick: bool = False) -> Array:
-        """[H, W, 3] float32 linear: the edit in the photo, working size; `quick` without soft borders, much sooner."""
-        if quick:
-            return onto_working(self.scene.photo, self.layers(edited))
-        photo = replace(self.scene.photo, original=self.scene.photo.linear)
-        return into_photo(photo, self.layers(edited))
-
-    def _check(self, edited: Scene) -> None:
-        if edited.geometry is not self.scene.geometry:
-            raise InputError("The preview was built for another geometry; build one for this scene.")
+        return onto_working(self.scene.photo, Layers(base, picture, differs, changed, is_relit(self.scene, edited)))
 
     def _seen(self, edited: Scene) -> Scene:
         """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""

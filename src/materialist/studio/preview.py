@@ -89,7 +89,7 @@ class LivePreview:
         shaded = edited
         if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
             shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
-        picture = _THREAD.submit(preview.picture, shaded, quick=True).result()
+        picture = _THREAD.submit(preview.picture, shaded).result()
         if edited.photo is not self.scene.photo:
             filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
             picture = np.where(filled, edited.photo.linear, picture)
