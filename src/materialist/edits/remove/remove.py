@@ -13,7 +13,7 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import given_picture, matched, with_picture
 from materialist.edits.remove.behind import Behind, behind
 from materialist.edits.remove.filling import find_filling
-from materialist.edits.remove.hole import Hole, make_hole
+from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.native import with_hole
 from materialist.options import Removal
 from materialist.types import Array, Geometry, Scene
@@ -63,18 +63,9 @@ def remove(
     how = "background" if options.background is not None else ("inpainter" if options.inpaint else "patches")
     what = {
         "filled_by": how, "pixels": int(hole.object.sum()), "grow": options.grow,
-        "shadow": "auto" if options.shadow is None else options.shadow, "at": _middle(hole),
+        "shadow": "auto" if options.shadow is None else options.shadow,
     }  # fmt: skip
     return noted(warned(removed, *warnings), "remove", what)
-
-
-def _middle(hole: Hole) -> list[int]:
-    """[x, y] a pixel of the hole, as far from its border as there is one: it tells this hole from others."""
-    from scipy.ndimage import distance_transform_edt
-
-    far = distance_transform_edt(np.pad(hole.painted, 1))[1:-1, 1:-1]
-    y, x = np.unravel_index(int(far.argmax()), far.shape)
-    return [int(x), int(y)]
 
 
 def _geometry(scene: Scene, found: Behind) -> Geometry:
