@@ -56,6 +56,26 @@ def test_the_same_seed_gives_the_same_sources_and_nothing_to_copy_gives_none():
     assert patch_sources(picture, hole, np.zeros_like(hole), one) is None
 
 
+def test_a_slanting_border_of_surfaces_stays_where_it_is():
+    """A patch across the border is only right where both have it in the same place."""
+    rows, columns = np.indices((72, 96))
+    label = (rows > 40 - columns / 12).astype(int)
+    wall = np.where(((rows + columns) % 10 < 4)[..., None], [0.3, 0.4, 0.6], [0.7, 0.7, 0.9])
+    hole = (np.abs(columns - 46) < 0.45 * (rows - 10)) & (rows < 62)
+    strange = []
+    for seed in range(4):  # the search is by chance
+        rng = np.random.default_rng(seed)
+        dots = np.zeros((72, 96), bool)
+        dots[rng.integers(44, 72, 60), rng.integers(0, 96, 60)] = True
+        floor = np.where(dots[..., None], [0.9, 0.9, 0.3], [0.4, 0.05, 0.1])
+        picture = np.where(label[..., None] == 1, floor, wall).astype(np.float32)
+        source = patch_sources(np.where(hole[..., None], 0.5, picture), hole, ~hole, label, seed=seed)
+        blue = copied(picture, source)[..., 2]
+        # The wall's paler blue on the floor, the floor's red on the wall.
+        strange.append(((label == 1) & (blue > 0.55) | (label == 0) & (blue < 0.3))[hole].mean())
+    assert np.mean(strange) < 0.0018 and max(strange) < 0.003, strange
+
+
 @pytest.mark.parametrize("width", [1, 4])
 def test_a_thin_hole_is_filled(width, left=201):
     """A pole is none at a quarter of the size."""

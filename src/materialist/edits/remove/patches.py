@@ -26,7 +26,6 @@ class PatchSettings:
     rounds: tuple[int, ...] = (6, 5, 4, 3, 2)  # of matching and averaging, coarsest size first; the last one goes on
     other: float = 0.1  # squared sRGB a pixel that a patch of another surface costs; as much again if all of it is
     far: float = 0.004  # cost of a patch from as far as the picture is long; more: perspective is kept
-    decay: float = 0.9  # a hidden pixel counts by this power of its distance to what is known
     mixed: float = 1e-4  # weight in a mean of what a patch shows of another surface
 
 
@@ -91,7 +90,6 @@ class _Level:
 
     def __init__(self, features: Array, hole: Array, usable: Array, label: Array, factor: int, settings: PatchSettings):
         import cv2
-        from scipy.ndimage import distance_transform_edt
 
         known = _shrunk((~hole)[..., None], factor)[..., 0]
         self.hole, self.settings = known < 0.5, settings
@@ -102,8 +100,6 @@ class _Level:
             np.minimum(np.arange(n) * factor + factor // 2, m - 1) for n, m in zip((height, width), hole.shape)
         )
         self.surface = label[rows[:, None], columns].ravel()
-        away = distance_transform_edt(self.hole)
-        self.trust = np.maximum(settings.decay**away, 0.02).astype(np.float32).ravel()
         # At the rim of the picture no patch fits around a pixel; those further in speak for it.
         r = min(settings.radius, (min(height, width) - 1) // 4)
         inside = np.zeros(self.hole.shape, bool)
@@ -125,28 +121,26 @@ class _Level:
         if start is not None:
             begun = start.ravel()[self.targets]
             best = np.where(self.whole[begun], begun, best)
-            filled = self._averaged(best, np.ones(len(best), np.float32))
+            filled = self._averaged(best)
         for _ in range(rounds):
-            best, cost = self._searched(filled, best, rng)
-            spread = max(float(np.quantile(cost, 0.75)), 1e-8)
-            filled = self._averaged(best, np.exp(-cost / spread))
+            best = self._searched(filled, best, rng)
+            filled = self._averaged(best)
         source = np.full(self.hole.shape, -1)
         source.ravel()[self.targets] = best
         return source
 
     def _cost(self, filled: Array, source: Array) -> Array:
-        """[P] weighted mean square difference of patches, with the prices of other surfaces and distance."""
+        """[P] mean square difference of patches, with the prices of other surfaces and distance."""
         here, there = self.targets[:, None] + self.around, source[:, None] + self.around
-        trust = self.trust[here]
-        square = ((filled[here] - filled[there]) ** 2).mean(-1)
+        square = ((filled[here] - filled[there]) ** 2).mean((-2, -1))
         (y, x), (row, column) = (np.divmod(v, self.hole.shape[1]) for v in (self.targets, source))
         far = np.hypot(row - y, column - x).astype(np.float32) / max(self.hole.shape)
         strange = self.surface[here] != self.surface[there]
         other = strange.mean(-1, dtype=np.float32) + strange[:, strange.shape[1] // 2]
-        return (square * trust).sum(-1) / trust.sum(-1) + self.settings.far * far + self.settings.other * other
+        return square + self.settings.far * far + self.settings.other * other
 
-    def _searched(self, filled: Array, best: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Sources and costs after what neighbours found, moved along, and places near the best, ever nearer."""
+    def _searched(self, filled: Array, best: Array, rng: np.random.Generator) -> Array:
+        """[P] sources after what neighbours found, moved along, and places near the best, ever nearer."""
         height, width = self.hole.shape
         cost = self._cost(filled, best)
 
@@ -157,27 +151,25 @@ class _Level:
             wins = new < cost
             best[wins], cost[wins] = tried[wins], new[wins]
 
-        for step in (2, 1):
-            for shift in (step, -step, step * width, -step * width):
-                other = self.index[np.clip(self.targets + shift, 0, self.index.size - 1)]
-                improved(np.where(other >= 0, best[other] - shift, best))
+        for shift in (1, -1, width, -width):
+            other = self.index[np.clip(self.targets + shift, 0, self.index.size - 1)]
+            improved(np.where(other >= 0, best[other] - shift, best))
         reach = max(height, width) / 2
         while reach >= 1:
             down, right = np.round(rng.uniform(-reach, reach, (2, len(best)))).astype(np.int64)
             row, column = np.divmod(best, width)
             improved(np.clip(row + down, 0, height - 1) * width + np.clip(column + right, 0, width - 1))
             reach /= 3
-        return best, cost
+        return best
 
-    def _averaged(self, best: Array, weight: Array) -> Array:
+    def _averaged(self, best: Array) -> Array:
         """[h * w, F] the features, in the hole the mean of what the patches over a pixel say."""
         total, norm = np.zeros_like(self.features), np.zeros((len(self.features), 1), np.float32)
         for offset in self.around:  # no two patches have one middle, so that this sum meets no place twice
             here, there = self.targets + offset, best + offset
-            own = self.surface[here] == self.surface[there]
-            part = (weight * np.where(own, 1, self.settings.mixed))[:, None].astype(np.float32)
-            total[here] += part * self.features[there]
-            norm[here] += part
+            weight = np.where(self.surface[here] == self.surface[there], 1, self.settings.mixed)[:, None]
+            total[here] += weight * self.features[there]
+            norm[here] += weight
         return np.where(self.hole.reshape(-1, 1) & (norm > 0), total / np.maximum(norm, 1e-12), self.features)
 
 
