@@ -6,7 +6,7 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.io.datasets import InteriorVerse, open_source, open_sources
+from materialist.io.datasets import InteriorVerse, open_sources
 from materialist.io.exr import write_exr
 from materialist.types import Camera
 
@@ -42,7 +42,7 @@ def _write(scene, name):
 
 
 def test_the_layout_in_our_conventions(folder):
-    source = open_source(folder, split="train")
+    source = open_sources([folder])
     assert isinstance(source, InteriorVerse) and len(source) == 4
     assert source.missing == ["dataset_85/LOST", "dataset_120/LOST"]
     sample = source.read(0)

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.io.datasets import open_source, open_sources
+from materialist.io.datasets import open_sources
 from materialist.io.samples import SampleFolder, read_sample
 
 
 def test_a_sample_in_our_conventions(tmp_path):
-    sample = open_source(made_samples.write_set(tmp_path)).read(1)
+    sample = open_sources([made_samples.write_set(tmp_path)]).read(1)
     surface = sample.mask > 0
     assert sample.image.shape == (48, 64, 3) and sample.depth.dtype == np.float32
     assert 0.3 < surface.mean() < 1, "the made scene has ground and sky"
@@ -39,7 +39,7 @@ def test_several_sets_are_one(tmp_path):
     source = open_sources(folders)
     assert len(source) == 5
     assert [source.number(k) for k in range(5)] == [0, 1, 0, 1, 2]
-    np.testing.assert_array_equal(source.read(4).albedo, open_source(folders[1]).read(2).albedo)
+    np.testing.assert_array_equal(source.read(4).albedo, open_sources([folders[1]]).read(2).albedo)
     made_samples.write_set(tmp_path / "a", 4)
     source.refresh()
     assert [source.number(k) for k in range(len(source))] == [0, 1, 2, 3, 0, 1, 2]
@@ -50,12 +50,12 @@ def test_several_sets_are_one(tmp_path):
 
 def test_bad_sets_are_named(tmp_path):
     with pytest.raises(InputError, match="no data folder"):
-        open_source(tmp_path / "nowhere")
+        open_sources([tmp_path / "nowhere"])
     with pytest.raises(InputError, match="neither 'samples'"):
-        open_source(tmp_path)
+        open_sources([tmp_path])
     (tmp_path / "samples").mkdir()
     with pytest.raises(InputError, match="no samples yet"):
-        open_source(tmp_path)
+        open_sources([tmp_path])
 
 
 def test_damaged_samples_are_named(tmp_path):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.io.datasets import open_source
+from materialist.io.datasets import open_sources
 from materialist.predict.bundled.network import BundledArchitecture
 from materialist.predict.network import UNetArchitecture
 from materialist.train.bundled import RECIPE, BundledTask
@@ -23,7 +23,7 @@ WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 def bundled(data: Path, *, samples=0, architecture=NETWORK, **changes) -> BundledTask:
     """The bundled network's task, a thousand times smaller than the real one."""
     recipe = RECIPE.changed(**(SMALL | changes))
-    return BundledTask(open_source(data), recipe, score_samples=samples, architecture=architecture)
+    return BundledTask(open_sources([Path(data)]), recipe, score_samples=samples, architecture=architecture)
 
 
 def clicks(views: Path, **changes) -> ClickTask:

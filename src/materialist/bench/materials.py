@@ -95,11 +95,11 @@ class MaterialsBench(Benchmark):
             for folder in _spread(folders, self.limit):
                 yield folder.name, *_read_folder(folder)
             return
-        from materialist.io.datasets import InteriorVerse, open_source
+        from materialist.io.datasets import InteriorVerse, open_sources
         from materialist.io.samples import SampleFolder
         from materialist.procedural.photographic import as_photo
 
-        source = open_source(data, split=self.split)
+        source = open_sources([data], split=self.split)
         if isinstance(source, InteriorVerse):
             report.settings["left out"] = " ".join(source.notes()) or None
         for index in _spread(list(range(len(source))), self.limit):

@@ -38,32 +38,23 @@ WHITE = 0.9
 MAPS = ("im", "albedo", "material", "depth", "normal")
 
 
-def open_source(folder: str | Path, *, split: str = "train") -> Source:
-    """The data set in `folder`: procedural samples, or InteriorVerse in its published layout.
+def open_sources(folders: Sequence[Path], *, split: str = "train") -> Source:
+    """The data set in folders: a split of InteriorVerse in one, or the procedural sets of one or several.
 
-    `split` is that of InteriorVerse: 'train', 'val' or 'test'. Raises InputError when it is neither, or is empty.
+    Raises InputError for a folder that is missing, is neither or is empty, and for an InteriorVerse among several.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError(f"There is no data folder {folder}; make one with: materialist train data -o {folder}.")
-    if (folder / "samples").is_dir():
-        return SampleFolder(folder)
-    if is_interiorverse(folder):
-        return InteriorVerse(folder, split)
-    raise InputError(
-        f"{folder} holds neither 'samples' (materialist train data) nor InteriorVerse scenes; check the path."
-    )
-
-
-def open_sources(folders: Sequence[Path]) -> Source:
-    """The data set in one folder, or the procedural sets of several as one. Raises InputError, also for an
-    InteriorVerse among several."""
-    sources = [open_source(folder) for folder in folders]
-    if len(sources) == 1:
-        return sources[0]
-    for folder, source in zip(folders, sources, strict=True):
-        if isinstance(source, InteriorVerse):
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(f"There is no data folder {folder}; make one with: materialist train data -o {folder}.")
+        if (folder / "samples").is_dir():
+            continue
+        if not parts(folder):
+            raise InputError(
+                f"{folder} holds neither 'samples' (materialist train data) nor InteriorVerse scenes; check the path."
+            )
+        if len(folders) > 1:
             raise InputError(f"{folder} is InteriorVerse; only sets of materialist train data can be put together.")
+        return InteriorVerse(folder, split)
     return SampleFolder(*folders)
 
 
@@ -124,11 +115,6 @@ class InteriorVerse(Source):
             if values.shape[:2] != (height, width):
                 raise InputError(f"{_sibling(path, name)} is {values.shape[:2]}, but its picture is {(height, width)}.")
         return _sample(maps, _mask(path, (height, width)), Camera(width, height, field_of_view(path)))
-
-
-def is_interiorverse(folder: Path) -> bool:
-    """Whether the folder looks like InteriorVerse: a list of scenes in it or in one of its parts."""
-    return bool(parts(folder))
 
 
 def parts(folder: Path) -> list[Path]:

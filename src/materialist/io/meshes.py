@@ -17,7 +17,6 @@ from materialist.io.atomic import writing
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Body, Mesh, Surface
 
-_VERTEX = np.dtype([(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz", "s", "t")])
 _FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
 
 _HEADER = """\
@@ -45,10 +44,7 @@ end_header
 
 def write_ply(path: str | Path, mesh: Mesh) -> None:
     """Write the mesh; texture coordinate t is Mesh.uv's v unchanged (DOWN), so that it stays exact."""
-    vertices = np.empty(len(mesh.vertices), _VERTEX)
-    columns = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], -1)  # [V, 8]
-    for index, name in enumerate(_VERTEX.names or ()):
-        vertices[name] = columns[:, index]
+    vertices = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], -1).astype("<f4")  # [V, 8]
     faces = np.empty(len(mesh.faces), _FACE)
     faces["count"], faces["vertex_indices"] = 3, mesh.faces
     faces["pixel"], faces["plane"] = mesh.face_pixel, mesh.face_plane
@@ -68,7 +64,7 @@ def read_ply(path: str | Path) -> Mesh:
     counts = [int(line.split()[-1]) for line in head.decode("latin1").splitlines() if line.startswith("element")]
     if not mark or len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
         raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
-    split = counts[0] * _VERTEX.itemsize
+    split = counts[0] * 32  # bytes of eight floats
     if len(body) != split + counts[1] * _FACE.itemsize:
         raise SceneError(f"The mesh {path} is truncated; save the scene again.")
     vertices = np.frombuffer(body[:split], "<f4").reshape(-1, 8)
