@@ -22,7 +22,7 @@ def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
     before = sample.render(sample.envmap, spp=64, seed=3)
     for kind in ("hue", "metal"):
         edit = found[kind]
-        after = edit.render(edit.envmap, spp=64, seed=3)
+        after = edit.truth.render(edit.envmap, spp=64, seed=3)
         inside = edit.region(before, after)
         np.testing.assert_array_equal(inside, edit.mask)
         assert metrics.psnr(before, after, mask=inside) + 6 < metrics.psnr(before, after, mask=~inside)
@@ -45,7 +45,7 @@ def test_the_true_cup_stands_where_the_scene_has_it(cases):
 def test_a_material_edit_of_the_scene_is_the_true_one(cases):
     sample, found = cases
     scene = true_scene(sample)
-    stage = found["metal"].render.__self__
+    stage = found["metal"].truth
     edited = found["metal"].change(scene)
     inside = found["metal"].mask
     np.testing.assert_allclose(edited.materials.albedo[inside], stage.truth.materials.albedo[inside], atol=1e-5)

@@ -88,7 +88,7 @@ class EditBench(Benchmark):
         from materialist.edits.composite.composite import composite
 
         before = sample.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
-        after = edit.render(edit.envmap, spp=self.truth_spp, seed=self.seed + 5)
+        after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)
         shared: dict[str, Any] = {"spp": self.spp, "seed": self.seed, "device": self.device}
         photo, truly = sample.photo.linear, edit.change(perfect)

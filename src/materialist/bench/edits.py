@@ -28,8 +28,8 @@ class Edit:
     kind: str
     change: Callable[[Scene], Scene]
     """The edit of any scene fitted to the sample's photo."""
-    render: Callable[..., Array]
-    """render(envmap, spp=, seed=) -> [H, W, 3] linear: the true scene after it."""
+    truth: TrueScene
+    """The true scene after it."""
     envmap: Array
     """[h, 2h, 3] the light it is seen under, at the photo's exposure."""
     mask: Array
@@ -47,21 +47,20 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
     from materialist.edits.light.relight import relight
     from materialist.edits.material.material import edit
 
-    stage: TrueScene = sample.render.__self__  # type: ignore[attr-defined]
-    item = stage._probe((0.5, 0.5))["item"]
-    count = [int((item == k).sum()) if len(i.solid.vertices) > 4 else 0 for k, i in enumerate(stage.items)]
-    largest = int(np.argmax(count))  # object, neither floor nor wall
+    stage = sample.scene
+    things = stage.things
+    largest = max(things, key=lambda k: things[k].sum(), default=None)  # object, neither floor nor wall
     for kind in kinds:
         if kind == "relight":
-            everything = np.ones(item.shape, bool)
-            yield Edit(kind, partial(relight, envmap=light), stage.render, light, everything)
+            everything = np.ones(stage.seen.shape, bool)
+            yield Edit(kind, partial(relight, envmap=light), stage, light, everything)
         elif kind == "insert":
-            yield from _insertion(sample, stage, item)
-        elif count[largest]:
-            mask = item == largest
+            yield from _insertion(sample, stage)
+        elif largest is not None:
+            mask = things[largest]
             values, other = _material(kind, stage.items[largest])
             items = [other if k == largest else one for k, one in enumerate(stage.items)]
-            yield Edit(kind, partial(edit, mask=mask, **values), _staged(stage, items).render, sample.envmap, mask)
+            yield Edit(kind, partial(edit, mask=mask, **values), _staged(stage, items), sample.envmap, mask)
 
 
 def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
@@ -80,7 +79,7 @@ def _staged(stage: TrueScene, items: list[Item]) -> TrueScene:
     return TrueScene(items, stage.view, stage.camera.height, stage.camera.width)
 
 
-def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Iterator[Edit]:
+def _insertion(sample: SyntheticSample, stage: TrueScene) -> Iterator[Edit]:
     """A cup in a free place of the floor, if any; the true one has the vertices that the fitted scene is given."""
     import cv2
 
@@ -88,7 +87,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Iterat
     from materialist.edits.insert.insert import insert
     from materialist.edits.insert.meshes import MeshModel
 
-    floor = np.pad((item == 0).astype(np.uint8), 1)
+    floor = np.pad((stage.seen == 0).astype(np.uint8), 1)
     free = cv2.distanceTransform(floor, cv2.DIST_L2, 5)[1:-1, 1:-1]
     row, column = np.unravel_index(int(np.argmax(free)), free.shape)
     if free[row, column] < 2:
@@ -102,8 +101,8 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, item: Array) -> Iterat
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
     cup = Item(placed, np.tile(body.surface.albedo, (2, 2, 1)), float(body.surface.roughness.mean()), 0.0)
     truth = _staged(stage, [*stage.items, cup])
-    mask = truth._probe((0.5, 0.5))["item"] == len(stage.items)
-    yield Edit("insert", lambda scene: insert(scene, model, at), truth.render, sample.envmap, mask)
+    mask = truth.seen == len(stage.items)
+    yield Edit("insert", lambda scene: insert(scene, model, at), truth, sample.envmap, mask)
 
 
 def true_scene(sample: SyntheticSample, maps: Prediction | None = None) -> Scene:

@@ -58,7 +58,7 @@ class SelectBench(Benchmark):
                 sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp)
                 name = f"{'captured' if folder else 'procedural'} {sample.name}"
                 for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
-                    for row in self._selected(true_scene(sample, found), sample.things, k):
+                    for row in self._selected(true_scene(sample, found), tuple(sample.scene.things.values()), k):
                         yield {**row, "method": f"{row['method']}, {maps} maps", "sample": f"{name} {row['sample']}"}
 
     def _selected(self, scene: Scene, things: Sequence[Array], number: int) -> Iterator[Row]:

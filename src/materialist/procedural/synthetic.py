@@ -6,7 +6,6 @@ the scenes are our own. The frame of the camera is the only frame: objects and l
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -40,11 +39,12 @@ class SyntheticSample:
     """The true maps at the photo's size: shading normal, planar depth with 0 for sky."""
     envmap: Array
     """[256, 512, 3] float32 linear: the light of the photo, in the camera frame and at the photo's exposure."""
-    render: Callable[..., Array]
-    """render(envmap, spp=256, seed=0) -> [H, W, 3] float32 linear, unclipped: the true scene under another light."""
+    scene: TrueScene
     name: str = ""
-    things: tuple[Array, ...] = ()
-    """[H, W] bool masks of the objects that are seen, ground and walls left out."""
+
+    def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
+        """[H, W, 3] float32 linear, unclipped: the true scene under another light [h, 2h, 3]."""
+        return self.scene.render(envmap, spp, seed)
 
 
 def make_sample(
@@ -73,10 +73,7 @@ def make_sample(
     linear = np.clip(picture * exposure, 0, 1).astype(np.float32)
     name = f"scene {scene_index} view {view_index} light {light_index}"
     photo = Photo(linear=linear, camera=truth_scene.camera, original=linear, fov_source="option", path=name)
-    return SyntheticSample(
-        photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene.render, name=name,
-        things=truth_scene.things,
-    )  # fmt: skip
+    return SyntheticSample(photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene, name)
 
 
 def _photo_seed(*index: int) -> int:
@@ -106,7 +103,14 @@ class TrueScene:
         self._params = mi.traverse(self._scene)
         self._params.keep(["light.data"])
         self._item_of_shape = _registry(list(shapes.values()))
+        self.seen: Array  # [H, W] number of the item at a pixel's centre, -1 for the sky
         self.truth = self._true_maps()
+
+    @property
+    def things(self) -> dict[int, Array]:
+        """Item number -> [H, W] bool mask, of the objects that are seen; ground and walls left out."""
+        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
+        return {int(k): self.seen == k for k in np.unique(self.seen[self.seen >= 0]) if k not in flat}
 
     def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
@@ -135,9 +139,7 @@ class TrueScene:
     def _true_maps(self, sub: int = 4) -> Prediction:
         """Depth and normal at pixel centres; albedo averaged over sub x sub places on the object at the centre."""
         centre = self._probe((0.5, 0.5))
-        item = centre["item"]
-        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
-        self.things = tuple(item == k for k in np.unique(item[item >= 0]) if k not in flat)
+        self.seen = item = centre["item"]
         total, count = np.zeros((*item.shape, 3)), np.zeros((*item.shape, 1))
         for place in np.ndindex(sub, sub):
             part = self._probe(tuple((np.array(place) + 0.5) / sub))
