@@ -33,7 +33,7 @@ train = typer.Typer(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recipe(OperationOptions):
+class RecipeChanges(OperationOptions):
     """What differs from the recipe of the network."""
 
     config: str = option(
@@ -77,7 +77,7 @@ def matnet(
         ),
     ],
     output: Annotated[Path, output_option("RUN", "Folder of the run.")],
-    recipe: Recipe,
+    recipe: RecipeChanges,
     training: Training = Training(every=300),  # noqa: B008
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
     workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from materialist.predict.protocol import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, Predictor
+from materialist.predict.protocol import NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, MapSet, Predictor
 from materialist.types import Array, Photo
 
 VALUES = {
@@ -24,7 +24,7 @@ class ConstantPredictor(Predictor):
 
     name = "constant"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""
         size = photo.linear.shape[:2]
         maps = {}
@@ -32,4 +32,4 @@ class ConstantPredictor(Predictor):
             value = np.asarray(VALUES[name], np.float32)
             maps[name] = np.broadcast_to(value, (*size, *value.shape)).copy()
         note = f"The constant predictor knows nothing of the photo: {', '.join(wanted)} are neutral everywhere."
-        return Part(maps, dict.fromkeys(wanted, self.name), (note,))
+        return MapSet(maps, dict.fromkeys(wanted, self.name), (note,))

@@ -10,7 +10,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import Part, Predictor
+from materialist.predict.protocol import MapSet, Predictor
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 
@@ -40,7 +40,7 @@ class DepthAnything(Predictor):
         hub.locate(self._where, "depth-anything")
         hub.library("transformers")
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """Planar depth at the photo's size; `seed` changes nothing.
 
         The network sees sRGB values. A metric model's depth is taken as it is, in metres; a relative one gives inverse
@@ -51,9 +51,9 @@ class DepthAnything(Predictor):
         model = hub.load(hub.library("transformers").DepthAnythingForDepthEstimation, folder)
         values = _run(model, photo.linear, on_gpu(self._device))
         if model.config.depth_estimation_type == "metric":
-            return Part({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
+            return MapSet({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
         depth, note, warnings = planar(values, photo.camera, normal, inverse=True, name=self.name)
-        return Part({"depth": depth}, {"depth": f"{self.name}{digest}{note}"}, warnings)
+        return MapSet({"depth": depth}, {"depth": f"{self.name}{digest}{note}"}, warnings)
 
 
 def _run(model, linear: Array, gpu: bool) -> Array:

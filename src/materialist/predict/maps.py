@@ -12,7 +12,7 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.image import read_map as read_data
 from materialist.predict import resample
-from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, Part, Predictor
+from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, MapSet, Predictor
 from materialist.types import Array, Photo
 
 NEUTRAL = {"roughness": NEUTRAL_ROUGHNESS, "metallic": NEUTRAL_METALLIC}
@@ -46,7 +46,7 @@ class MapsPredictor(Predictor):
         """'maps:DIR'."""
         return f"maps:{self.folder}"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps at the working size of the photo; `seed` changes nothing.
 
         A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal is unknown;
@@ -67,7 +67,7 @@ class MapsPredictor(Predictor):
                 maps[name] = np.full(size, NEUTRAL[name], np.float32)
             else:
                 raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
-        return Part(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
+        return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
 
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
         """The values of a map at their own size, checked and mended. Raises InputError."""

@@ -12,7 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import MixedPredictor, Part, Predictor
+from materialist.predict.protocol import MapSet, MixedPredictor, Predictor
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 
@@ -54,7 +54,7 @@ class Marigold(Predictor):
         hub.library("diffusers")
         hub.library("transformers")
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
@@ -76,7 +76,7 @@ class Marigold(Predictor):
         lacking = [name for name in wanted if name not in maps]
         if lacking:
             raise WeightsError(f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it.")
-        return Part({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
+        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
 
 
 def appearance(output: Array, properties: dict) -> dict[str, Array]:

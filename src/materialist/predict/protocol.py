@@ -19,7 +19,7 @@ NEUTRAL_METALLIC = 0.1
 
 
 @dataclass(frozen=True)
-class Part:
+class MapSet:
     """Some of the maps of a photograph."""
 
     maps: dict[str, Array]
@@ -43,7 +43,7 @@ class Predictor(ABC):
         """The name of the predictor in the report."""
 
     @abstractmethod
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps at the photo's working size; equal seeds give equal maps.
 
         `normal` [H, W, 3], where known, sets the scale of a relative depth (docs/predictors.md, "Relative depth").
@@ -91,7 +91,7 @@ class MixedPredictor(Predictor):
             if not set(names).isdisjoint(wanted):
                 self.sources[spec].prepare(names)
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps of all sources together. Each source runs once."""
         maps: dict[str, Array] = {}
         sources: dict[str, str] = {}
@@ -104,4 +104,4 @@ class MixedPredictor(Predictor):
                 maps |= part.maps
                 sources |= part.sources
                 warnings += part.warnings
-        return Part(maps, sources, warnings)
+        return MapSet(maps, sources, warnings)

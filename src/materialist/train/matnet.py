@@ -91,8 +91,8 @@ class PaperTask(MapsTask):
         """The five losses of L_MatNet, all with weight 1."""
         image, mask = batch["image"], batch["mask"]
         height, width = image.shape[-2:]
-        fitted = [max(PATCH, round(side / PATCH) * PATCH) for side in (height, width)]
-        out = network(F.interpolate(image, fitted, mode="bicubic", align_corners=False).clamp(min=0))
+        size = _patches(height), _patches(width)
+        out = network(F.interpolate(image, size, mode="bicubic", align_corners=False).clamp(min=0))
         out = {k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False) for k, v in out.items()}
         albedo = batch["albedo"]
         return {
@@ -114,7 +114,7 @@ class PaperTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
         assert isinstance(network, MatNet)
-        maps = infer(network, np.clip(sample.image, 0, 1), input_size=_shorter(sample.depth.shape))
+        maps = infer(network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape)))
         normal = maps["normal"] / np.maximum(np.linalg.norm(maps["normal"], axis=-1, keepdims=True), 1e-6)
         unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
         return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
@@ -154,6 +154,6 @@ def load_start(network: MatNet, path: Path) -> list[str]:
     return sorted(start)
 
 
-def _shorter(size: tuple[int, ...]) -> int:
-    """The shorter side rounded to the patches of the encoder: training saw pictures at their own size."""
-    return max(PATCH, round(min(size) / PATCH) * PATCH)
+def _patches(side: int) -> int:
+    """A side of a picture, pixels, rounded to whole patches of the encoder."""
+    return max(PATCH, round(side / PATCH) * PATCH)

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from materialist.predict.bundled.edges import Guide, weighted_median
+from materialist.predict.bundled.edges import GuidedFilter, weighted_median
 
 
 def two_sides(height=24, width=32, noise=0.01):
@@ -43,14 +43,16 @@ def test_shares_are_the_weights_of_the_guided_filter():
     expected = written_out(photo, members, 2, 1e-3)
     known = np.isfinite(expected)
     assert known.sum() == 4 * 6
-    np.testing.assert_allclose(Guide(photo, radius=2, eps=1e-3).share(members)[known], expected[known], atol=2e-4)
+    np.testing.assert_allclose(
+        GuidedFilter(photo, radius=2, eps=1e-3).share(members)[known], expected[known], atol=2e-4
+    )
 
 
 def test_a_blurred_outline_becomes_the_photos():
     photo, side = two_sides(64, 80)
     true = np.where(side, 1.0, 2.0).astype(np.float32)
     blurred = cv2.GaussianBlur(true, (0, 0), 4)
-    sharp = weighted_median(blurred, Guide(photo, radius=12))
+    sharp = weighted_median(blurred, GuidedFilter(photo, radius=12))
     near = np.abs(cv2.GaussianBlur(side.astype(np.float32), (0, 0), 2) - 0.5) < 0.45
     assert np.abs(sharp - true)[near].mean() < 0.35 * np.abs(blurred - true)[near].mean()
 
@@ -61,4 +63,4 @@ def test_a_slanted_plane_stays():
     )
     rows = np.mgrid[:40, :60][0].astype(np.float32)
     inner = (slice(12, -12), slice(12, -12))
-    np.testing.assert_allclose(weighted_median(rows, Guide(photo, radius=6))[inner], rows[inner], atol=0.5)
+    np.testing.assert_allclose(weighted_median(rows, GuidedFilter(photo, radius=6))[inner], rows[inner], atol=0.5)

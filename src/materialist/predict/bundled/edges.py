@@ -18,7 +18,7 @@ work for sums that hardly differ (windows are one coarse pixel wider or narrower
 with stay whole. Pictures narrower than twice that are summed as they are."""
 
 
-class Guide:
+class GuidedFilter:
     """The photo as a guide: weights W_ij = mean over windows k of 1 + (I_i - m_k)^T (S_k + eps)^-1 (I_j - m_k).
 
     m_k and S_k are mean and covariance of colours in the window, so that pixels on one side of an edge count for each
@@ -65,7 +65,7 @@ class Guide:
         return mean if self.coarse == self.size else cv2.resize(mean, self.size[::-1], interpolation=cv2.INTER_LINEAR)
 
 
-def weighted_median(values: Array, guide: Guide, *, known: Array | None = None, bins: int = 32) -> Array:
+def weighted_median(values: Array, guide: GuidedFilter, *, known: Array | None = None, bins: int = 32) -> Array:
     """[H, W] float32: at every pixel the median of the values around it, weighted by `guide`.
 
     Values between their 0.5 and 99.5 percentiles are told apart by `bins` steps and by linear interpolation within.

@@ -12,7 +12,7 @@ import torch
 from materialist.camera import rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
-from materialist.predict.bundled.edges import Guide, weighted_median
+from materialist.predict.bundled.edges import GuidedFilter, weighted_median
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.bundled.relief import with_relief
 from materialist.predict.network import STRIDE
@@ -81,7 +81,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     middle = _network_size(size, SETTINGS.edge_side)
     photo = linear_to_srgb(resample.values(linear, middle))
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
-    guide = Guide(photo, radius=reach)
+    guide = GuidedFilter(photo, radius=reach)
     depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)

@@ -56,7 +56,7 @@ class BundledNetwork(StoredNetwork):
         self.levels = nn.ModuleList(nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
         self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
         self.place = nn.Conv2d(4, w[3], 1)
-        self.attention = nn.ModuleList(_Attention(w[3]) for _ in range(a.attention))
+        self.attention = nn.ModuleList(_AttentionBlock(w[3]) for _ in range(a.attention))
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
         self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
         self.decoders = nn.ModuleList(
@@ -174,7 +174,7 @@ def _same_subpixels(conv: nn.Conv2d) -> None:
         conv.bias.zero_()
 
 
-class _Attention(nn.Module):
+class _AttentionBlock(nn.Module):
     """Pre-norm transformer block over cells [B, n, C]; cells know their place from their rays."""
 
     def __init__(self, channels: int, head_size: int = 32):

@@ -14,7 +14,7 @@ from materialist.predict.bundled import WEIGHTS
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import MAPS, Part, Predictor
+from materialist.predict.protocol import MAPS, MapSet, Predictor
 from materialist.predict.weights import sha256
 from materialist.types import Array, Photo
 
@@ -49,7 +49,7 @@ class BundledPredictor(Predictor):
         """What the report calls it: how long it was trained, and the start of its checksum."""
         return self.source
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted of the network's maps at the photo's size; deterministic, `seed` changes nothing.
 
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
@@ -65,4 +65,4 @@ class BundledPredictor(Predictor):
             maps["normal"] = np.where(sky[..., None], 0, found.normal).astype(np.float32)
         elif sky.any():
             warnings = (f"{sky.mean():.0%} of the picture was taken for sky and has no surface.",)
-        return Part({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings)
+        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings)

@@ -13,7 +13,7 @@ from materialist.predict.device import on_gpu
 from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth
 from materialist.predict.matnet.network import SIZES, MatNet
 from materialist.predict.models import hub_model, is_hub_id, require, weights_file
-from materialist.predict.protocol import Part, Predictor
+from materialist.predict.protocol import MapSet, Predictor
 from materialist.predict.weights import INSTEAD, load_weights, metadata, read_state, verify_file
 from materialist.types import Array, Photo
 
@@ -53,7 +53,7 @@ class MatNetPredictor(Predictor):
         """What the report calls it: size, file and the start of its checksum."""
         return self.source
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> Part:
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted of the network's maps at the photo's size; `seed` changes nothing.
 
         The network sees linear values, as in training (InteriorVerse). Its albedo is linear, its normals are in our
@@ -68,7 +68,7 @@ class MatNetPredictor(Predictor):
         found = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
         found["normal"] = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0).astype(np.float32)
         found["depth"] = np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
-        return Part({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
+        return MapSet({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
 
 
 def _locate(where: str) -> Path:
