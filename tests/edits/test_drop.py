@@ -1,4 +1,4 @@
-"""Falling things: they come to rest on the ground, lose energy, and never go through it."""
+"""Falling things: they come to rest on the ground, lose energy, never go through it; films, scenes and recipes."""
 
 from dataclasses import replace
 
@@ -8,12 +8,13 @@ import trimesh
 from made_meshes import box_file, extent, floor_scene
 
 from materialist.edits.drop.convex import convex_pieces
-from materialist.edits.drop.drop import down, drop, upright
+from materialist.edits.drop.drop import down, drop, settle, upright
 from materialist.edits.drop.ground import Field, blocks
-from materialist.edits.drop.physics import GRAVITY, Thing, fall
+from materialist.edits.drop.physics import GRAVITY, Pose, Thing, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import support_at
+from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
 from materialist.errors import InputError
 from materialist.options import Drop
 
@@ -21,17 +22,24 @@ pytest.importorskip("mujoco")
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
 BOX = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.1, 0.1)])
+AT = (48.0, 50.0)
+FALL = "materialist.edits.drop.drop.fall"
 FLAT = Field(np.array([-1.0, -1.0]), 2 / 64, np.zeros((65, 65)))
 
 
 @pytest.fixture(scope="module")
-def box(tmp_path_factory):
-    return read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
+def box_path(tmp_path_factory):
+    return box_file(tmp_path_factory.mktemp("mesh") / "box.ply")
+
+
+@pytest.fixture(scope="module")
+def box(box_path):
+    return read_model(box_path)
 
 
 @pytest.fixture(scope="module")
 def filmed_box(box):
-    return drop(floor_scene(96, 72), [box], (48.0, 50.0), frames=40, seed=3)
+    return drop(floor_scene(96, 72), [box], AT, frames=40, seed=3)
 
 
 def test_it_starts_above_the_click_and_rests_on_the_floor(filmed_box):
@@ -48,8 +56,8 @@ def test_it_starts_above_the_click_and_rests_on_the_floor(filmed_box):
 
 def test_the_same_seed_gives_the_same_film(box, filmed_box):
     scene = floor_scene(96, 72)
-    again = drop(scene, [box], (48.0, 50.0), frames=12, seed=3)
-    other = drop(scene, [box], (48.0, 50.0), frames=12, seed=4)
+    again = drop(scene, [box], AT, frames=12, seed=3)
+    other = drop(scene, [box], AT, frames=12, seed=4)
     for frame, same in zip(filmed_box, again):
         np.testing.assert_array_equal(frame.bodies[0].vertices, same.bodies[0].vertices)
     assert not np.array_equal(again[-1].bodies[0].vertices, other[-1].bodies[0].vertices)
@@ -78,7 +86,7 @@ def test_nothing_tunnels(height):
 
 def test_gravity(box):
     scene = floor_scene(96, 72)
-    support = support_at(scene, (48.0, 50.0))
+    support = support_at(scene, AT)
     assert down(scene, support, None) @ UP < -0.999
     np.testing.assert_allclose(down(scene, support, (0, -2, 0)), [0, -1, 0])
     frame = upright(down(scene, support, None))
@@ -91,20 +99,20 @@ def test_gravity(box):
 
 
 def test_things_rest_on_bodies_that_are_there(box):
-    scene = insert(floor_scene(96, 72), box, (48.0, 50.0), scale=2, turn=20)
+    scene = insert(floor_scene(96, 72), box, AT, scale=2, turn=20)
     size = extent(scene.bodies)
-    last = drop(scene, [box], (48.0, 50.0), frames=40, spin=0, height=3, scale=0.8)[-1]
+    last = drop(scene, [box], AT, frames=40, spin=0, height=3, scale=0.8)[-1]
     assert len(last.bodies) == 2
     low = float((last.bodies[1].vertices @ UP + 2).min())
     assert low > 0.9 * size or low < 0.02 * size  # on top of it, or it has slid off onto the floor
 
 
 def test_inside_of_something_there_is_no_room(box):
-    scene = insert(floor_scene(96, 72), box, (48.0, 50.0), scale=8)
+    scene = insert(floor_scene(96, 72), box, AT, scale=8)
     (body,) = scene.bodies  # its base must not be one with the floor
     scene = replace(scene, bodies=(replace(body, vertices=(body.vertices + 0.01 * UP).astype(np.float32)),))
     with pytest.raises(InputError, match="no room at 48,50"):
-        drop(scene, [box], (48.0, 50.0), frames=2)
+        drop(scene, [box], AT, frames=2)
 
 
 def test_it_spins_about_its_centre_of_mass():
@@ -131,7 +139,7 @@ def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
 
 
 def test_several_start_clear_of_each_other(box):
-    film = drop(floor_scene(96, 72), [box, box], (48.0, 50.0), frames=2, spin=0)
+    film = drop(floor_scene(96, 72), [box, box], AT, frames=2, spin=0)
     a, b = (body.vertices @ UP for body in film[0].bodies)
     assert b.min() > a.max()
     told = film[0].provenance["edits"][-1]
@@ -146,7 +154,7 @@ def test_bad_input(box):
         ({"fps": 0}, "frame rate"), ({"gravity": (0, 0, 0)}, "gravity"), ({"at": [(1, 1), (2, 2)]}, "places"),
         ({"at": (400, 3)}, "outside"), ({"meshes": []}, "Nothing falls"),
     ]:  # fmt: skip
-        given = {"meshes": [box], "at": (48.0, 50.0), **options}
+        given = {"meshes": [box], "at": AT, **options}
         with pytest.raises(InputError, match=sentence):
             drop(scene, **given)
 
@@ -160,3 +168,70 @@ def test_convex_shapes_are_one_piece_and_concave_ones_several():
     pieces = convex_pieces(np.asarray(corner.vertices), np.asarray(corner.faces))
     total = sum(trimesh.convex.convex_hull(piece).volume for piece in pieces)
     assert len(pieces) > 1 and 6 <= total < 7.3  # the hull alone has 8; the pieces come from a coarse grid
+
+
+@pytest.fixture(scope="module")
+def rested(box):
+    return settle(floor_scene(96, 72), [box], AT, seed=3)
+
+
+def test_it_is_the_end_of_the_film(box, rested):
+    film = drop(floor_scene(96, 72), [box], AT, frames=72, seed=3)
+    size = extent(rested.bodies)
+    np.testing.assert_allclose(rested.bodies[0].vertices, film[-1].bodies[0].vertices, atol=0.01 * size)
+    assert abs(float((rested.bodies[0].vertices @ UP + 2).min())) < 0.01 * size  # it lies on the floor
+    assert not np.allclose(rested.bodies[0].vertices, film[0].bodies[0].vertices, atol=0.1 * size)
+    assert rested.provenance["edits"] == film[-1].provenance["edits"]
+
+
+def test_a_file_with_a_drop_says_the_same_before_and_after(tmp_path, box_path, rested):
+    (tmp_path / "edits.yaml").write_text(
+        f"- drop: {{mesh: {box_path}, at: [48, 50], seed: 3}}\n- relight: {{ambient: 2}}\n"
+    )
+    scene, steps = floor_scene(96, 72), read_recipe(tmp_path / "edits.yaml")
+    write_recipe(tmp_path / "again.yaml", steps)
+    again = read_recipe(tmp_path / "again.yaml")
+    assert again == steps
+    for edited in (apply(scene, steps), apply(scene, again)):
+        np.testing.assert_array_equal(edited.bodies[0].vertices, rested.bodies[0].vertices)
+        assert [entry["kind"] for entry in edited.provenance["edits"]] == ["drop", "light"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"mesh": "box.ply"}, "needs its at"), ({"at": ["1", "2"]}, "needs its mesh"),
+        ({"mesh": "none.ply", "at": ["1", "2"]}, "none.ply"), ({"mesh": ["a", ["b"]], "at": ["1", "2"]}, "file name"),
+        ({"mesh": "box.ply", "at": ["48", "50"], "seed": "1.5"}, "seed"),
+        ({"mesh": "box.ply", "at": ["48", "50"], "height": "-1"}, "height"),
+        ({"mesh": "box.ply", "at": ["48", "50"], "gravity": ["0", "0", "0"]}, "gravity"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_in_a_file_is_named(box_path, options, words):
+    with pytest.raises(InputError, match=words):
+        apply(floor_scene(96, 72), [Step("drop", options, box_path.parent)])
+
+
+def test_what_falls_out_of_the_scene_is_left_out(box, monkeypatch):
+    scene = floor_scene(96, 72)
+    below, still = Pose(np.array([0, 0, -1e6]), np.eye(3)), Pose(np.zeros(3), np.eye(3))
+    monkeypatch.setattr(FALL, lambda *_, **__: [[below, still]] * 14)
+    edited = settle(scene, [box, box], AT)
+    assert len(edited.bodies) == 1 and any("left out" in note for note in edited.report.warnings)
+    monkeypatch.setattr(FALL, lambda *_, **__: [[below]] * 14)
+    with pytest.raises(InputError, match="falls beside everything"):
+        settle(scene, [box], AT)
+
+
+def test_what_lies_out_of_view_is_told(box, monkeypatch):
+    away = Pose(np.array([0, 0, 2.0]), np.eye(3))
+    monkeypatch.setattr(FALL, lambda *_, **__: [[away]] * 14)
+    edited = settle(floor_scene(96, 72), [box], AT)
+    assert edited.report.warnings == ("What fell came to rest where the camera does not look.",)
+
+
+def test_what_rolls_on_is_told(box, monkeypatch):
+    rolling = [[Pose(np.array([0.01 * k, 0, 0]), np.eye(3))] for k in range(40)]
+    monkeypatch.setattr(FALL, lambda *_, **__: rolling)
+    edited = settle(floor_scene(96, 72), [box], AT)
+    assert any("at rest" in note for note in edited.report.warnings)
