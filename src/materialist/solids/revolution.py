@@ -6,7 +6,6 @@ shoulder are known; maps of front and back have no place for them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,48 +92,42 @@ class Revolution:
 
     def thickness(self, depth: Array, inside: Array, rays: Array) -> Array:
         """[H, W] float32 scene units along rays: from the front [H, W] planar depth to the last surface of the body."""
-        ray = rays[inside]
-        reach = 2.5 * max(float(self.profile.seen[:, 0].max()), float(np.ptp(self.profile.seen[:, 1])))
-        steps = np.arange(0, reach, self.profile.cell)
-        last = np.zeros(len(ray))
-        for part, values in self._along(ray, depth[inside], steps):
-            inner = values < 0
-            k = inner.shape[1] - 1 - inner[:, ::-1].argmax(1)
-            row, after = np.arange(len(inner)), np.minimum(k + 1, inner.shape[1] - 1)
-            before, beyond = values[row, k], values[row, after]
-            share = np.where(beyond > before, -before / np.maximum(beyond - before, 1e-12), 0)
-            last[part] = np.where(inner.any(1), steps[k] + np.clip(share, 0, 1) * self.profile.cell, 0)
+        _, last = self._chords(rays[inside])
         found = np.zeros(depth.shape, np.float32)
-        found[inside] = last
+        found[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(rays[inside], axis=-1)
         return found
 
     def front(self, inside: Array, rays: Array) -> tuple[Array, Array]:
         """[H, W] planar depth at which rays enter the body, 0 where they pass, and its unit normals [H, W, 3] there."""
-        ray, seen = rays[inside], self.profile.seen
-        length = np.linalg.norm(ray, axis=-1)
-        reach = 1.2 * float(np.hypot(seen[:, 0].max(), np.ptp(seen[:, 1]) / 2))
-        middle = self.axis.foot + seen[:, 1].mean() * self.axis.up
-        first, steps = (ray @ middle) / length**2, np.arange(-reach, reach, 0.5 * self.profile.cell)
-        hit, entry = np.zeros(len(ray), bool), first.copy()
-        for part, values in self._along(ray, first, steps):
-            hit[part] = (values < 0).any(1)
-            entry[part] += steps[(values < 0).argmax(1)] / length[part]
-        points = ray * entry[:, None]
         depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
-        depth[inside] = np.where(hit, entry, 0)
+        first, _ = self._chords(rays[inside])
+        depth[inside] = np.nan_to_num(first)
+        points = rays[inside] * depth[inside][:, None]
         normal[inside] = self.axis.spread(points, self.profile.slope(self.axis.of(points)))
         return depth, normal
 
-    def _along(self, ray: Array, first: Array, steps: Array) -> Iterator[tuple[slice, Array]]:
-        """Values [n, S] of the profile's function on rays [N, 3], some at once, from planar depth `first` [N] on.
-
-        steps: [S] scene units along the rays.
-        """
-        length = np.linalg.norm(ray, axis=-1)
-        for k in range(0, len(ray), DEFAULT.block):
+    def _chords(self, rays: Array) -> tuple[Array, Array]:
+        """[N] planar depths of the first and of the last point of rays [N, 3] in the body, NaN where they pass it."""
+        seen, step = self.profile.seen, 0.5 * self.profile.cell
+        length = np.linalg.norm(rays, axis=-1)
+        middle = self.axis.foot + seen[:, 1].mean() * self.axis.up
+        reach = 1.5 * float(np.hypot(seen[:, 0].max(), np.ptp(seen[:, 1])))
+        steps = np.arange(-reach, reach, step)
+        found = np.full((2, len(rays)), np.nan)
+        for k in range(0, len(rays), DEFAULT.block):
             part = slice(k, k + DEFAULT.block)
-            at = first[part, None] + steps / length[part, None]
-            yield part, self.profile.at(self.axis.of(ray[part, None] * at[..., None]))
+            at = ((rays[part] @ middle) / length[part] ** 2)[:, None] + steps / length[part, None]  # [n, S]
+            values = self.profile.at(self.axis.of(rays[part, None] * at[..., None]))
+            row, inner = np.arange(len(at)), values < 0
+            for end, flipped in enumerate((inner, inner[:, ::-1])):
+                column = flipped.argmax(1)
+                column = column if end == 0 else inner.shape[1] - 1 - column
+                beyond = np.clip(column + (2 * end - 1), 0, inner.shape[1] - 1)
+                own, other = values[row, column], values[row, beyond]
+                share = np.clip(-own / np.maximum(other - own, 1e-12), 0, 1)
+                place = at[row, column] + share * (at[row, beyond] - at[row, column])
+                found[end, part] = np.where(inner.any(1), place, np.nan)
+        return found[0], found[1]
 
 
 def profile_of(
