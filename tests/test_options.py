@@ -62,6 +62,7 @@ def test_texts_mean_what_the_values_do(tmp_path):
         (Insertion, {"material": "wood"}, "The material is 'wood'; give as-is, glass, mirror, R,G,B"),
         (InvertOptions, {"envmap_size": (64, 64)}, "The envmap size is 64x64; it must be twice as wide"),
         (InvertOptions, {"envmap_size": "512"}, "must look like 512x256, not '512'"),
+        (InvertOptions, {"envmap_size": (8, 4)}, "The envmap size is 8x4; it must be twice as wide"),
         (InvertOptions, {"tau": 90}, "The tau is 90; it must lie in (0, 90) degrees."),
     ],
 )

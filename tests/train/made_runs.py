@@ -23,7 +23,7 @@ WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 def bundled(data: Path, *, samples=0, architecture=NETWORK, **changes) -> BundledTask:
     """The bundled network's task, a thousand times smaller than the real one."""
     recipe = RECIPE.changed(**(SMALL | changes))
-    return BundledTask(open_sources([Path(data)]), recipe, score_samples=samples, architecture=architecture)
+    return BundledTask(open_sources([data]), recipe, score_samples=samples, architecture=architecture)
 
 
 def clicks(views: Path, **changes) -> ClickTask:
