@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
 from materialist.errors import SetupError
 from materialist.types import Array
 
-SAME = 1.05
-"""Volume of the hull over that of the shape up to which the hull alone stands for it."""
-CONCAVE = 0.12
-"""Concavity that is left in a piece (CoACD's threshold)."""
-PIECES = 16
-COARSE = 24
-"""Cells along the longest side to which a fine mesh is thinned out before it is taken apart."""
-FINE = 1500
-"""Triangles from which a mesh counts as fine."""
+
+@dataclass(frozen=True)
+class ConvexSettings:
+    """When one hull stands for a mesh, and how CoACD takes others apart; tuned by eye."""
+
+    same: float = 1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
+    concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
+    pieces: int = 16  # most pieces
+    fine: int = 1500  # triangles from which a mesh is thinned out before it is taken apart
+    coarse: int = 24  # cells along the longest side to which it is thinned out
+
+
+DEFAULT = ConvexSettings()
 
 
 def hull(points: Array) -> Array:
@@ -42,7 +47,7 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
 
     vertices = np.asarray(vertices, np.float64)
     outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
-    if mesh.is_watertight and ConvexHull(outer).volume <= SAME * abs(mesh.volume):
+    if mesh.is_watertight and ConvexHull(outer).volume <= DEFAULT.same * abs(mesh.volume):
         return [outer]
     try:
         import coacd
@@ -52,11 +57,11 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
         ) from error
     logging.getLogger("coacd").setLevel(logging.ERROR)
     coacd.set_log_level("error")
-    if len(faces) > FINE:
-        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / COARSE
+    if len(faces) > DEFAULT.fine:
+        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / DEFAULT.coarse
         mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
     parts = coacd.run_coacd(
-        coacd.Mesh(mesh.vertices, mesh.faces), threshold=CONCAVE, max_convex_hull=PIECES, preprocess_resolution=30,
-        resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
+        coacd.Mesh(mesh.vertices, mesh.faces), threshold=DEFAULT.concave, max_convex_hull=DEFAULT.pieces,
+        preprocess_resolution=30, resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
     )  # fmt: skip
     return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]

@@ -23,14 +23,18 @@ from materialist.io.video import MAX_FRAMES
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
-UPRIGHT = 0.5
-"""Cosine to the camera's up from which a plane can be a floor or a table top."""
-LONGEST = 20.0
-"""Seconds after which a thing that still rolls is left where it is."""
-LOOKS = 24
-"""Looks at the things a second."""
-STILL = 12
-"""Looks in a row without motion after which things are at rest."""
+
+@dataclass(frozen=True)
+class DropSettings:
+    """What is a floor, and when things are at rest; tuned by eye."""
+
+    upright: float = 0.5  # cosine to the camera's up from which a plane can be a floor or a table top
+    longest: float = 20.0  # seconds after which a thing that still rolls is left where it is
+    looks: int = 24  # looks at the things a second
+    still: int = 12  # looks in a row without motion after which things are at rest
+
+
+DEFAULT = DropSettings()
 
 
 def drop(
@@ -94,7 +98,9 @@ def settle(
         )
     notes = [f"{names[k]} falls beside everything that the photo shows, and was left out." for k in sorted(gone)]
     if not rests:
-        notes.append(f"After {LONGEST:g} seconds not everything that fell is at rest; it stays where it is then.")
+        notes.append(
+            f"After {DEFAULT.longest:g} seconds not everything that fell is at rest; it stays where it is then."
+        )
     edited = falling.at(poses, tuple(notes), gone)
     if not any(_in_view(scene, body) for body in edited.bodies[len(scene.bodies) :]):
         return falling.at(poses, (*notes, "What fell came to rest where the camera does not look."), gone)
@@ -181,7 +187,7 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
         if direction.shape != (3,) or not np.isfinite(direction).all() or not np.linalg.norm(direction) > 0:
             raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
         return direction / np.linalg.norm(direction)
-    if support.normal[1] > UPRIGHT:
+    if support.normal[1] > DEFAULT.upright:
         return -support.normal
     from materialist.edits.insert.support import support_at
 
@@ -190,7 +196,7 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
         if len(rows):
             middle = len(rows) // 2
             plane = support_at(scene, (float(columns[middle]), float(rows[middle])))
-            if plane.normal[1] > UPRIGHT:
+            if plane.normal[1] > DEFAULT.upright:
                 return -plane.normal
     return np.array([0.0, -1.0, 0.0])
 
@@ -266,13 +272,15 @@ def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
 def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     """(the last poses, numbers of the things that fell out of the scene, whether the rest lies still)."""
     bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
-    recent: deque[list[Pose]] = deque(maxlen=STILL + 1)
+    recent: deque[list[Pose]] = deque(maxlen=DEFAULT.still + 1)
     gone: frozenset[int] = frozenset()
-    for poses in fall(falling.things, falling.ground, frames=round(LONGEST * LOOKS) + 1, fps=LOOKS):
+    for poses in fall(
+        falling.things, falling.ground, frames=round(DEFAULT.longest * DEFAULT.looks) + 1, fps=DEFAULT.looks
+    ):
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
-        if not recent[-1] or (len(recent) > STILL and _still(list(recent), falling.what["metres"])):
+        if not recent[-1] or (len(recent) > DEFAULT.still and _still(list(recent), falling.what["metres"])):
             return poses, gone, True
     return poses, gone, False
 
