@@ -37,11 +37,17 @@ def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
 
 
 def white_balanced(image: Array, rng: np.random.Generator) -> Array:
-    """Gains that pull the picture a little towards grey, as cameras guess; samples are balanced already."""
+    """Gains that pull the picture a little towards grey, as cameras guess; now and then a cast of the light stays.
+
+    Samples are balanced already.
+    """
     lit = np.minimum(image, 1)
     grey = np.mean(lit**2, (0, 1)) ** 0.5 + 1e-4  # bright areas count more, as they do in cameras
     gains = (grey.mean() / grey) ** rng.uniform(0.0, 0.35)
     gains = np.clip(gains, 0.4, 2.5) * np.exp(rng.normal(0, 0.04, 3))
+    if rng.random() < 0.35:  # a cast from amber to blue, as lamps and shade leave it, or a little to green
+        warm, green = rng.normal(0, 0.16), rng.normal(0, 0.03)
+        gains = gains * np.exp([warm, green, -warm])
     gains = gains / (gains * grey).sum() * grey.sum()
     return (image * gains).astype(np.float32)
 
