@@ -211,3 +211,12 @@ def test_files_and_style_of_the_tree():
     for module, tree in _trees().items():
         calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
         assert not any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls), f"{module} prints"
+
+
+def test_a_class_name_exists_once():
+    homes: dict[str, list[str]] = {}
+    for module, tree in _trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(module)
+    assert not {name: found for name, found in homes.items() if len(found) > 1}

@@ -10,7 +10,7 @@ from made_meshes import box_file, extent, floor_scene
 from materialist.edits.drop.convex import convex_pieces
 from materialist.edits.drop.drop import down, drop, settle, upright
 from materialist.edits.drop.ground import Field, blocks
-from materialist.edits.drop.physics import GRAVITY, Pose, Thing, fall
+from materialist.edits.drop.physics import GRAVITY, Pose, RigidBody, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.insert.support import support_at
@@ -64,13 +64,13 @@ def test_the_same_seed_gives_the_same_film(box, filmed_box):
 
 
 def test_free_fall_is_newtons():
-    poses = list(fall([Thing((BOX,), np.array([0, 0, 2.0]), np.zeros(3))], [], frames=10, fps=25))
+    poses = list(fall([RigidBody((BOX,), np.array([0, 0, 2.0]), np.zeros(3))], [], frames=10, fps=25))
     for k, (pose,) in enumerate(poses):
         np.testing.assert_allclose(pose.centre[2], 2 - GRAVITY / 2 * (k / 25) ** 2, atol=2e-3)
 
 
 def test_energy_is_only_lost():
-    things = [Thing((BOX,), np.array([0, 0, 0.5]), np.array([1.0, 3.0, 0.5]))]
+    things = [RigidBody((BOX,), np.array([0, 0, 0.5]), np.array([1.0, 3.0, 0.5]))]
     energy = np.array([poses[0].energy for poses in fall(things, blocks(FLAT, metres=0.2), frames=60, fps=60)])
     assert (np.diff(energy) < 0.01 * energy[0]).all() and energy[-1] < 0.5 * energy[0]
 
@@ -79,7 +79,7 @@ def test_energy_is_only_lost():
 def test_nothing_tunnels(height):
     rough = np.random.default_rng(0).normal(0, 0.003, (65, 65))
     ground = blocks(Field(FLAT.corner, FLAT.cell, rough), metres=0.2)
-    poses = list(fall([Thing((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=45, fps=20))
+    poses = list(fall([RigidBody((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=45, fps=20))
     z = np.array([pose[0].centre[2] for pose in poses])
     assert z.min() > 0.04 and abs(z[-1] - z[-10]) < 1e-3
 
@@ -118,7 +118,9 @@ def test_inside_of_something_there_is_no_room(box):
 def test_it_spins_about_its_centre_of_mass():
     """Which falls straight down, wherever the middle of the box around the thing is."""
     off = np.array([0.15, 0.0, 0.05])
-    (spun,) = zip(*fall([Thing((BOX + off,), np.array([0, 0, 2.0]), np.array([1.0, 5.0, 3.0]))], [], frames=10, fps=25))
+    (spun,) = zip(
+        *fall([RigidBody((BOX + off,), np.array([0, 0, 2.0]), np.array([1.0, 5.0, 3.0]))], [], frames=10, fps=25)
+    )
     mass = np.array([pose.centre + pose.turn @ off for pose in spun])
     np.testing.assert_allclose(mass[:, :2], np.tile(off[:2], (10, 1)), atol=2e-3)
     np.testing.assert_allclose(mass[:, 2], 2.05 - GRAVITY / 2 * (np.arange(10) / 25) ** 2, atol=2e-3)
@@ -129,7 +131,10 @@ def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
     ground = blocks(FLAT, metres=0.2)
     rod = BOX * np.array([1, 0.2, 0.1])
     spun = lambda turns: fall(  # noqa: E731
-        [Thing((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))], ground, frames=48, fps=24
+        [RigidBody((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))],
+        ground,
+        frames=48,
+        fps=24,
     )
     energy = [poses[0].energy for poses in spun(20)]
     assert np.isfinite(energy).all() and max(energy) < 1.02 * energy[0]

@@ -42,7 +42,7 @@ def back_of_ball(camera, thickness, radius=0.6, distance=3.0):
 def shown(maps, thickness, away, picture, sky=0.0, back=None, camera=CAMERA, **options):
     """The model before a wall at depth `away` under an even sky; maps: depth, normal, mask."""
     depth, normal, mask = maps
-    behind = ti.Behind(picture, np.full(mask.shape, away), np.full((8, 16, 3), sky))
+    behind = ti.Backdrop(picture, np.full(mask.shape, away), np.full((8, 16, 3), sky))
     return ti.two_interface(camera, normal, depth, mask, thickness, behind, Glass(**options), back)
 
 
@@ -193,10 +193,10 @@ def test_rays_that_meet_nothing_see_the_environment():
     sky = np.zeros((16, 32, 3))
     sky[:8] = 1.0  # the upper half
     origin, direction = np.array([[0.0, 0, -2]] * 3), np.array([[0.0, 0.9, 0.436], [0, -0.9, 0.436], [0, 0, -1.0]])
-    behind = ti.Behind(np.full((*SHAPE, 3), 0.25), np.full(SHAPE, 5.0), sky)
+    behind = ti.Backdrop(np.full((*SHAPE, 3), 0.25), np.full(SHAPE, 5.0), sky)
     found = ti.look(origin, direction, behind, CAMERA)
     assert found[:, 0].tolist() == pytest.approx([1, 0, 0.25])
-    empty = ti.Behind(behind.picture, np.zeros(SHAPE), sky)
+    empty = ti.Backdrop(behind.picture, np.zeros(SHAPE), sky)
     assert ti.look(origin[:1], direction[:1], empty, CAMERA)[0, 0] == 1
     # The sky that the picture shows comes from the picture.
     assert ti.look(origin[2:], direction[2:], empty, CAMERA)[0].tolist() == [0.25] * 3

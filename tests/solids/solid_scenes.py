@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from materialist.bench.glass_scenes import Front, seen
+from materialist.bench.glass_scenes import SeenSide, seen
 from materialist.camera import pixel_rays
 from materialist.procedural.objects import shapes
 from materialist.solids.revolution import Axis
@@ -45,7 +45,7 @@ def arc(centre, radius, first=-90, last=90, count=90):
     return np.stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)], -1)
 
 
-def view(solid, camera: Camera = CAMERA) -> tuple[Front, np.ndarray]:
+def view(solid, camera: Camera = CAMERA) -> tuple[SeenSide, np.ndarray]:
     """What is seen, and the mask."""
     front = seen(solid, camera)
     return front, front.depth > 0

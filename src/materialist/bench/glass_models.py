@@ -164,12 +164,12 @@ def two_interface(case: Case, found: Thickness, behind: Background, *, papers_ba
 
     The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
     """
-    from materialist.edits.glass.two_interface import Behind, back_of
+    from materialist.edits.glass.two_interface import Backdrop, back_of
     from materialist.edits.glass.two_interface import two_interface as model
     from materialist.options import Glass
 
     scene, front = case.scene, case.scene.front
-    beyond = Behind(behind.picture, behind.depth, case.envmap)
+    beyond = Backdrop(behind.picture, behind.depth, case.envmap)
     back = None if papers_back else back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
     return model(scene.camera, front.normal, front.depth, scene.mask, found.solid, beyond, Glass(ior=case.ior), back)
 

@@ -48,7 +48,7 @@ PROTOCOL = GlassProtocol()
 
 
 @dataclass(frozen=True)
-class Thing:
+class GlassObject:
     """An object of the benchmark, standing on y = 0, its longest side about 0.7."""
 
     name: str
@@ -57,7 +57,7 @@ class Thing:
 
 
 @dataclass(frozen=True)
-class Front:
+class SeenSide:
     """What is seen of a mesh from a camera."""
 
     depth: Array
@@ -70,16 +70,16 @@ class Front:
     """[H, W, 3] unit normal of that last surface, away from the viewer."""
 
 
-def things(data: Path | None, count: int, seed: int = 0) -> list[Thing]:
+def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
     """The first `count` symmetric and `count` asymmetric objects: procedural, or watertight meshes of DATA/meshes."""
     if data is None:
         return [thing for k in range(count) for thing in (_turned(k, seed), _free(k, seed))]
-    found: list[list[Thing]] = []
+    found: list[list[GlassObject]] = []
     for group in GROUPS:
         files = sorted((data / "meshes" / group).glob("*.ply"))
         files = [f for f in files if f.stem not in VESSELS]
         order = np.random.default_rng([seed, 6]).permutation(len(files))
-        loaded = (Thing(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7)) for k in order)
+        loaded = (GlassObject(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7)) for k in order)
         closed = list(islice((thing for thing in loaded if is_closed(thing.solid)), count))
         if not closed:
             raise InputError(f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none.")
@@ -97,26 +97,28 @@ def is_closed(solid: Solid) -> bool:
     return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
-def _turned(index: int, seed: int) -> Thing:
+def _turned(index: int, seed: int) -> GlassObject:
     """A solid of revolution or a superellipsoid: its own mirror image."""
     rng = np.random.default_rng([seed, 7, index])
     kind = index % 4
     if kind == 0:
-        return Thing(f"ellipsoid {index}", "symmetric", shapes.superquadric(rng.uniform(0.45, 0.7, 3), 1, 1))
+        return GlassObject(f"ellipsoid {index}", "symmetric", shapes.superquadric(rng.uniform(0.45, 0.7, 3), 1, 1))
     if kind == 1:
         y = np.linspace(0, 1, 60)
         radius = 0.17 + 0.07 * np.sin(rng.uniform(4, 8) * y + rng.uniform(0, 6)) + 0.05 * rng.uniform(-1, 1) * y
         radius = radius * np.sqrt(np.clip(y / 0.12, 0, 1) * np.clip((1 - y) / 0.12, 0, 1))
-        return Thing(f"baluster {index}", "symmetric", shapes.lathe(np.stack([radius, 0.7 * y], -1)))
+        return GlassObject(f"baluster {index}", "symmetric", shapes.lathe(np.stack([radius, 0.7 * y], -1)))
     if kind == 2:
-        return Thing(f"capsule {index}", "symmetric", shapes.capsule(rng.uniform(0.13, 0.2), rng.uniform(0.2, 0.35)))
+        return GlassObject(
+            f"capsule {index}", "symmetric", shapes.capsule(rng.uniform(0.13, 0.2), rng.uniform(0.2, 0.35))
+        )
     extent = rng.uniform(0.4, 0.65, 3)
-    return Thing(
+    return GlassObject(
         f"cushion {index}", "symmetric", shapes.superquadric(extent, rng.uniform(0.5, 0.8), rng.uniform(0.5, 1))
     )
 
 
-def _free(index: int, seed: int) -> Thing:
+def _free(index: int, seed: int) -> GlassObject:
     """A lumpy or twisted body."""
     from materialist.procedural.objects.glassware import centred
 
@@ -129,7 +131,7 @@ def _free(index: int, seed: int) -> Thing:
     else:
         body = centred(shapes.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
         name = f"blob {index}"
-    return Thing(name, "asymmetric", shapes.grounded(shapes.placed(body, scale=0.65)))
+    return GlassObject(name, "asymmetric", shapes.grounded(shapes.placed(body, scale=0.65)))
 
 
 def _twist(points: Array, turn: float, bend: float) -> Array:
@@ -145,7 +147,7 @@ class GlassScene:
     `background` is 'room', a floor and a wall, or 'envmap': nothing but the light, as in the paper.
     """
 
-    def __init__(self, thing: Thing, size: int, seed: int = 0, background: str = "room"):
+    def __init__(self, thing: GlassObject, size: int, seed: int = 0, background: str = "room"):
         rng = np.random.default_rng([seed, 9, *thing.name.encode()])
         self.thing, self.background = thing, background
         view = _view(thing.solid, rng)
@@ -158,18 +160,18 @@ class GlassScene:
         self.room = [scenes.in_camera(i, view) for i in _room(rng)] if background == "room" else []
 
     @cached_property
-    def front(self) -> Front:
+    def front(self) -> SeenSide:
         """The object alone."""
         return seen(self.item.solid, self.camera)
 
     @cached_property
-    def behind(self) -> Front:
+    def behind(self) -> SeenSide:
         """The room alone."""
         if self.room:
             return seen(shapes.joined([i.solid for i in self.room]), self.camera)
         none = np.zeros((self.camera.height, self.camera.width), np.float32)
         normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*none.shape, 3))
-        return Front(none, normal, none, -normal)
+        return SeenSide(none, normal, none, -normal)
 
     @cached_property
     def mask(self) -> Array:
@@ -240,7 +242,7 @@ def painted(albedo: Array) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
 
 
-def seen(solid: Solid, camera: Camera) -> Front:
+def seen(solid: Solid, camera: Camera) -> SeenSide:
     """What the camera sees of a mesh in its frame."""
     from materialist.procedural.thickness.ray_paths import ShapeTracer, towards
 
@@ -254,7 +256,7 @@ def seen(solid: Solid, camera: Camera) -> Front:
     back = towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)
     thickness = found.solid * np.linalg.norm(direction, axis=-1)
     depth = np.where(hit, found.first, 0)
-    return Front(
+    return SeenSide(
         depth.reshape(shape).astype(np.float32), normal.reshape(*shape, 3).astype(np.float32),
         thickness.reshape(shape).astype(np.float32), back.reshape(*shape, 3).astype(np.float32),
     )  # fmt: skip

@@ -44,7 +44,7 @@ STAGES = {
 
 
 @dataclass(frozen=True)
-class Case:
+class InvertedPhoto:
     """The photo to invert and where its prior comes from."""
 
     name: str
@@ -97,14 +97,14 @@ class InvertBench(Benchmark):
                 yield _step_row(self, case, folder)
 
 
-def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int) -> Case:
+def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int) -> InvertedPhoto:
     """What to invert, by the options; a synthetic photo with its true maps is written into `folder`."""
     if photo:
-        return Case(Path(photo).name, photo, "auto")
+        return InvertedPhoto(Path(photo).name, photo, "auto")
     if data is not None:
         for place in (data / "official_indoor", data):
             if (place / "photo.png").is_file() and (place / "maps").is_dir():
-                return Case(place.name, place / "photo.png", f"maps:{place / 'maps'}")
+                return InvertedPhoto(place.name, place / "photo.png", f"maps:{place / 'maps'}")
         raise InputError(
             f"{data} holds neither official_indoor/ nor photo.png with maps/ beside it; give such a folder, a --photo, "
             "or leave out --data for a synthetic photo."
@@ -121,10 +121,10 @@ def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, si
     for name, values in {**vars(sample.truth.materials), "normal": sample.truth.normal}.items():
         write_exr(folder / "maps" / f"{name}.exr", values)
     write_exr(folder / "maps" / "depth.exr", sample.truth.depth)
-    return Case("synthetic", folder / "photo.png", f"maps:{folder / 'maps'}", f"{sample.photo.camera.fov:.6g}")
+    return InvertedPhoto("synthetic", folder / "photo.png", f"maps:{folder / 'maps'}", f"{sample.photo.camera.fov:.6g}")
 
 
-def inversion(bench: Benchmark, case: Case, size: int, folder: Path, *options: str) -> Row:
+def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *options: str) -> Row:
     """The row of one inversion at `size`, in a process of its own; scratch files go into `folder`."""
     photo, scene = _at_least(case, size, folder), folder / f"scene{size}"
     command = (
@@ -146,7 +146,7 @@ def inversion(bench: Benchmark, case: Case, size: int, folder: Path, *options: s
     }
 
 
-def _at_least(case: Case, size: int, folder: Path) -> Path | str:
+def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     """The photo, or a copy enlarged to `size` when it is smaller: `invert` itself never enlarges."""
     import cv2
 
@@ -163,7 +163,7 @@ def _at_least(case: Case, size: int, folder: Path) -> Path | str:
     return path
 
 
-def _photo(case: Case, size: int) -> Photo:
+def _photo(case: InvertedPhoto, size: int) -> Photo:
     from materialist.io.photo import read_photo
 
     return read_photo(case.photo, size=size, fov=case.fov)
@@ -179,7 +179,7 @@ def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
 
 
-def _step_row(bench: InvertBench, case: Case, folder: Path) -> Row:
+def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     """One step of a material fit, cached and by Mitsuba's path replay backpropagation, in this process.
 
     Both render at full resolution with gradients of all maps; only the engine differs. The first four cached steps

@@ -11,8 +11,8 @@ import typer
 
 from materialist.cli.generate import add_command
 from materialist.cli.options import Computing, output_option
-from materialist.cli.outcome import INTERRUPTED, report_success
-from materialist.errors import MaterialistError
+from materialist.cli.outcome import report_success
+from materialist.errors import Interrupted
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -23,12 +23,6 @@ if TYPE_CHECKING:
 def register(app: typer.Typer) -> None:
     """Add the command."""
     add_command(app, batch)
-
-
-class Interrupted(MaterialistError):
-    """Ctrl-C, with how to go on."""
-
-    exit_code = INTERRUPTED
 
 
 def batch(

@@ -62,7 +62,7 @@ def inside_out(shell: Shell) -> Shell:
     return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv, True)
 
 
-class Region(NamedTuple):
+class MeshedRegion(NamedTuple):
     """A triangulated part of the plane."""
 
     points: Array
@@ -73,7 +73,7 @@ class Region(NamedTuple):
     """[B, 2] int64 edges with one face only, in that face's direction; every vertex on one has one in and one out."""
 
 
-def region(field: Array) -> Region:
+def region(field: Array) -> MeshedRegion:
     """The region where `field` [H, W] > 0, interpolated linearly between the grid points (x, y) = (column, row).
 
     Values beyond the grid count as negative at once: a caller who wants a smooth end there leaves a margin.
@@ -101,7 +101,7 @@ def region(field: Array) -> Region:
     joined = np.concatenate(faces)
     edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
     lone = ~np.isin(edges[:, 0] * len(points) + edges[:, 1], edges[:, 1] * len(points) + edges[:, 0])
-    return Region(points, joined, edges[lone])
+    return MeshedRegion(points, joined, edges[lone])
 
 
 def _crossings(field: Array, inside: Array, first: int) -> tuple[Array, Array]:
@@ -132,7 +132,7 @@ class Sheets(NamedTuple):
     """[V, 2] direction (y down) in the picture in which the region ends, on its border."""
 
 
-def closed(region: Region, sheets: Sheets, camera: Camera) -> Shell:
+def closed(region: MeshedRegion, sheets: Sheets, camera: Camera) -> Shell:
     """The closed surface; its wall bulges by the collar, and looks across the rays: it is a silhouette."""
     count, place = len(sheets.place), sheets.place
     number = np.full(count, -1, np.int64)

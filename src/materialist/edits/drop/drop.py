@@ -14,7 +14,7 @@ from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.convex import convex_pieces, hull
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
-from materialist.edits.drop.physics import Pose, Thing, fall, load
+from materialist.edits.drop.physics import Pose, RigidBody, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support
@@ -112,7 +112,7 @@ class Falling:
     """Things over a scene, before they fall."""
 
     scene: Scene
-    things: list[Thing]
+    things: list[RigidBody]
     ground: list[Array]
     """Convex blocks [n, 3], metres, z up."""
     starts: list[tuple[tuple[Body, ...], Array]]
@@ -237,7 +237,7 @@ def _lifts(points: list[Array], height: float) -> list[float]:
     return lifts
 
 
-def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[Thing]:
+def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[RigidBody]:
     """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
     rng = np.random.default_rng(wanted.seed)
     things = []
@@ -249,11 +249,11 @@ def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: 
         corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
         faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
         pieces = convex_pieces(points, faces, seed=wanted.seed)
-        things.append(Thing(tuple(piece - centre for piece in pieces), centre, turning))
+        things.append(RigidBody(tuple(piece - centre for piece in pieces), centre, turning))
     return things
 
 
-def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: Thing, pose: Pose) -> Body:
+def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: RigidBody, pose: Pose) -> Body:
     """The body of the camera frame where the thing is now."""
     turn = to_up.T @ pose.turn @ to_up
     # In metres, z up: x -> R (x + shift - first centre) + centre.

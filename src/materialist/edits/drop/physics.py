@@ -22,7 +22,7 @@ DENSITY = 600.0
 
 
 @dataclass(frozen=True)
-class Thing:
+class RigidBody:
     """A rigid body at its start."""
 
     pieces: tuple[Array, ...]
@@ -45,7 +45,7 @@ class Pose:
     """Kinetic and potential energy of all things, joule; heights count from z = 0."""
 
 
-def fall(things: list[Thing], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
+def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
     """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
 
     Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
@@ -94,7 +94,7 @@ def _diverged(mujoco) -> tuple[int, ...]:
     return int(kinds.mjWARN_BADQPOS), int(kinds.mjWARN_BADQVEL), int(kinds.mjWARN_BADQACC)
 
 
-def _world(mujoco, things: list[Thing], ground: list[Array]):
+def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.gravity = [0, 0, -GRAVITY]

@@ -98,12 +98,12 @@ def _two_interface(
     scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], options: Glass, envmap: Array
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
-    from materialist.edits.glass.two_interface import Behind, back_of, two_interface
+    from materialist.edits.glass.two_interface import Backdrop, back_of, two_interface
 
     own: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
-    clear, behind = options.transmission, Behind(photo.linear, removed.depth, envmap)
+    clear, behind = options.transmission, Backdrop(photo.linear, removed.depth, envmap)
     for part, found in each:
         seen, front, facing = _front(scene, part, found)
         back = back_of(front, seen, found.solid, found.back, scene.camera)

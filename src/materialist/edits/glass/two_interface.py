@@ -37,7 +37,7 @@ SIDES = (2, 4)
 
 
 @dataclass(frozen=True)
-class Behind:
+class Backdrop:
     """What is behind the object."""
 
     picture: Array
@@ -65,7 +65,7 @@ class Crossing:
 
 
 def two_interface(
-    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, behind: Behind, options: Glass,
+    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, behind: Backdrop, options: Glass,
     back: Array | None = None,
 ) -> Array:  # fmt: skip
     """The object under the mask as glass.
@@ -205,7 +205,7 @@ def _unmasked(direction: Array, normal: Array, alpha: float, below: Array | bool
     return np.where(side > 0, masking(direction, normal, alpha), 0)
 
 
-def look(origin: Array, direction: Array, behind: Behind, camera: Camera) -> Array:
+def look(origin: Array, direction: Array, behind: Backdrop, camera: Camera) -> Array:
     """[N, 3] radiance that rays from [N, 3] along unit [N, 3] meet: the background at S(x2), else the environment.
 
     A ray that meets no surface, but ends in the picture's sky, reads the picture.

@@ -35,7 +35,7 @@ class ContinuationSettings:
 
 
 @dataclass(frozen=True)
-class Behind:
+class HiddenGeometry:
     """What stands behind an object, at working size; outside the hole it is the scene's own."""
 
     depth: Array
@@ -49,7 +49,7 @@ class Behind:
 def behind(
     depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera,
     settings: ContinuationSettings = ContinuationSettings(),
-) -> Behind:  # fmt: skip
+) -> HiddenGeometry:  # fmt: skip
     """Continue the surfaces around a hole into it.
 
     Surfaces part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the
@@ -63,7 +63,7 @@ def behind(
         front: [H, W] depth of what is taken away, 0 where nothing is: the result never comes before it.
     """
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
-    out = Behind(depth.astype(np.float32), normal.astype(np.float32), known)
+    out = HiddenGeometry(depth.astype(np.float32), normal.astype(np.float32), known)
     ends = {
         int(k): settings.farthest * float(np.percentile(depth[~hole & (known == k)], 99))
         for k in np.unique(known[~hole & (known >= 0)])

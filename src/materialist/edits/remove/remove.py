@@ -11,7 +11,7 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import given_picture, matched, with_picture
-from materialist.edits.remove.behind import Behind, behind
+from materialist.edits.remove.behind import HiddenGeometry, behind
 from materialist.edits.remove.filling import find_filling
 from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.native import with_hole
@@ -68,7 +68,7 @@ def remove(
     return noted(warned(removed, *warnings), "remove", what)
 
 
-def _geometry(scene: Scene, found: Behind) -> Geometry:
+def _geometry(scene: Scene, found: HiddenGeometry) -> Geometry:
     """The scene's geometry, built anew from what is behind the object."""
     from materialist.geometry.build import build_geometry, completion_of
     from materialist.geometry.extents import read_extents

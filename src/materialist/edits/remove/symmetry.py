@@ -16,7 +16,7 @@ from materialist.types import Array, Camera
 
 
 @dataclass(frozen=True)
-class SymmetrySettings:
+class TranslationSettings:
     """When a plane counts as periodic; tuned on the 19 rooms of `bench glass`."""
 
     cells: int = 160  # along the longer side of the rectified plane; more: finer shifts
@@ -32,7 +32,7 @@ class SymmetrySettings:
 
 def repeated_sources(
     albedo: Array, shown: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera,
-    settings: SymmetrySettings = SymmetrySettings(),
+    settings: TranslationSettings = TranslationSettings(),
 ) -> Array:  # fmt: skip
     """Where periodic planes say that each pixel of a hole takes its value from.
 
@@ -111,7 +111,7 @@ def _usual(shown: Array, landings: Array, repeats: int) -> Array:
 
 
 def _shifts(
-    albedo: Array, points: Array, known: Array, hidden: Array, camera: Camera, settings: SymmetrySettings
+    albedo: Array, points: Array, known: Array, hidden: Array, camera: Camera, settings: TranslationSettings
 ) -> list[Array]:
     """[3] each, scene units: shifts under which a plane looks like itself, best first."""
     import cv2
