@@ -53,3 +53,7 @@ def test_taking_away(tmp_path):
     assert "a/scene.glb" in names and "a/scene.light.hdr" in names
     assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
     assert not list(tmp_path.glob(".partial*"))
+
+
+def test_notes_cannot_bring_tags_or_links_into_the_page():
+    assert stage._safe("<img src=x> [a](b)") == "&lt;img src=x> &#91;a](b)"

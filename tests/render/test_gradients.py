@@ -1,0 +1,102 @@
+"""Gradients of the differentiable rendering against quadrature of the formula and the linearity of light."""
+
+import disney_reference as brdf
+import numpy as np
+import pytest
+import torch
+from render_scenes import uniform, wall, with_floor
+
+from materialist.camera import pixel_rays
+from materialist.render.scene import RenderScene
+from materialist.types import Camera, Materials
+
+CAMERA = Camera(5, 3, 50.0)
+SIZE = (3, 5)
+ALBEDO, ROUGHNESS, METALLIC = (0.8, 0.4, 0.1), 0.6, 0.3
+
+
+@pytest.fixture(scope="module")
+def corner():
+    """A wall and, continued from its lowest row, a floor in front of it: light goes both ways."""
+    label = np.full(SIZE, -1)
+    label[2] = 0
+    return RenderScene(with_floor(wall(CAMERA), label, height=-0.8), CAMERA, device="cpu")
+
+
+def leaves(maps, envmap):
+    arrays = (maps.albedo, maps.roughness, maps.metallic, envmap)
+    return [torch.from_numpy(np.array(a, np.float32)).requires_grad_() for a in arrays]
+
+
+def random_maps(seed):
+    draw = np.random.default_rng(seed).uniform
+    return Materials(*(draw(0.3, 0.8, (*SIZE, *c)).astype(np.float32) for c in ((3,), (), ())))
+
+
+def random_light(seed, height=6):
+    return np.random.default_rng(seed).uniform(0.2, 2, (height, 2 * height, 3)).astype(np.float32)
+
+
+def test_gradients_under_constant_light_are_the_derivatives_of_the_formula():
+    """Direct light on a wall: each pixel is the integral of f_r cos, and so is its derivative in each parameter."""
+    scene = RenderScene(wall(CAMERA), CAMERA, device="cpu")
+    maps = leaves(uniform(CAMERA, ALBEDO, ROUGHNESS, METALLIC), np.ones((4, 8, 3)))
+    image = scene.render_torch(*maps, spp=8192, seed=1, max_depth=2)
+    image.sum().backward()
+    z, phi = np.meshgrid((np.arange(300) + 0.5) / 300, (np.arange(300) + 0.5) / 300 * 2 * np.pi)
+    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], -1)
+
+    def radiance(row, col, albedo=ALBEDO, roughness=ROUGHNESS, metallic=METALLIC):
+        ray = pixel_rays(CAMERA)[row, col].astype(float)
+        value = brdf.evaluate(
+            np.array(albedo), roughness, metallic, np.array([0.0, 0, 1]), wi, -ray / np.sqrt(ray @ ray)
+        )
+        return 2 * np.pi * (value * z[..., None]).mean((0, 1))
+
+    step = 1e-4
+    for row, col in ((0, 0), (1, 2), (2, 3)):
+        for name, leaf in (("roughness", maps[1]), ("metallic", maps[2])):
+            centre = {"roughness": ROUGHNESS, "metallic": METALLIC}[name]
+            ends = [radiance(row, col, **{name: centre + s}).sum() for s in (step, -step)]
+            assert float(leaf.grad[row, col]) == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=0.05, abs=0.01)
+        ends = [radiance(row, col, albedo=np.add(ALBEDO, s)) for s in (step, -step)]
+        assert maps[0].grad[row, col].numpy() == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=0.05)
+
+
+def test_the_gradient_of_the_light_adds_up_to_the_picture(corner):
+    """Radiance is linear in the light: <dL/dE, E> = L, and dL/dE of a texel is the picture that it alone makes."""
+    maps, envmap = random_maps(8), random_light(9)
+    inputs = leaves(maps, envmap)
+    corner.render_torch(*inputs, spp=16384, seed=1).sum().backward()
+    gradient = inputs[3].grad.numpy()
+    corner.set_materials(maps)
+    corner.set_envmap(envmap)
+    total = corner.render(spp=16384, seed=4).sum()
+    assert float((gradient * envmap).sum()) == pytest.approx(float(total), rel=0.02)
+    for texel in ((0, 3), (1, 1), (2, 11)):
+        alone = np.zeros_like(envmap)
+        alone[texel] = 1
+        corner.set_envmap(alone)
+        assert gradient[texel] == pytest.approx(corner.render(spp=16384, seed=5).sum((0, 1)), rel=0.08)
+
+
+def test_equal_seeds_give_equal_values(corner):
+    maps, envmap = random_maps(1), random_light(2)
+    images = [corner.render_torch(*leaves(maps, envmap), spp=16, seed=s).detach().numpy() for s in (4, 4, 5)]
+    np.testing.assert_array_equal(images[0], images[1])
+    assert np.abs(images[0] - images[2]).max() > 1e-4
+
+
+def test_two_planes_keep_their_own_materials():
+    """Planes start alike; assigning one must not reach the other."""
+    camera = Camera(6, 4, 50.0)
+    label = np.full((4, 6), -1)
+    label[3], label[0] = 0, 1
+    geometry = with_floor(wall(camera), label)
+    geometry.mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
+    scene = RenderScene(geometry, camera, device="cpu")
+    maps = uniform(camera)
+    maps.albedo[3], maps.albedo[0] = 0.9, 0.1
+    scene.set_materials(maps)
+    for plane, value in ((0, 0.9), (1, 0.1)):
+        assert np.array(scene.params[f"plane{plane}.bsdf.base_color.data"]) == pytest.approx(value, rel=1e-5)
