@@ -6,6 +6,7 @@ from solid_scenes import AXIS, CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, 
 
 from materialist.bench.glass_scenes import is_closed
 from materialist.solids.finder import surface_of_revolution
+from materialist.solids.profile import fitted
 from materialist.solids.revolution import Revolution, profile_of, vessel
 
 POT = lines((0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.0, 0.7))
@@ -34,7 +35,7 @@ def error(thickness, front, inside):
 
 def test_a_ball_comes_out_whole(ball):
     body, front, inside = ball
-    assert body.profile.off < 0.3
+    assert body.profile.off < 0.3 and body.profile.through < 0.005
     shell = body.body(CAMERA)
     assert is_closed(shell)
     away = shell.vertices - (FOOT + 0.4 * UP)
@@ -50,14 +51,35 @@ def test_a_ball_comes_out_whole(ball):
     assert 0.4 - inner.mean() == pytest.approx(0.08, rel=0.15)
 
 
-def test_the_hole_of_a_ring_stays_open():
-    centre, radius = (0.4, 0.15), 0.15
+def test_it_stays_above_the_ground():
+    high = GROUND * 0.97
+    body, _, inside = revolved(turned(arc((0, 0.4), 0.4)), high)
+    lowest = ((body.body(CAMERA).vertices - FOOT) @ UP).min()
+    assert lowest > np.percentile((RAYS * high[..., None] - FOOT)[inside & (high > 0)] @ UP, 2)
+
+
+@pytest.mark.parametrize(("centre", "radius"), [((0.4, 0.15), 0.15), ((0.32, 0.2), 0.2)])
+def test_the_hole_of_a_ring_stays_open_even_where_it_is_not_seen_to_its_ground(centre, radius):
     body, front, inside = revolved(turned(arc(centre, radius, -180, 180, 120)))
     places = np.array([[0.03, centre[1]], [centre[0] - 1.3 * radius, 0.05], centre, [centre[0] + 1.3 * radius, 0.1]])
     assert (body.profile.at(places) > 0).tolist() == [True, True, False, True]
     shell = body.body(CAMERA)
     assert is_closed(shell) and volume(shell) == pytest.approx(2 * np.pi**2 * centre[0] * radius**2, rel=0.1)
     assert error(body.thickness(front.depth.astype(float), inside, RAYS), front, inside) < 0.05
+
+
+def test_a_cup_has_a_bottom():
+    """Its rim turns inwards as a ring's does, and does not come down to the foot of the outside."""
+    outer, inner = lines((0, 0), (0.3, 0), (0.3, 0.55)), lines((0.22, 0.55), (0.22, 0.05), (0, 0.05))
+    body, *_ = revolved(turned(np.concatenate([outer, arc((0.26, 0.55), 0.04, 0, 180, 30), inner])))
+    assert body.profile.at(np.array([[0.26, 0.3], [0.15, 0.01]])).max() < 0  # wall and bottom are full
+
+
+def test_edges_keep_their_normals(pot):
+    shell = pot[0].body(CAMERA)
+    height = (shell.vertices - FOOT) @ UP
+    assert np.abs(shell.normals[(height > 0.05) & (height < 0.65)] @ UP).max() < 0.05
+    assert volume(shell) == pytest.approx(np.pi * 0.3**2 * 0.7, rel=0.03)
 
 
 def test_a_cylinder_becomes_an_open_pot(pot):
@@ -76,6 +98,16 @@ def test_a_cylinder_becomes_an_open_pot(pot):
     assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (facing[side & (place[:, 0] < 0.27)] < -0.9).all()
     assert vessel(body.profile, 0.4) is None  # no room inside
     assert vessel(revolved(turned(arc((0.4, 0.15), 0.15, -180, 180)))[0].profile, 0.03) is None  # a ring
+
+
+def test_the_function_goes_on_as_it_went():
+    """Points of the upper half of a circle around the axis: the lower half follows by its curvature."""
+    angle = np.radians(np.linspace(0, 90, 200))
+    lean = np.stack([np.cos(angle), np.sin(angle)], -1)
+    found = fitted(0.5 * lean + [0, 1.0], lean, np.zeros((0, 2)), 0.01, 0.4)
+    (line, normals), *_ = found.lines()
+    assert np.abs(np.linalg.norm(line - [0, 1.0], axis=1) - 0.5).max() < 0.03
+    assert np.sum((line - [0, 1.0]) * normals, -1).min() > 0.4
 
 
 @pytest.mark.parametrize("up", [UP, None])

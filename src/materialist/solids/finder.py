@@ -25,8 +25,7 @@ class FinderSettings:
     coarse: int = 40  # pixels along the object while its axis is looked for
     round: float = 0.035  # largest mean sine between normals and the planes through the axis; tuned by eye
     off: float = 1.5  # largest root mean square distance of the front from the profile, cells
-    beside: float = 0.15  # largest share of the body in a margin of `margin` pixels around the mask
-    margin: int = 4
+    through: float = 0.03  # largest share of the front just below which rays pass freely
     behind: tuple[float, ...] = (0.1, 0.3, 0.5)  # first guesses of the axis' place, object sizes behind the front
     reach: float = 1.5  # farthest place of the axis, in object sizes: normals of one plane all meet at infinity
     tilts: tuple[float, ...] = (0.05, 0.25, 0.45)  # first guesses of how far the camera looks down, radians
@@ -84,18 +83,12 @@ def upright(normal: Array, plane: Array) -> Array | None:
 def _by_normals(
     depth: Array, normal: Array, inside: Array, rays: Array, up: Array | None, behind: Array | None
 ) -> Revolution | None:
-    from scipy.ndimage import binary_dilation
-
     axis, sine = _axis(depth, normal, inside, rays, up)
     if sine > DEFAULT.round:
         return None
     profile = profile_of(depth, normal, inside, rays, axis, behind)
-    if profile.off > DEFAULT.off or not profile.lines():
-        return None
-    body = Revolution(axis, profile)
-    margin = binary_dilation(inside, iterations=DEFAULT.margin) & ~inside
-    beyond, _ = body.front(margin, rays)
-    return body if (beyond > 0).sum() <= DEFAULT.beside * margin.sum() else None
+    fits = profile.off <= DEFAULT.off and profile.through <= DEFAULT.through
+    return Revolution(axis, profile) if fits and profile.lines() else None
 
 
 def _axis(depth: Array, normal: Array, inside: Array, rays: Array, up: Array | None) -> tuple[Axis, float]:

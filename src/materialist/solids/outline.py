@@ -235,4 +235,4 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     floor = float(side[0, 1])
     if ground is not None:
         floor = float(np.clip(ground + REVOLUTION.air * high, floor - 0.1 * high, floor + 0.1 * high))
-    return fitted(seen, leaning, cell, floor)
+    return fitted(seen, leaning, np.zeros((0, 2)), cell, floor)

@@ -15,11 +15,21 @@ from materialist.types import Array
 
 @dataclass(frozen=True)
 class ProfileSettings:
-    """How smooth the function is; tuned by eye."""
+    """How smooth the function is, and how it goes on where nothing is seen; tuned by eye."""
 
     bend: float = 0.03  # weight of second differences against that of points: larger is smoother
     lean: float = 2.0  # weight of normals against that of places
+    rounds: int = 3  # solutions; after each, places that rays pass freely and that lay in the body are pushed out
+    pushed: float = 0.5  # value that such a place is given, cells
+    push: float = 0.3  # its weight
     margin: int = 12  # cells around what is seen
+    below: float = 3.0  # cells below the surface at which no ray passes
+    gap: int = 7  # cells along a line without a point that are no gap in what is seen
+    stretch: float = 0.2  # part of the height over which the outside is looked at, to go on below
+    stretch_inside: float = 0.5  # the same for the inside of a ring
+    meeting: float = 0.2  # part of the height within which a ring's inside must end at the foot of its outside
+    level: float = 0.8  # angle from the level within which it must end, radians
+    clear: float = 3.0  # cells around points that are seen in which no ray pushes: there the points tell the border
     beside: float = 2.5  # cells within which a line must have a point that is seen, to be of the object
 
 
@@ -42,6 +52,8 @@ class Profile:
     """[N, 2] points (distance, height) that it was fitted to."""
     off: float
     """Root mean square of the function at them, cells."""
+    through: float
+    """Share of those points just below which rays pass freely."""
 
     def at(self, places: Array) -> Array:
         """[...] the function at places [..., 2]: below 0 in the body."""
@@ -92,32 +104,122 @@ class Profile:
         return np.stack([read(out), read(up)], -1)
 
 
-def fitted(seen: Array, leaning: Array, cell: float, floor: float) -> Profile:
+def fitted(seen: Array, leaning: Array, passed: Array, cell: float, floor: float) -> Profile:
     """The profile through points of its border.
 
     Args:
         seen: [N, 2] distance from the axis and height. leaning: [N, 2] unit normals there, outwards.
+        passed: [M, 2] places that are free for certain.
         cell, floor: as of `Profile`.
     """
+    first = _fitted(seen, leaning, len(seen), passed, cell, floor)
+    below = _hidden(first, leaning, -1)
+    foot = float(np.concatenate([seen, below[:, :2]])[:, 1].min())
+    hidden = np.concatenate([below, _hidden(first, leaning, 1, foot)])
+    if not len(hidden):
+        return first
+    turning = np.stack([np.cos(hidden[:, 2]), np.sin(hidden[:, 2])], -1)
+    both = np.concatenate([seen, hidden[:, :2]]), np.concatenate([leaning, turning])
+    return _fitted(*both, len(seen), passed, cell, floor)
+
+
+def _fitted(points: Array, leaning: Array, count: int, passed: Array, cell: float, floor: float) -> Profile:
+    """The profile of points of which the first `count` are seen."""
+    from scipy.ndimage import distance_transform_edt
+    from scipy.sparse import diags
     from scipy.sparse.linalg import splu
 
-    bottom, high = float(seen[:, 1].min()), float(np.ptp(seen[:, 1]))
-    low = min(bottom, max(floor, bottom - high)) - DEFAULT.margin * cell
+    seen = points[:count]
+    low = min(float(seen[:, 1].min()), max(floor, float(seen[:, 1].min() - np.ptp(seen[:, 1])))) - DEFAULT.margin * cell
     shape = (
         int(np.ceil((seen[:, 1].max() - low) / cell)) + DEFAULT.margin,
         int(np.ceil(seen[:, 0].max() / cell)) + DEFAULT.margin,
     )
-    at = (seen - [0, low]) / cell  # (column, row)
-    rows, wanted = _points(at, leaning, shape)
+    at = lambda places: (places - [0, low]) / cell  # noqa: E731  (column, row)
+    free = _cells(at(passed), shape)
+    told = free & (distance_transform_edt(~_cells(at(seen), shape)) > DEFAULT.clear)
+    rows, wanted = _points(at(points), leaning, shape)
     matrix = rows.T @ rows + DEFAULT.bend * _bending(shape)
-    values = splu(matrix.tocsc()).solve(rows.T @ wanted).reshape(shape)
-    return Profile(values, cell, low, floor, seen, float(np.sqrt(np.mean(_read(values, at) ** 2))))
+    right = rows.T @ wanted
+    pushed = np.zeros(shape, bool)
+    for _ in range(DEFAULT.rounds):
+        push = DEFAULT.push * pushed.ravel()
+        values = splu((matrix + diags(push)).tocsc()).solve(right + DEFAULT.pushed * push).reshape(shape)
+        before, pushed = pushed, pushed | (told & (values < DEFAULT.pushed / 2))
+        if (before == pushed).all():
+            break
+    off = float(np.sqrt(np.mean(_read(values, at(seen)) ** 2)))
+    below = np.clip(np.round(at(seen) - DEFAULT.below * leaning[:count]).astype(int), 0, np.array(shape[::-1]) - 1)
+    return Profile(values, cell, low, floor, seen, off, float(free[below[:, 1], below[:, 0]].mean()))
+
+
+def _hidden(profile: Profile, leaning: Array, way: int, foot: float = 0.0) -> Array:
+    """Where the border goes on below what is seen of it: places and the angles of normals [K, 3].
+
+    way -1: the outside, from the lowest that is seen, with the curvature above it, until the ground, or level. way 1:
+    the inside of a ring, which goes on turning until it meets the `foot` of the outside, at that height and level; the
+    inside of a cup does not, and stays as it is.
+    """
+    from scipy.ndimage import maximum_filter1d
+    from scipy.spatial import cKDTree
+
+    high, tree = np.ptp(profile.seen[:, 1]), cKDTree(profile.seen)
+    for line, _ in profile.lines():
+        away, nearest = tree.query(line)
+        # Small gaps do not end what is seen.
+        known = maximum_filter1d(away < DEFAULT.beside * profile.cell, DEFAULT.gap, mode="nearest")
+        if way < 0:
+            ends = np.flatnonzero(known & ~np.roll(known, 1) & (line[:, 1] < np.median(profile.seen[:, 1])))[:1]
+        else:
+            ends = np.flatnonzero(known & ~np.roll(known, -1) & (line[:, 1] > foot + DEFAULT.meeting * high))[-1:]
+        if not len(ends) or line[ends[0], 0] < DEFAULT.gap * profile.cell:
+            continue
+        # The line from its end into what is seen, from a place with a point right there.
+        back = np.s_[ends[0] :] if way < 0 else np.s_[ends[0] :: -1]
+        start = int(np.argmax(away[back] < profile.cell))
+        stretch = DEFAULT.stretch if way < 0 else DEFAULT.stretch_inside
+        found = _onward(profile, line[back][start:], leaning[nearest[back][start:]], stretch, way)
+        level = way < 0 or (len(found) > 1 and found[-1, 2] > 1.5 * np.pi - DEFAULT.level)
+        if len(found) > 1 and level and (way < 0 or abs(found[-1, 1] - foot) < DEFAULT.meeting * high):
+            return found[1:]
+    return np.zeros((0, 3))
+
+
+def _onward(profile: Profile, line: Array, leaning: Array, stretch: float, way: int) -> Array:
+    """What lies before a line [K, 2] with normals [K, 2], a cell apart: places and the angles of normals [M, 3].
+
+    It turns as the line's beginning does. way: 1 for a line that is to be followed with the body to the left, -1 for
+    one with the body to the right; normals point right for -1, left for 1.
+    """
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    part = along < stretch * np.ptp(profile.seen[:, 1])
+    angle = np.unwrap(np.arctan2(leaning[part, 1], leaning[part, 0]))
+    middle = 0.0 if way < 0 else np.pi
+    angle += 2 * np.pi * np.round((middle - angle[0]) / (2 * np.pi))
+    if part.sum() < DEFAULT.gap or abs(angle[0] - middle) > np.pi / 2:
+        return np.zeros((0, 3))
+    rate, first = np.polyfit(along[part], angle, 1)
+    rate, at, found = -way * rate, line[0].copy(), []
+    while rate > 0 and at[0] > 0 and at[1] > profile.floor and abs(first - middle) < np.pi / 2:
+        found.append([*at, first])
+        first += way * rate * profile.cell
+        at = at + way * profile.cell * np.array([-np.sin(first), np.cos(first)])
+    return np.array(found).reshape(-1, 3)
 
 
 def _read(values: Array, at: Array) -> Array:
     from scipy.ndimage import map_coordinates
 
     return map_coordinates(values, [at[:, 1], at[:, 0]], order=1, mode="nearest")
+
+
+def _cells(at: Array, shape: tuple[int, int]) -> Array:
+    """[h, w] bool: cells with one of the places [M, 2] (column, row)."""
+    column, row = np.round(at).astype(int).T
+    there = (row >= 0) & (row < shape[0]) & (column < shape[1])
+    found = np.zeros(shape, bool)
+    found[row[there], column[there]] = True
+    return found
 
 
 def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:

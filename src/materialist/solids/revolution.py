@@ -1,6 +1,7 @@
 """A surface of revolution: one profile swept around its axis, found from what is seen of it, and made a closed body.
 
-Every visible point says where the profile is and how it leans. So the inner side of a ring and the underside of a
+Every visible point says where the profile is and how it leans. Every ray that passes the object, or comes to its front,
+says where the profile is not, whatever turn brings it there. So the inner side of a ring and the underside of a
 shoulder are known; maps of front and back have no place for them.
 """
 
@@ -21,8 +22,11 @@ class RevolutionSettings:
     """How a profile is read off the maps, and swept."""
 
     cells: int = 180  # of the profile's plane along the object
+    rays: int = 6000  # rays at most that tell where the object is not: a bound on memory
     block: int = 4096  # rays that are followed at once: a bound on memory
     around: int = 256  # corners of the swept circles
+    near: int = 6  # pixels around the object whose rays tell where it is not
+    before: float = 1.5  # cells before the front at which rays are free for certain
     sunk: float = 0.3  # part of its height that an object reaches below what is seen of it, at most; tuned by eye
     air: float = 0.004  # part of its height that an object stays above the ground
     side: float = 0.5  # least outward part of the normals of a side; above the last of it is the lid
@@ -148,7 +152,8 @@ def profile_of(
     if not np.isfinite(floor):
         facing = -(normal[inside] * rays[inside]).sum(-1) / np.linalg.norm(rays[inside], axis=-1)
         floor = low if np.median(facing[seen[:, 1] <= low + 0.06 * high]) > DEFAULT.base_facing else -np.inf
-    return fitted(seen, axis.leaning(points, normal[inside]), cell, max(low - DEFAULT.sunk * high, floor))
+    passed = _passed(depth, inside, rays, axis, (wide, high), cell)
+    return fitted(seen, axis.leaning(points, normal[inside]), passed, cell, max(low - DEFAULT.sunk * high, floor))
 
 
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
@@ -157,6 +162,25 @@ def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) 
         return -np.inf
     points = rays[known] * np.asarray(behind)[known][:, None]
     return float(np.percentile((points - axis.foot) @ axis.up, 2))
+
+
+def _passed(
+    depth: Array, inside: Array, rays: Array, axis: Axis, extent: tuple[float, float], cell: float
+) -> Array:  # fmt: skip
+    """[M, 2] places of the half plane that rays pass before they meet anything; extent: (width, height) of the body."""
+    import cv2
+
+    near = cv2.dilate(inside.astype(np.uint8), np.ones((2 * DEFAULT.near + 1,) * 2, np.uint8)) > 0
+    stride = max(1, int(near.sum()) // DEFAULT.rays)
+    front = np.where(inside, depth - DEFAULT.before * cell, np.inf)[near][::stride]
+    ray = rays[near][::stride]
+    length = np.linalg.norm(ray, axis=-1)
+    # Along the rays, through the ball around the object.
+    reach = 1.2 * float(np.hypot(*extent))
+    middle = axis.foot + extent[1] / 2 * axis.up
+    nearest = (ray @ middle) / length**2
+    at = nearest[:, None] + np.arange(-reach, reach, 0.7 * cell) / length[:, None]  # [N, S] planar depth
+    return axis.of((ray[:, None] * at[..., None])[at < front[:, None]])
 
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
