@@ -1,4 +1,5 @@
-"""The object at clicks or in a box: ClickNet where it is certain, else GrabCut (Rother et al. 2004)."""
+"""The object at clicks or in a box: ClickNet where it is certain, its outline redrawn by GrabCut (Rother et al. 2004);
+GrabCut alone elsewhere."""
 
 from __future__ import annotations
 
@@ -38,6 +39,18 @@ class SelectSettings:
     """Radius around a click beyond which GrabCut does not look (54 clicks)."""
     gap: float = 0.015
     """Half of the gap across which two parts are one, share of the longer side (tuned by eye)."""
+    inwards: float = 0.02
+    """How far ClickNet's outline may move inwards to an edge of the photo, share of the longer side (tuned by eye)."""
+    outwards: float = 0.22
+    """How far it may move outwards: thin parts stick out (tuned by eye)."""
+    unlikely: float = 0.3
+    """Likelihood below which a pixel is none of the object; larger keeps the outline closer (tuned by eye)."""
+    near_likely: float = 0.015
+    """Distance from likelier pixels up to which an unlikely one may still be of the object (tuned by eye)."""
+    kept: float = 0.6
+    """Overlap with ClickNet's mask below which GrabCut has lost the object in its surroundings (tuned by eye)."""
+    passes: int = 3
+    """Times that the band follows the outline: a first pass stops at a shadow (tuned by eye)."""
 
 
 DEFAULT = SelectSettings()
@@ -50,7 +63,7 @@ def object_at(
     if network:
         likely = clicknet(scene, points)
         if certainty(likely) >= settings.certain:
-            return tidy(likely > 0.5, points)
+            return refined(scene, tidy(likely > 0.5, points), points, likely, settings)
     return tidy(grabcut(scene, _around(scene, points, settings), rounds=5), points)
 
 
@@ -124,6 +137,39 @@ def _in_box(scene: Scene, box: Box, settings: SelectSettings) -> Array:
             if (likely * inside).sum() > settings.within * likely.sum():
                 found = np.maximum(found, likely * inside)
     return found
+
+
+def refined(
+    scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array, settings: SelectSettings = DEFAULT
+) -> Array:
+    """[H, W] bool: the rough mask with its outline moved to the photo's edges, a band at a time.
+
+    `likely` [H, W] in [0, 1]: the outline stays out of what is clearly none of the object. `points` (column, row) lie
+    on the object.
+    """
+    import cv2
+
+    def disc(share: float) -> Array:
+        radius = max(2, round(share * max(rough.shape)))
+        return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+
+    possible = cv2.dilate((likely > settings.unlikely).astype(np.uint8), disc(settings.near_likely)) > 0
+    mask = rough
+    for _ in range(settings.passes):
+        inner = cv2.erode(mask.astype(np.uint8), disc(settings.inwards), borderValue=1) > 0
+        if not inner.any():
+            inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1) > 0
+        outer = (cv2.dilate(mask.astype(np.uint8), disc(settings.outwards)) > 0) & (possible | mask)
+        label = np.where(inner, CERTAIN, np.where(mask, PROBABLE, np.where(outer, POSSIBLE, 0))).astype(np.uint8)
+        for x, y in points:
+            label[y, x] = CERTAIN
+        found = tidy(grabcut(scene, label), points)
+        if overlap(found, mask) <= settings.kept:
+            return tidy(mask, points)
+        if np.array_equal(found, mask):
+            break
+        mask = found
+    return mask
 
 
 def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
