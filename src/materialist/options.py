@@ -61,7 +61,7 @@ class Removal(OperationOptions):
         low=0, high=2, choices=("auto",), metavar="auto|S")
     """None and `auto` look for the shadow."""
     grow: float = option(
-        0.006, "Rim of the object that is filled as well, share of the picture's longer side.", low=0, high=0.2,
+        0.01, "Rim of the object that is filled as well, share of the picture's longer side.", low=0, high=0.2,
         called="rim", flag=None)
     seed: int = option(0, "Of the patch search.", **_SEED)
     device: str = option("auto", "Where a diffusion model runs.", **_DEVICE)

@@ -9,7 +9,6 @@ from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
 from materialist.color import linear_to_srgb
-from materialist.edits.glass.preview import GlassPreview
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
 
@@ -136,17 +135,6 @@ def test_glass_is_written_saved_and_loaded_again(run, folder, tmp_path):
     assert code == 0 and facts(shown)["edits"][-1]["hollow"] is True, err
 
 
-def test_a_preview_is_a_picture_that_says_so(run, folder, tmp_path):
-    command = ("glass", folder / "a.scene", "--mask", folder / "block.png", "--ior", 1.4, "--thickness", "symmetry")
-    code, shown, err = run(*command, "--preview", "--tint", "1,0.5,0.5", "-o", tmp_path / "p.exr")
-    assert code == 0, err
-    assert "A preview: 48 x 36" in shown and "without the shadow" in shown and "thickness: symmetry" in shown
-    truth = GlassPreview(load_scene(folder / "a.scene"), MASK, thickness="symmetry")
-    np.testing.assert_allclose(
-        read_exr(tmp_path / "p.exr"), truth.picture(ior=1.4, tint=(1, 0.5, 0.5), spp=16), rtol=1e-5
-    )
-
-
 def test_remove_with_a_background_shows_it(run, folder, tmp_path):
     code, _, err = run(
         "remove", folder / "a.scene", "--mask", folder / "block.png", "--background", folder / "wall.exr", "--spp", 16,
@@ -237,9 +225,7 @@ INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
         ((*GLASS, "--ior", "0.9"), "out.png", "refraction is 0.9"),
         ((*GLASS, "--tint", "1,1"), "out.png", "must be R,G,B"),
         ((*GLASS, "--thickness", "none.exr"), "out.png", "none.exr"),
-        ((*GLASS, "--preview", "--full-render"), "out.png", "--preview"),
         ((*GLASS, "--model", "two-interface", "--full-render"), "out.png", "--model closed"),
-        ((*GLASS, "--model", "two-interface", "--preview"), "out.png", "closed"),
         (("glass", "a.scene", "--mask", "all.png"), "out.png", "mark one object only"),
         (("remove", "a.scene", "--mask", "block.png", "--background", "square.exr"), "out.png", "same proportions"),
         (("remove", "a.scene", "--mask", "block.png", "--inpaint", "magic"), "out.png", "give sd:FOLDER"),

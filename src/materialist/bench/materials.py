@@ -9,9 +9,7 @@ linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]
 square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a PSNR is at most 100.
 Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without it; SI log RMSE is the
 standard deviation of log depth error; `order` the part of random pixel pairs in the right order (a constant gets 0.5).
-Normals: mean angle, degrees. LPIPS (AlexNet, of sRGB-encoded maps, with the truth where there is no surface) only where
-the lpips package and its weights are installed. sheet.png: the photo, and the maps of each predictor and the true ones
-under each other.
+Normals: mean angle, degrees. sheet.png: the photo, and the maps of each predictor and the true ones under each other.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.option_kinds import option
 from materialist.predict.protocol import MAPS
-from materialist.types import Array, Camera, Materials, Photo, Prediction
+from materialist.types import Camera, Photo, Prediction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +35,6 @@ class MaterialsBench(Benchmark):
     columns = (
         Column("albedo_psnr", "albedo PSNR", "higher", 2),
         Column("albedo_ssim", "albedo SSIM", "higher"),
-        Column("albedo_lpips", "albedo LPIPS", "lower"),
         Column("albedo_psnr_raw", "albedo PSNR raw", "higher", 2),
         *(
             Column(f"{name}_{key}", f"{name} {title}", better, digits)
@@ -46,7 +43,6 @@ class MaterialsBench(Benchmark):
                 ("psnr", "PSNR", "higher", 2),
                 ("psnr_pooled", "PSNR pooled", "higher", 2),
                 ("ssim", "SSIM", "higher", 3),
-                ("lpips", "LPIPS", "lower", 3),
             )
         ),
         Column("depth_mae", "depth MAE", "lower"),
@@ -143,26 +139,10 @@ def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str
     """The figures of a prediction; none of the maps that the truth lacks, in whose place something else stands."""
     from materialist.metrics.maps import ordinal_accuracy, score
 
-    figures, surface = score(found, truth), truth.depth > 0
-    if surface.any():
+    figures = score(found, truth)
+    if (truth.depth > 0).any():
         figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
-        figures |= _perceptual(found.materials, truth.materials, surface)
     return {key: value for key, value in figures.items() if not key.startswith(tuple(f"{name}_" for name in absent))}
-
-
-def _perceptual(found: Materials, true: Materials, surface: Array) -> dict[str, float]:
-    """LPIPS of albedo (after one factor), roughness and metallic over the true surface, where it is installed."""
-    from materialist.metrics.lpips import lpips
-    from materialist.metrics.maps import best_scale
-
-    scale = np.float32(best_scale(found.albedo, true.albedo, surface))
-    pairs = {"albedo": (found.albedo * scale, true.albedo)}
-    pairs |= {name: (getattr(found, name), getattr(true, name)) for name in ("roughness", "metallic")}
-    out: dict[str, float] = {}
-    for name, (a, b) in pairs.items():
-        distance = lpips(np.where(surface[..., None] if a.ndim == 3 else surface, a, b), b)
-        out |= {} if distance is None else {f"{name}_lpips": distance}
-    return out
 
 
 def _pool(rows: list[Row]) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,11 +10,10 @@ import typer
 from materialist.cli.generate import add_command
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
+from materialist.cli.progress import StageProgress
 from materialist.errors import Interrupted
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from materialist.batches.outcome import Outcome, Status
 
 
@@ -55,11 +52,11 @@ def batch(
     from materialist.batches.run import batch as run
 
     try:
-        with BatchProgress(quiet=computing.as_json) as progress:
+        with StageProgress(quiet=computing.as_json) as bars:
             outcome = run(
                 source, output, apply=apply, workers=workers, ray=ray, resume=resume, force=force,
                 predictor=predictor, size=size, fov=fov, seed=computing.seed, device=computing.device, spp=spp,
-                progress=progress,
+                progress=lambda status: _told(bars, status, computing.as_json),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None
@@ -82,45 +79,9 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
     )  # fmt: skip
 
 
-class BatchProgress:
-    """Context manager and callback: a bar over all photos with failures and what is at work.
-
-    Where stderr is no terminal there is a line for each photo instead, and with `quiet` nothing.
-    """
-
-    def __init__(self, quiet: bool = False) -> None:
-        self._quiet = quiet
-        self._bar: Progress | None = None
-        if not quiet and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-            self._bar = Progress(
-                BarColumn(bar_width=16), MofNCompleteColumn(), TimeRemainingColumn(),
-                TextColumn("{task.description}", markup=False), console=Console(stderr=True),
-                speed_estimate_period=3600,
-            )  # fmt: skip
-
-    def __enter__(self) -> BatchProgress:
-        if self._bar is not None:
-            self._bar.start()
-            self._all = self._bar.add_task("looking at what is there", total=None)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def __call__(self, status: Status) -> None:
-        """Show the state of the batch now."""
-        over = status.done + status.failed
-        if self._bar is not None:
-            if status.news and status.urgent:
-                self._bar.console.print(status.news, markup=False, highlight=False)
-            words = [f"{status.failed} failed"] if status.failed else []
-            words += [f"{name}: {stage}" for name, stage in list(status.running.items())[:3]]
-            self._bar.update(self._all, completed=over, total=status.total, description=", ".join(words))
-        elif status.news and not self._quiet:
-            typer.echo(f"[{over}/{status.total}] {status.news}", err=True)
+def _told(bars: StageProgress, status: Status, quiet: bool) -> None:
+    """The state of the batch as a bar, and what has just happened as a line."""
+    over = status.done + status.failed
+    bars("photos", over, status.total)
+    if status.news and not quiet:
+        typer.echo(f"[{over}/{status.total}] {status.news}", err=True)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from materialist.cli.generate import add_command
 from materialist.cli.options import PictureOutput, Region, Rendering, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_before, chosen_region, flag_numbers, write_result
-from materialist.cli.progress import StageProgress
+from materialist.cli.picture import check_before, chosen_region, flag_numbers, opened, write_result
 from materialist.errors import InputError
 from materialist.options import Glass, Insertion, MaterialEdit, Removal
 
-PREVIEW_PATHS = 16
-"""Paths a pixel of `glass --preview`, as in the studio."""
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
 
 
@@ -62,75 +58,28 @@ def edit(
 ) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
     from materialist.edits.material.material import edit as change
-    from materialist.io.package import load_scene
 
     if options == MaterialEdit():
         raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
-    check_before(output, rendering, run)
-    loaded = load_scene(scene)
-    found = chosen_region(loaded, region, run)
+    loaded, found = opened(scene, output, region, rendering, run)
     lines = [f"{int(found.sum())} pixels edited, {float(found.mean()):.0%} of the photo."]
     write_result("edit", loaded, change(loaded, found, options), output, rendering, run, lines=lines)
 
 
 def glass(
-    scene: SceneArgument,
-    output: PictureOutput,
-    region: Region,
-    options: Glass,
-    run: Run,
-    rendering: Rendering,
-    preview: Annotated[
-        bool, typer.Option("--preview", help="Sooner: working size, without its shadow and caustics.")
-    ] = False,
+    scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, rendering: Rendering, run: Run
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
     from materialist.edits.glass.glass import glass as change
-    from materialist.io.package import load_scene
 
     if options.model == "two-interface" and rendering.full_render:
         raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
-    check_before(output, rendering, run)
-    if preview and (rendering.save is not None or rendering.full_render or not rendering.denoise):
-        raise InputError("--preview writes a picture and nothing else: leave --save, --full-render, --no-denoise out.")
-    loaded = load_scene(scene)
-    found = chosen_region(loaded, region, run)
-    if preview:
-        _preview(loaded, found, options, output, rendering.spp or PREVIEW_PATHS, run)
-        return
+    loaded, found = opened(scene, output, region, rendering, run)
     edited = change(loaded, found, options)
     source = edited.provenance["edits"][-1]["thickness"]
     lines = [f"{int(found.sum())} pixels are glass; thickness: {source}."]
     write_result("glass", loaded, edited, output, rendering, run, lines=lines)
-
-
-def _preview(loaded: Any, region: Any, options: Glass, output: Path, spp: int, run: Run) -> None:
-    """Write what the studio shows while its sliders move, and say what it leaves out."""
-    from materialist.edits.composite.output import write_composite
-    from materialist.edits.core.notes import warnings_since
-    from materialist.edits.glass.preview import GlassPreview
-
-    start = time.monotonic()
-    look = {name: getattr(options, name) for name in ("ior", "transmission", "tint", "roughness")}
-    with StageProgress(quiet=run.as_json) as progress:
-        progress("body", 0, 1)
-        made = GlassPreview(loaded, region, options)
-        progress("render", 0, 1)
-        picture = made.picture(spp=spp, seed=run.seed)
-    write_composite(output, picture, loaded.photo, force=run.force)
-    size, source = f"{picture.shape[1]} x {picture.shape[0]}", made.edited.provenance["edits"][-1]["thickness"]
-    warnings = warnings_since(loaded, made.edited)
-    lines = [
-        f"{int(region.sum())} pixels are glass; thickness: {source}.",
-        f"A preview: {size}, the size that the scene was worked out at, without the shadow and caustics of the glass.",
-        *(f"Note: {note}" for note in warnings),
-        f"Look at {output}",
-    ]
-    report_success(
-        "glass", run.as_json, lines, image=str(output), scene=None, preview=True, seconds=time.monotonic() - start,
-        thickness=source, warnings=warnings, **look,
-    )  # fmt: skip
 
 
 def remove(
@@ -138,11 +87,8 @@ def remove(
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
     from materialist.edits.remove.remove import remove as change
-    from materialist.io.package import load_scene
 
-    check_before(output, rendering, run)
-    loaded = load_scene(scene)
-    found = chosen_region(loaded, region, run)
+    loaded, found = opened(scene, output, region, rendering, run)
     lines = [f"{int(found.sum())} pixels taken away."]
     write_result("remove", loaded, change(loaded, found, options), output, rendering, run, lines=lines)
 

@@ -36,6 +36,15 @@ def chosen_region(scene: Any, region: Place, run: Run) -> Any:
     )
 
 
+def opened(scene: Path, output: Path, region: Place, rendering: Rendering, run: Run) -> tuple[Any, Any]:
+    """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
+    from materialist.io.package import load_scene
+
+    check_before(output, rendering, run)
+    loaded = load_scene(scene)
+    return loaded, chosen_region(loaded, region, run)
+
+
 def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | None = None) -> None:
     """Everything about the output that can be wrong, before the work starts; `video`: frames a second of a film.
 

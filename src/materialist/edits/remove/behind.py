@@ -25,9 +25,6 @@ class ContinuationSettings:
     ring: float = 0.1  # width, in sizes, of the ring around the hole whose surfaces may go on
     share: float = 0.01  # least part of that ring of a surface that goes on
     firm: float = 0.1  # part of the ring from which planes leave nothing hidden to what is no plane
-    beyond: float = 0.5  # unless this part of what is no plane stands where no plane goes on: the background
-    farthest: float = 1.1  # a plane ends at this multiple of the depth up to which it is seen
-    nearer: float = 0.9  # a plane is not where it would come before this part of the depth that is seen
     window: float = 0.4  # width, in sizes, of the surroundings that are looked at
     fades: float = 0.2  # distance from the hole, in sizes, at which a pixel counts 1 / e for lines between surfaces
     straight: float = 0.9  # least part of the surroundings that such lines must sort rightly; else a membrane does
@@ -64,16 +61,12 @@ def behind(
     """
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
     out = HiddenGeometry(depth.astype(np.float32), normal.astype(np.float32), known)
-    ends = {
-        int(k): settings.farthest * float(np.percentile(depth[~hole & (known == k)], 99))
-        for k in np.unique(known[~hole & (known >= 0)])
-    }
     margin = max(8, round(settings.window * float(np.sqrt(hole.sum()))) + 1)
     box = window(hole, hole.shape, margin)
     around = _Surroundings(
         depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float), settings
     )
-    label = around.labels(ends)
+    label = around.labels()
     for k in np.unique(label[around.hole]):
         here = around.hole & (label == k)
         new_depth, new_normal = around.surface(int(k), here, front[box])
@@ -94,16 +87,14 @@ class _Surroundings:
         self.spanned = membrane(self.inverse, ~hole & surface)
         self.ring = _ring(hole, settings.ring)
 
-    def labels(self, ends: dict[int, float]) -> Array:
-        """[h, w] int: the labels around, carried into the hole; `ends`: the depth at which each plane ends."""
+    def labels(self) -> Array:
+        """[h, w] int: the labels around, carried into the hole."""
         kinds, count = np.unique(self.known[~self.hole], return_counts=True)
         shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(self.ring.sum(), 1)
         kept = kinds[shares >= self.settings.share] if self.ring.any() else kinds[count.argmax()][None]
-        firm = shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= self.settings.firm
-        background = LOOSE in kept and self._is_background({k: ends[k] for k in map(int, kept) if k >= 0})
-        if firm and not background:
+        if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= self.settings.firm:
             kept = kept[kept != LOOSE]
-        chosen = None if LOOSE in kept and not background else self._parted(kept)
+        chosen = None if LOOSE in kept else self._parted(kept)
         if chosen is None:
             indicator = np.stack([self.known == k for k in kept], -1).astype(np.float32)
             chosen = kept[membrane(indicator, ~self.hole & np.isin(self.known, kept)).argmax(-1)]
@@ -140,15 +131,6 @@ class _Surroundings:
         normal = membrane(self.normal, own)[here]
         length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), normal / length
-
-    def _is_background(self, ends: dict[int, float]) -> bool:
-        """Whether what lies on no plane around the hole stands where planes have ended, and not on them."""
-        loose = self.ring & (self.known == LOOSE)
-        beyond = np.ones(loose.sum(), bool)
-        for k, end in ends.items():
-            going_on = self.rays[loose] @ self._plane(~self.hole & (self.known == k))  # above the horizon not positive
-            beyond &= (going_on < 1 / end) | (going_on > self.inverse[loose] / self.settings.nearer)
-        return bool(loose.any() and beyond.mean() > self.settings.beyond)
 
     def _on_plane(self, own: Array) -> Array:
         """[h, w] inverse depth of the plane through the pixels `own` [h, w] bool, bent to meet them at the hole."""
