@@ -1,5 +1,7 @@
 """Fixtures for all tests."""
 
+import shutil
+
 import pytest
 
 
@@ -28,3 +30,31 @@ def sample(mitsuba):
     from materialist.procedural.synthetic import make_sample
 
     return make_sample(0, 0, 0, size=(40, 56), seed=0, spp=64)
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command line; returns (exit code, stdout, stderr)."""
+    from materialist.cli import app
+    from materialist.cli.outcome import run_to_exit_code
+
+    def call(*arguments):
+        code = run_to_exit_code(app, [str(argument) for argument in arguments])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium (skipped, with the reason, where it is not there)."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("needs chromium")
+    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=chromium, args=options)
+        yield opened
+        opened.close()

@@ -10,21 +10,12 @@ from made_batch import photos
 
 import materialist.batches.run as batch_run
 from materialist.batches.outcome import Outcome, Row
-from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 
 
-@pytest.fixture
-def run(capsys, monkeypatch):
-    """Run a command line with the stand-in for the inversion; returns (exit code, stdout, stderr)."""
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch):
+    """The stand-in for the inversion."""
     monkeypatch.setattr(batch_run, "batch", functools.partial(batch_run.batch, function="made_batch:moody"))
-
-    def call(*arguments):
-        code = run_to_exit_code(app, [str(argument) for argument in arguments])
-        shown = capsys.readouterr()
-        return code, shown.out, shown.err
-
-    return call
 
 
 def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):

@@ -2,14 +2,12 @@
 
 import base64
 import re
-import shutil
-import zlib
 
 import numpy as np
 import pytest
 from export_scenes import room
 
-from materialist.exporters.page import _VERTEX, _packed, page
+from materialist.exporters.page import page
 from materialist.exporters.parts import scene_parts
 
 
@@ -29,35 +27,6 @@ def test_foreign_text_is_escaped(text):
     assert "too &lt;/script&gt; dark" in text
     assert text.count("</script>") == 2 and "{{" not in text
     assert "31.25 dB" in text and "nan" not in text.split("<script")[0]
-
-
-def test_the_mesh_survives_packing():
-    scene = room()
-    parts = scene_parts(scene)
-    packed = _packed(scene.camera, scene.depth, parts)
-    vertices = np.frombuffer(zlib.decompress(base64.b64decode(packed["vertices"])), _VERTEX)
-    indices = np.frombuffer(zlib.decompress(base64.b64decode(packed["indices"])), "<u4").reshape(-1, 3)
-    assert _VERTEX.itemsize == 24 and packed["all"] == indices.size
-    surface = parts[0].mesh
-    count = len(surface.vertices)
-    np.testing.assert_array_equal(vertices["position"][:count], surface.vertices)
-    assert np.abs(vertices["uv"][:count] / 65535 - surface.uv).max() < 1e-5
-    assert (vertices["colour"][:count, 3] == 0).all() and (vertices["colour"][count:, 3] == 255).all()
-    second = indices[packed["surface"] // 3 :][: len(parts[1].mesh.faces)]
-    np.testing.assert_array_equal(vertices["position"][second], parts[1].mesh.vertices[parts[1].mesh.faces])
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("needs chromium")
-    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
-    with playwright.sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=chromium, args=options)
-        yield running
-        running.close()
 
 
 def test_in_a_browser(browser, tmp_path):

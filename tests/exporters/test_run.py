@@ -6,8 +6,6 @@ import pytest
 from export_scenes import room
 
 import materialist as mt
-from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 from materialist.io.package import save_scene
 
 
@@ -64,29 +62,28 @@ def test_the_page_is_reduced_unless_asked_otherwise(tmp_path, monkeypatch):
     assert small < whole - 20_000
 
 
-def test_command(package, tmp_path, capsys):
+def test_command(run, package, tmp_path):
     target = tmp_path / "room.glb"
-    arguments = ["export", str(package), "--to", "glb", "-o", str(target), "--json"]
-    assert run_to_exit_code(app, arguments) == 0
-    told = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.light.hdr")]
+    arguments = ["export", package, "--to", "glb", "-o", target]
+    code, out, _ = run(*arguments, "--json")
+    told = json.loads(out.splitlines()[-1])
+    assert code == 0 and told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.light.hdr")]
     before = target.read_bytes()
-    assert run_to_exit_code(app, arguments) == 2
-    assert "give --force" in capsys.readouterr().err and target.read_bytes() == before
-    assert run_to_exit_code(app, [*arguments, "--force", "--max-triangles", "1000"]) == 0
+    code, _, err = run(*arguments)
+    assert code == 2 and "give --force" in err and target.read_bytes() == before
+    assert run(*arguments, "--force", "--max-triangles", 1000)[0] == 0
     assert len(target.read_bytes()) < len(before) / 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.light.hdr"]
 
 
-def test_command_with_bad_input(package, tmp_path, capsys):
-    out = str(tmp_path / "a.html")
-    for arguments in (
-        ["export", str(tmp_path / "none"), "--to", "html", "-o", out],
-        ["export", str(package), "--to", "html", "-o", out, "--max-triangles", "5"],
-        ["export", str(package), "--to", "glb", "-o", out],
-        ["export", str(package), "--to", "vrml", "-o", out],
-        ["export", str(package), "--to", "html", "-o", out, "--shadow-catcher"],
+def test_command_with_bad_input(run, package, tmp_path):
+    for source, to, *more in (
+        (tmp_path / "none", "html"),
+        (package, "html", "--max-triangles", 5),
+        (package, "glb"),
+        (package, "vrml"),
+        (package, "html", "--shadow-catcher"),
     ):
-        assert run_to_exit_code(app, arguments) == 2
-        assert capsys.readouterr().err
+        code, _, err = run("export", source, "--to", to, "-o", tmp_path / "a.html", *more)
+        assert code == 2 and err
     assert list(tmp_path.iterdir()) == []

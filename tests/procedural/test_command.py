@@ -2,31 +2,20 @@
 
 import json
 
-from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 
-
-def run(capsys, *arguments):
-    code = run_to_exit_code(app, ["train", "data", *map(str, arguments)])
-    return code, capsys.readouterr()
-
-
-def test_makes_resumes_refuses_and_draws(tmp_path, capsys):
-    folder = tmp_path / "set"
-    common = ("-o", folder, "--size", 32, "--spp", 1, "--seed", 5, "--device", "cpu")
-    code, out = run(capsys, *common, "--count", 1, "--json")
-    assert code == 0
-    assert json.loads(out.out.splitlines()[-1])["rendered"] == 1
-    code, out = run(capsys, *common, "--count", 2, "--resume", "--json")
-    told = json.loads(out.out.splitlines()[-1])
+def test_makes_resumes_refuses_and_draws(run, tmp_path):
+    folder, sheet = tmp_path / "set", tmp_path / "sheet.png"
+    make = ("train", "data", "-o", folder, "--size", 32, "--spp", 1, "--seed", 5, "--device", "cpu", "--count")
+    code, out, _ = run(*make, 1, "--json")
+    assert code == 0 and json.loads(out.splitlines()[-1])["rendered"] == 1
+    code, out, _ = run(*make, 2, "--resume", "--json")
+    told = json.loads(out.splitlines()[-1])
     assert (code, told["rendered"], told["existing"]) == (0, 1, 1)
-    code, out = run(capsys, *common, "--count", 2)
-    assert code == 2
-    assert "--resume" in out.err
-    code, out = run(capsys, "-o", folder, "--sheet", tmp_path / "sheet.png")
-    assert code == 0
-    drawn = (tmp_path / "sheet.png").read_bytes()
-    code, out = run(capsys, "-o", folder, "--sheet", tmp_path / "sheet.png")
-    assert (code, (tmp_path / "sheet.png").read_bytes()) == (2, drawn)
-    assert "--force" in out.err
-    assert run(capsys, "-o", folder, "--sheet", tmp_path / "sheet.png", "--force")[0] == 0
+    code, _, err = run(*make, 2)
+    assert code == 2 and "--resume" in err
+    draw = ("train", "data", "-o", folder, "--sheet", sheet)
+    assert run(*draw)[0] == 0
+    drawn = sheet.read_bytes()
+    code, _, err = run(*draw)
+    assert code == 2 and "--force" in err and sheet.read_bytes() == drawn
+    assert run(*draw, "--force")[0] == 0

@@ -1,6 +1,4 @@
-"""A session on a small scene; a studio that runs on it, and a browser (skipped, with the reason, where they fail)."""
-
-import shutil
+"""A session on a small scene; a studio that runs on it, and pages of a browser."""
 
 import pytest
 from studio_scenes import package
@@ -21,19 +19,6 @@ def running(tmp_path_factory):
     yield address, folder / "work"
     process.terminate()
     process.wait(20)
-
-
-@pytest.fixture(scope="session")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("needs chromium")
-    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=chromium, args=options)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

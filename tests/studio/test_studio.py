@@ -4,13 +4,11 @@ import socket
 
 import pytest
 
-from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import widgets
-from materialist.studio.server import check_host, check_port, first_target, new_studio
+from materialist.studio.server import check_host, first_target, new_studio
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
 
@@ -56,16 +54,13 @@ def test_others_need_leave(host):
     assert not check_host(host, "word", False) and not check_host(host, None, True)
 
 
-def test_a_port_in_use_is_one_sentence(tmp_path, capsys):
+def test_a_port_in_use_is_one_sentence(run, tmp_path):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(InputError, match=f"Port {port}"):
-            check_port("127.0.0.1", port)
-        assert run_to_exit_code(app, ["studio", "--port", str(port), "--work", str(tmp_path / "w")]) == 2
-    assert f"Port {port}" in capsys.readouterr().err
-    assert not (tmp_path / "w").exists()
+        code, _, err = run("studio", "--port", port, "--work", tmp_path / "w")
+    assert code == 2 and f"Port {port}" in err and not (tmp_path / "w").exists()
 
 
 @pytest.mark.parametrize(
@@ -73,11 +68,11 @@ def test_a_port_in_use_is_one_sentence(tmp_path, capsys):
     [["--host", "0.0.0.0"], ["--port", "0"], ["--port", "99999"], ["--work", "/proc/nowhere"], ["--workers", "0"],
      ["/no/such/scene"]],
 )  # fmt: skip
-def test_bad_options_end_with_2(arguments, tmp_path, capsys):
-    work = [] if "--work" in arguments else ["--work", str(tmp_path)]
+def test_bad_options_end_with_2(run, arguments, tmp_path):
+    work = [] if "--work" in arguments else ["--work", tmp_path]
     port = [] if "--port" in arguments else ["--port", "47391"]
-    assert run_to_exit_code(app, ["studio", *arguments, *work, *port]) == 2
-    assert capsys.readouterr().err.startswith("Error: ")
+    code, _, err = run("studio", *arguments, *work, *port)
+    assert code == 2 and err.startswith("Error: ")
 
 
 def test_a_scene_elsewhere_is_known_again(tmp_path):
