@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 from made_meshes import floor_scene
-from studio_scenes import click, named
+from studio_scenes import named
 
 from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio import objects
 from materialist.studio.controls import control_values
-from materialist.studio.glass import GlassState
 from materialist.studio.objects import library_file
 from materialist.studio.preview import LivePreview
-from materialist.studio.stage import stage
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):
@@ -56,46 +54,3 @@ def test_choosing_an_object_brings_its_values(session):
     session.deselect()
     objects.place(session, 30, 40)  # the next is as the controls show it
     assert session.edits.steps[1].options == {**session.edits.steps[0].options, "at": ["30", "40"]}
-
-
-class _Tracer:
-    """Notes what it is asked, and lets things go."""
-
-    def __init__(self):
-        self.asked, self.kept = [], None
-        self.state = GlassState()
-
-    def ask(self, others, step):
-        self.asked.append((others, step.options["ior"]))
-        self.state = GlassState(True, "Tracing")
-
-    def pane(self, step):
-        return None
-
-    def keep(self, steps):
-        self.kept = steps
-
-    def stop(self):
-        self.kept = ()
-
-
-def test_the_current_glass_is_asked_for_and_no_other(session, monkeypatch):
-    tracer = _Tracer()
-    monkeypatch.setattr(session, "glass", tracer)
-    click(session)
-    session.set("edit", hue="90")
-    with pytest.raises(InputError, match="index of refraction"):
-        session.set("glass", ior="9")
-    session.set("glass", ior="1.3", transmission="1")
-    shown = stage(session)
-    assert session.current_kind == "glass" and shown["waiting"] and "tracing" in shown["badge"]
-    assert [(len(others), ior) for others, ior in tracer.asked] == [(1, "1.3")]
-    session.set("glass", ior="1.4")
-    stage(session)
-    assert tracer.asked[-1][1] == "1.4" and control_values(session)["glass_ior"] == 1.4
-    session.act("choose", 0)
-    session.set("edit", hue="100")
-    stage(session)
-    assert len(tracer.asked) == 2 and "glass_ior" not in control_values(session)  # another edit is current
-    session.act("remove", 1)
-    assert [step.kind for step in tracer.kept] == ["edit"]

@@ -1,13 +1,11 @@
 """Clicks, boxes and strokes."""
 
-import importlib.util
-
 import numpy as np
 import pytest
 from studio_scenes import block, room
 
-from materialist.errors import InputError, WeightsError
-from materialist.studio.selection import Selection, read_pick, sam_missing
+from materialist.errors import InputError
+from materialist.studio.selection import Selection, read_pick
 
 
 def overlap(mask: np.ndarray, truth: np.ndarray) -> float:
@@ -48,17 +46,3 @@ def test_box_and_brush():
 def test_nonsense_from_the_page(data):
     with pytest.raises(InputError):
         read_pick(data)
-
-
-def test_what_is_missing_is_said(monkeypatch, tmp_path):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    assert "materialist[hub]" in sam_missing()
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
-
-    def nowhere(where):
-        raise WeightsError("not here")
-
-    monkeypatch.setattr("materialist.edits.select.sam.folder_of", nowhere)
-    assert "materialist models download sam2" in sam_missing()
-    monkeypatch.setattr("materialist.edits.select.sam.folder_of", lambda where: tmp_path)
-    assert sam_missing() is None

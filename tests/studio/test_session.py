@@ -33,12 +33,31 @@ def test_an_edit_from_click_to_recipe(session):
     assert apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min() == 0.5
 
 
-def test_undo_takes_a_whole_drag_back(session):
+def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):
+    for name in ("a.png", "b.png"):
+        write_png_bytes(session.workspace / name, np.full((8, 8, 3), 90, np.uint8))
+    for name in ("a.exr", "b.exr"):
+        write_exr(session.workspace / name, np.ones((32, 64, 3), np.float32))
     click(session)
-    for hue in range(10, 100, 10):
-        session.set("edit", hue=str(hue))
+    for colour in ("#101010", "#202020", "#303030"):
+        session.set("edit", texture=None, albedo=colour)
+    for texture in ("a.png", "b.png"):
+        session.set("edit", albedo=None, texture=texture)
+    for left in ({"texture": "a.png"}, {"albedo": "#303030"}):
+        session.undo()
+        (step,) = session.edits.steps
+        assert {name: step.options[name] for name in ("texture", "albedo") if name in step.options} == left
     session.undo()
     assert session.edits.steps == () and not (session.workspace / "edits.yaml").exists()
+    for envmap in ("a.exr", "b.exr", "b.exr"):  # the same again changes nothing
+        session.light(envmap=envmap, gain="auto")
+    for x in (10, 25):
+        place_lamp(session, x, 40)
+    session.undo()
+    assert len(session.edits.steps[0].options["lamps"]) == 1
+    session.undo()
+    session.undo()
+    assert session.edits.steps[0].options["envmap"] == "a.exr"
 
 
 def test_a_selection_that_grows_takes_its_edit_along(session):
@@ -132,34 +151,6 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
     file.unlink()
 
 
-def test_each_change_of_light_is_taken_back_alone(session):
-    for x in (10, 25, 40):
-        place_lamp(session, x, 40)
-    session.undo()
-    assert len(session.edits.steps[0].options["lamps"]) == 2
-    for name in ("a.exr", "b.exr"):
-        write_exr(session.workspace / name, np.ones((32, 64, 3), np.float32))
-    for envmap in ("a.exr", "b.exr", "b.exr"):  # the same again changes nothing
-        session.light(envmap=envmap, gain="auto")
-    session.undo()
-    assert session.edits.steps[0].options["envmap"] == "a.exr"
-
-
-def test_a_colour_is_dragged_and_a_texture_is_not(session):
-    for name in ("a.png", "b.png"):
-        write_png_bytes(session.workspace / name, np.full((8, 8, 3), 90, np.uint8))
-    click(session)
-    session.set("edit", hue="10")
-    for colour in ("#101010", "#202020", "#303030"):
-        session.set("edit", texture=None, albedo=colour)
-    for texture in ("a.png", "b.png"):
-        session.set("edit", albedo=None, texture=texture)
-    for left in ({"texture": "a.png"}, {"albedo": "#303030"}, {}):
-        session.undo()
-        options = session.edits.steps[0].options
-        assert {name: options[name] for name in ("texture", "albedo") if name in options} == left
-
-
 def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session):
     click(session)
     session.set("edit", hue="10")
@@ -175,17 +166,10 @@ def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session)
     assert "rotate" in (session.workspace / "edits.yaml").read_text()
 
 
-def loaded(session, folder, text):
-    """The session with a list of edits from a file."""
-    file = folder / "edits.yaml"
-    file.write_text(text)
-    session.read_edits(file)
-    return session
-
-
 @pytest.mark.parametrize("where", ["box: [12, 12, 40, 36]", "click: [25, 24], with: grabcut"])
 def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
-    loaded(session, tmp_path, f"- edit: {{{where}, hue: 50}}")
+    (tmp_path / "edits.yaml").write_text(f"- edit: {{{where}, hue: 50}}")
+    session.read_edits(tmp_path / "edits.yaml")
     session.act("choose", 0)
     assert (session.selection.mask & block()).sum() > 0.8 * block().sum()
     click(session, 50, 40, "add")
@@ -220,17 +204,6 @@ A, B, C = (
     Step("relight", {"rotate": "90"}),
     Step("edit", {"hue": "1"}),
 )
-
-
-def test_add_move_toggle_remove():
-    edits = EditList().add(A).add(B).add(C)
-    assert edits.current == 2 and edits.steps == (A, B, C)
-    assert edits.moved(2, -1).steps == (A, C, B) and edits.moved(2, -1).current == 1
-    assert edits.moved(0, -1) is edits and edits.moved(2, 1) is edits
-    off = edits.toggled(1)
-    assert off.active == (A, C) and off.steps[1].skipped and off.toggled(1).steps == edits.steps
-    assert edits.without(0).steps == (B, C) and edits.without(0).current is None
-    assert edits.current_step == C and edits.without(0).current is None
 
 
 def test_ticking_and_moving_leave_the_current_one():

@@ -28,14 +28,6 @@ def test_a_title_is_never_a_path(tmp_path, title):
     assert shown and len(shown) <= 60 and not set("<>\n\0") & set(shown)
 
 
-def test_people_see_their_own(tmp_path):
-    work = WorkFolder(tmp_path)
-    mine, other = work.new("a", "anna"), work.new("b", "bert")
-    assert [p.name for p in work.projects("anna")] == [mine.name]
-    assert len(work.projects()) == 2
-    assert [p.name for p in work.projects("bert")] == [other.name] and work.projects("carl") == []
-
-
 def test_a_damaged_card_hides_its_project_alone(tmp_path):
     work = WorkFolder(tmp_path)
     broken, good = work.new("a", "me"), work.new("b", "me")
