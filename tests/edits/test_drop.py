@@ -8,13 +8,12 @@ import trimesh
 from made_meshes import box_file, extent, floor_scene
 
 from materialist.edits.drop.convex import convex_pieces
-from materialist.edits.drop.drop import down, drop, settle, upright
+from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.ground import Field, blocks
 from materialist.edits.drop.physics import GRAVITY, Pose, RigidBody, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
-from materialist.edits.insert.support import support_at
-from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
+from materialist.edits.recipe import apply, read_recipe, write_recipe
 from materialist.errors import InputError
 from materialist.options import Drop
 
@@ -82,20 +81,6 @@ def test_nothing_tunnels(height):
     poses = list(fall([RigidBody((BOX,), np.array([0, 0, height]), np.zeros(3))], ground, frames=45, fps=20))
     z = np.array([pose[0].centre[2] for pose in poses])
     assert z.min() > 0.04 and abs(z[-1] - z[-10]) < 1e-3
-
-
-def test_gravity(box):
-    scene = floor_scene(96, 72)
-    support = support_at(scene, AT)
-    assert down(scene, support, None) @ UP < -0.999
-    np.testing.assert_allclose(down(scene, support, (0, -2, 0)), [0, -1, 0])
-    frame = upright(down(scene, support, None))
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(frame @ UP, [0, 0, 1], atol=1e-3)
-    from edit_scenes import flat_scene
-
-    wall = flat_scene()
-    np.testing.assert_allclose(down(wall, support_at(wall, (40.0, 20.0)), None), [0, -1, 0])
 
 
 def test_things_rest_on_bodies_that_are_there(box):
@@ -203,40 +188,21 @@ def test_a_file_with_a_drop_says_the_same_before_and_after(tmp_path, box_path, r
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("poses", "words"),
     [
-        ({"mesh": "box.ply"}, "needs its at"), ({"at": ["1", "2"]}, "needs its mesh"),
-        ({"mesh": "none.ply", "at": ["1", "2"]}, "none.ply"), ({"mesh": ["a", ["b"]], "at": ["1", "2"]}, "file name"),
-        ({"mesh": "box.ply", "at": ["48", "50"], "seed": "1.5"}, "seed"),
-        ({"mesh": "box.ply", "at": ["48", "50"], "height": "-1"}, "height"),
-        ({"mesh": "box.ply", "at": ["48", "50"], "gravity": ["0", "0", "0"]}, "gravity"),
+        ([[Pose(np.array([0, 0, -1e6]), np.eye(3)), Pose(np.zeros(3), np.eye(3))]] * 14, "left out"),
+        ([[Pose(np.array([0, 0, 2.0]), np.eye(3))]] * 14, "came to rest where the camera does not look"),
+        ([[Pose(np.array([0.01 * k, 0, 0]), np.eye(3))] for k in range(40)], "at rest"),
     ],
-)  # fmt: skip
-def test_what_is_wrong_in_a_file_is_named(box_path, options, words):
-    with pytest.raises(InputError, match=words):
-        apply(floor_scene(96, 72), [Step("drop", options, box_path.parent)])
+    ids=["fell out", "out of view", "rolls on"],
+)
+def test_what_cannot_be_seen_at_rest_is_told(box, monkeypatch, poses, words):
+    monkeypatch.setattr(FALL, lambda *_, **__: poses)
+    edited = settle(floor_scene(96, 72), [box] * len(poses[0]), AT)
+    assert len(edited.bodies) == 1 and any(words in note for note in edited.report.warnings)
 
 
-def test_what_falls_out_of_the_scene_is_left_out(box, monkeypatch):
-    scene = floor_scene(96, 72)
-    below, still = Pose(np.array([0, 0, -1e6]), np.eye(3)), Pose(np.zeros(3), np.eye(3))
-    monkeypatch.setattr(FALL, lambda *_, **__: [[below, still]] * 14)
-    edited = settle(scene, [box, box], AT)
-    assert len(edited.bodies) == 1 and any("left out" in note for note in edited.report.warnings)
-    monkeypatch.setattr(FALL, lambda *_, **__: [[below]] * 14)
+def test_what_falls_beside_everything_is_refused(box, monkeypatch):
+    monkeypatch.setattr(FALL, lambda *_, **__: [[Pose(np.array([0, 0, -1e6]), np.eye(3))]] * 14)
     with pytest.raises(InputError, match="falls beside everything"):
-        settle(scene, [box], AT)
-
-
-def test_what_lies_out_of_view_is_told(box, monkeypatch):
-    away = Pose(np.array([0, 0, 2.0]), np.eye(3))
-    monkeypatch.setattr(FALL, lambda *_, **__: [[away]] * 14)
-    edited = settle(floor_scene(96, 72), [box], AT)
-    assert edited.report.warnings == ("What fell came to rest where the camera does not look.",)
-
-
-def test_what_rolls_on_is_told(box, monkeypatch):
-    rolling = [[Pose(np.array([0.01 * k, 0, 0]), np.eye(3))] for k in range(40)]
-    monkeypatch.setattr(FALL, lambda *_, **__: rolling)
-    edited = settle(floor_scene(96, 72), [box], AT)
-    assert any("at rest" in note for note in edited.report.warnings)
+        settle(floor_scene(96, 72), [box], AT)

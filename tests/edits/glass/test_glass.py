@@ -8,11 +8,8 @@ from edit_scenes import block_mask, flat_scene, rendered_scene
 
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
-from materialist.edits.core.renderer import paths_for
 from materialist.edits.glass.glass import LID, NO_ROOM, SOLID, glass
 from materialist.edits.glass.thickness import object_thickness, objects_in
-from materialist.edits.light.relight import relight
-from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.types import Camera, Materials, Photo, Prediction, Scene
@@ -32,12 +29,6 @@ def test_glass_is_a_body_before_the_continued_wall():
     what = edited.provenance["edits"][-1]
     assert what["kind"] == "glass" and what["thickness"] == "symmetry"
     assert not scene.bodies and "edits" not in scene.provenance
-
-
-def test_glass_and_other_light_take_twice_the_paths():
-    scene = flat_scene()
-    edits = edit(scene, MASK, hue=90), relight(scene, ambient=0.5), glass(scene, MASK, thickness="symmetry")
-    assert [paths_for(scene, edited) for edited in edits] == [128, 256, 256]
 
 
 def test_glass_that_bends_nothing_is_not_there():
@@ -87,24 +78,6 @@ def test_thickness_is_given_mirrored_or_predicted():
     ):  # fmt: skip
         with pytest.raises(InputError, match=message):
             object_thickness(scene, MASK, wrong)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"ior": 0.9}, r"refraction is 0.9; it must lie in \[1, 3\]"),
-        ({"ior": np.nan}, "refraction is nan"),
-        ({"transmission": 1.2}, "transmission is 1.2"),
-        ({"roughness": -0.1}, "roughness is -0.1"),
-        ({"tint": (1, 2, 1)}, "three numbers"),
-        ({"model": "magic"}, "choose one of closed, two-interface"),
-        ({"hollow": "half"}, "or open"),
-        ({"thickness": "no.exr"}, "give a file"),
-    ],
-)
-def test_bad_options(options, message):
-    with pytest.raises(InputError, match=message):
-        glass(flat_scene(), MASK, **options)
 
 
 def test_masks_at_the_frame_in_parts_and_over_everything():

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import block_mask, rendered_scene
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import glass
 from materialist.edits.glass.preview import GlassPreview
-from materialist.errors import InputError
 
 MASK = block_mask(36, 48)
 
@@ -38,12 +37,3 @@ def test_the_glass_is_exchanged_and_comes_back(preview):
     for other in (frosted, coated):
         assert np.abs(other - clear)[MASK].max() > 0.01
     np.testing.assert_array_equal(preview.picture(spp=16), clear)
-
-
-def test_bad_values_are_refused(preview):
-    with pytest.raises(InputError, match="index of refraction"):
-        preview.picture(ior=0.5)
-    with pytest.raises(InputError, match="at least 1 path"):
-        preview.picture(spp=0)
-    with pytest.raises(InputError, match="leave it 'closed'"):
-        GlassPreview(flat_scene(), MASK, model="two-interface")

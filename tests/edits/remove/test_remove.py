@@ -72,19 +72,6 @@ def test_what_was_put_before_it_stays_whole():
     assert not (red_there(gone) & ~here).any(), "nor is it copied"
 
 
-@pytest.mark.parametrize(
-    ("mask", "message"),
-    [
-        (np.zeros((36, 48), bool), "empty"),
-        (np.ones((36, 48), bool), "covers 100% of what"),
-        (np.ones((10, 10), bool), "the photo at working size"),
-    ],
-)
-def test_masks_that_cannot_be_removed(mask, message):
-    with pytest.raises(InputError, match=message):
-        remove(flat_scene(), mask)
-
-
 def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
     scene = flat_scene(sky=12)
     mask = np.zeros((36, 48), bool)
@@ -97,6 +84,8 @@ def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
     only_sky_behind = replace(scene, depth=np.where(mask, scene.depth, 0))
     with pytest.raises(InputError, match="around the mask is sky"):
         remove(only_sky_behind, mask)
+    with pytest.raises(InputError, match="covers 100% of what"):
+        remove(scene, np.ones((36, 48), bool))
 
 
 def test_a_wall_ends_without_the_object_where_it_ended_with_it():
