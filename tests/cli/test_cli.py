@@ -14,6 +14,7 @@ from PIL import Image
 
 from materialist.cli import app
 from materialist.errors import InputError, OutputError, SetupError
+from materialist.io.exr import read_exr
 from materialist.io.package import load_scene
 from materialist.option_kinds import declarations
 from materialist.options import Drop, Glass, InvertOptions, Relight
@@ -44,15 +45,10 @@ def test_invert_passes_every_option_on_and_writes_the_scene(run, photo, tmp_path
     assert str(place / "overview.png") in out
 
 
-def test_defaults_of_the_command_line_are_those_of_python(run, photo, tmp_path, monkeypatch):
+def test_defaults_are_those_of_python_and_json_is_the_last_line(run, photo, tmp_path, monkeypatch):
     calls = install(monkeypatch)
-    assert run("invert", photo, "-o", tmp_path / "a.scene")[0] == 0
-    assert calls[0]["options"] == InvertOptions()
-
-
-def test_json_success_is_the_last_line(run, photo, tmp_path, monkeypatch):
-    install(monkeypatch)
     code, out, _ = run("invert", photo, "-o", tmp_path / "a.scene", "--json")
+    assert calls[0]["options"] == InvertOptions()
     facts = json.loads(out.splitlines()[-1])
     assert code == 0 and facts["ok"] is True and facts["scene"] == str(tmp_path / "a.scene")
     assert facts["rerender_psnr_path"] == 31.25 and facts["warnings"] == ["no normals", "dim"]
@@ -63,14 +59,7 @@ def test_render_writes_what_the_pipeline_gives(run, photo, tmp_path, monkeypatch
     run("invert", photo, "-o", tmp_path / "a.scene")
     code, out, err = run("render", tmp_path / "a.scene", "-o", tmp_path / "o.exr", "--spp", 4, "--denoise", "--seed", 3)
     assert code == 0, err
-    assert {key: calls[1][key] for key in ("spp", "denoise", "seed", "device")} == {
-        "spp": 4,
-        "denoise": True,
-        "seed": 3,
-        "device": "auto",
-    }
-    from materialist.io.exr import read_exr
-
+    assert calls[1].items() >= {"spp": 4, "denoise": True, "seed": 3, "device": "auto"}.items()
     np.testing.assert_array_equal(read_exr(tmp_path / "o.exr"), load_scene(tmp_path / "a.scene").rerender)
     assert "o.exr" in out
 
@@ -106,17 +95,12 @@ def test_exit_codes(run, photo, tmp_path, monkeypatch, failure, code):
         (["invert", "PHOTO", "-o", "OUT", "--engine", "steam"], "steam"),
         (["invert", "PHOTO", "-o", "OUT", "--size", "big"], "--size"),
         (["invert", "PHOTO", "-o", "OUT", "--size", "3"], "working size"),
-        (["invert", "PHOTO", "-o", "OUT", "--fov", "500"], "field of view"),
         (["invert", "PHOTO", "-o", "OUT", "--envmap-size", "512"], "512x256"),
-        (["invert", "PHOTO", "-o", "OUT", "--envmap-size", "512x512"], "twice as wide"),
-        (["invert", "PHOTO", "-o", "OUT", "--tau", "90"], "tau"),
         (["invert", "nothing.jpg", "-o", "OUT"], "nothing.jpg"),
         (["invert", "PHOTO", "-o", "PHOTO"], "--force"),
-        (["invert", "PHOTO", "-o", "PHOTO", "--force"], "not a scene package"),
         (["invert", "PHOTO", "-o", "/proc/x.scene"], "/proc/x.scene"),
         (["render", "nothing.scene", "-o", "OUT.png"], "nothing.scene"),
         (["render", "nothing.scene", "-o", "OUT.gif"], ".png"),
-        (["render", "nothing.scene", "-o", "OUT.png", "--spp", "0"], "--spp"),
         (["bench", "light", "-o", "OUT", "--data", "nowhere"], "nowhere"),
         (["bench", "light", "-o", "OUT", "ten"], "ten"),
     ],

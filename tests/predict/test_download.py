@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import socket
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -10,7 +9,6 @@ import pytest
 
 from materialist.errors import InputError, OutputError, WeightsError
 from materialist.predict.models import (
-    adopt,
     chosen,
     download,
     folder_of,
@@ -115,16 +113,6 @@ def test_a_file_that_came_damaged_is_not_kept(hub, folder):
     assert not is_complete(MODEL) and not (folder / "matnet_weights.pth").exists()
 
 
-def test_a_hub_out_of_reach_is_told_fast_with_the_alternatives(monkeypatch):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{free.getsockname()[1]}")
-        with pytest.raises(WeightsError) as error:
-            download(MODEL)
-    for word in ("cannot be fetched", "matnet_weights.pth", "Lez/MatNet", "download matnet --from FOLDER", "maps:DIR"):
-        assert word in str(error.value)
-
-
 def test_an_unknown_or_odd_repository_is_refused(hub):
     with pytest.raises(WeightsError, match="cannot be fetched"):
         download(hub_model("nobody/nothing"))
@@ -154,31 +142,6 @@ def test_the_best_format_of_each_folder_is_chosen():
         "model_index.json", "tokenizer/vocab.json", "tokenizer/merges.txt", "unet/config.json",
         "unet/a.fp16.safetensors", "vae/b.safetensors", "old/c.fp16.bin", "w.pth",
     }  # fmt: skip
-
-
-def test_files_fetched_elsewhere_are_taken_over(folder, tmp_path):
-    source = tmp_path / "elsewhere"
-    source.mkdir()
-    with pytest.raises(InputError, match="lacks matnet_weights"):
-        adopt(MODEL, source)
-    (source / "matnet_weights.pth").write_bytes(b"weights")
-    assert adopt(MODEL, source) == folder and is_complete(MODEL) and verify_folder(folder)
-
-
-def test_verify_finds_every_kind_of_damage(hub, folder):
-    download(MODEL)
-    whole = verify_folder(folder)
-    (folder / "config.json").write_bytes(b"[]")
-    with pytest.raises(WeightsError, match=r"config\.json is damaged.*expected"):
-        verify_folder(folder)
-    (folder / "config.json").unlink()
-    with pytest.raises(WeightsError, match=r"lacks config\.json"):
-        verify_folder(folder)
-    (folder / "config.json").write_bytes(b"{}")
-    assert verify_folder(folder) == whole
-    (folder / "SHA256SUMS").write_text("")
-    with pytest.raises(WeightsError, match="no list of checksums"):
-        verify_folder(folder)
 
 
 def test_names_and_ids():
