@@ -1,5 +1,6 @@
 """A small scene whose photo is its own path-traced picture: a block before a wall, on the camera's axis."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -15,50 +16,50 @@ def block_mask(height: int, width: int) -> np.ndarray:
     return mask
 
 
+def scene_of(
+    camera: Camera, depth, normal, albedo, *, roughness=0.5, photo=None, original=None, envmap=None, completion="planes"
+) -> Scene:
+    """A scene of maps [H, W(, 3)]; the photo is the albedo and the light is even, unless they are given."""
+    depth, normal, albedo = (np.asarray(a, np.float32) for a in (depth, normal, albedo))
+    linear = albedo if photo is None else photo
+    materials = Materials(albedo, np.full(depth.shape, roughness, np.float32), np.zeros(depth.shape, np.float32))
+    seen = Photo(linear, camera, linear if original is None else original, fov_source="option")
+    geometry = build_geometry(depth, normal, camera, completion=completion)
+    light = np.ones((8, 16, 3), np.float32) if envmap is None else envmap
+    prior = Prediction(materials, normal, depth, "made")
+    return Scene(camera, seen, prior, materials, normal, depth, geometry, light, linear)
+
+
 def flat_scene(height: int = 36, width: int = 48, *, native: int = 1, sky: int = 0, block: float = 2.0) -> Scene:
     """The scene with a made-up photo; `native` times as large an original; `sky` rows without a surface.
 
     The wall is 3 away and the block `block`.
     """
     rng = np.random.default_rng(5)
-    camera = Camera(width, height, 40.0)
     mask = block_mask(height, width)
-    depth = np.where(mask, block, 3.0).astype(np.float32)
+    depth = np.where(mask, block, 3.0)
     depth[:sky] = 0
-    normal = np.zeros((height, width, 3), np.float32)
-    normal[..., 2] = 1
+    normal = np.broadcast_to([0, 0, 1], (height, width, 3))
     albedo = np.where(mask[..., None], [0.6, 0.25, 0.1], [0.5, 0.5, 0.45]).astype(np.float32)
     albedo *= rng.uniform(0.9, 1.1, (height, width, 1)).astype(np.float32)
-    materials = Materials(albedo, np.full((height, width), 0.5, np.float32), np.zeros((height, width), np.float32))
-    prior = Prediction(materials, normal, depth, "made")
     original = np.kron(albedo, np.ones((native, native, 1), np.float32))
     original *= rng.uniform(0.97, 1.03, original.shape).astype(np.float32)
-    photo = Photo(_shrunk(original, native), camera, original, fov_source="option")
-    geometry = build_geometry(depth, normal, camera, completion="none")
+    photo = original.reshape(height, native, width, native, 3).mean((1, 3)).astype(np.float32)
     envmap = np.ones((8, 16, 3), np.float32)
     envmap[:4] *= 1.5
-    return Scene(camera, photo, prior, materials, normal, depth, geometry, envmap, photo.linear)
+    camera = Camera(width, height, 40.0)
+    return scene_of(camera, depth, normal, albedo, photo=photo, original=original, envmap=envmap, completion="none")
 
 
 @lru_cache(maxsize=4)
 def rendered_scene(native: int = 1, block: float = 2.0) -> Scene:
     """The flat scene with its own rendering as photo (and as re-rendering)."""
-    from dataclasses import replace
-
-    from materialist.render.scene import RenderScene
+    from materialist.pipeline import render_scene
 
     scene = flat_scene(native=native, block=block)
-    target = RenderScene(scene.geometry, scene.camera)
-    target.set_materials(scene.materials)
-    target.set_envmap(scene.envmap)
-    picture = np.clip(target.render(spp=64, seed=11), 0, 1)
+    picture = np.clip(render_scene(scene, spp=64, seed=11), 0, 1)
     original = np.kron(picture, np.ones((native, native, 1), np.float32))
     return replace(scene, photo=replace(scene.photo, linear=picture, original=original), rerender=picture)
-
-
-def _shrunk(original: np.ndarray, native: int) -> np.ndarray:
-    h, w = original.shape[0] // native, original.shape[1] // native
-    return original.reshape(h, native, w, native, 3).mean((1, 3)).astype(np.float32)
 
 
 def tetrahedron() -> Body:

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from edit_scenes import scene_of
 from PIL import Image
 
 from materialist.camera import pixel_rays
-from materialist.geometry.build import build_geometry
-from materialist.types import Camera, Materials, Photo, Prediction, Scene
+from materialist.types import Camera, Scene
 
 
 def box_file(path: Path, extents=(1.0, 2.0, 0.5)) -> Path:
@@ -68,17 +68,10 @@ def floor_scene(width: int = 48, height: int = 36, *, tilt: float = 30.0, native
     normal = np.array([0, np.cos(np.radians(tilt)), np.sin(np.radians(tilt))])
     along = -(pixel_rays(camera) @ normal)
     depth = np.where(along > 0.05, 2 / np.maximum(along, 0.05), 0).astype(np.float32)
-    wobble = np.random.default_rng(1).normal(0, 1, depth.shape)
-    depth *= (1 + noise * wobble).astype(np.float32)
-    normals = np.broadcast_to(normal, (height, width, 3)).astype(np.float32).copy()
-    albedo = np.full((height, width, 3), 0.5, np.float32)
-    materials = Materials(albedo, np.full((height, width), 0.9, np.float32), np.zeros((height, width), np.float32))
+    depth *= (1 + noise * np.random.default_rng(1).normal(0, 1, depth.shape)).astype(np.float32)
+    normals, albedo = np.tile(normal, (height, width, 1)), np.full((height, width, 3), 0.5)
     original = np.full((height * native, width * native, 3), 0.5, np.float32)
-    photo = Photo(albedo, camera, original, fov_source="option")
-    geometry = build_geometry(depth, normals, camera)
-    envmap = np.ones((8, 16, 3), np.float32)
-    prior = Prediction(materials, normals, depth, "made")
-    return Scene(camera, photo, prior, materials, normals, depth, geometry, envmap, albedo)
+    return scene_of(camera, depth, normals, albedo, roughness=0.9, original=original)
 
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")

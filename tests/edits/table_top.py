@@ -1,11 +1,8 @@
 """Two balls on a table, to be selected."""
 
-from dataclasses import replace
-
 import numpy as np
-from edit_scenes import flat_scene
+from edit_scenes import scene_of
 
-from materialist.camera import unproject
 from materialist.types import Camera
 
 
@@ -25,18 +22,7 @@ def table_top():
     photo = (colour * rng.uniform(0.85, 1.15, (h, w, 1))).astype(np.float32).clip(0.01, 1)
     depth = np.where(first, 2.0, np.where(second, 2.3, 3.0)).astype(np.float32)
     depth[:4] = 0
-    base = flat_scene()
-    camera = Camera(w, h, 40.0)
-    normal = np.zeros((h, w, 3), np.float32)
-    normal[..., 2] = 1
-    scene = replace(
-        base,
-        camera=camera,
-        photo=replace(base.photo, linear=photo, original=photo, camera=camera),
-        depth=depth,
-        normal=normal,
-    )
-    assert unproject(depth, camera).shape == (h, w, 3)
+    scene = scene_of(Camera(w, h, 40.0), depth, np.broadcast_to([0, 0, 1], (h, w, 3)), photo, completion="none")
     return scene, first, second
 
 

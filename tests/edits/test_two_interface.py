@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from geometry_scenes import ball
 
 from materialist.bsdf.dielectric import fresnel_dielectric, masking
 from materialist.camera import pixel_rays
@@ -14,29 +15,16 @@ from materialist.types import Camera
 
 CAMERA = Camera(48, 40, 40)
 SHAPE = (40, 48)
+RADIUS, CENTRE = 0.6, (0, 0, -3)
+*MAPS, THICK = ball(CAMERA, CENTRE, RADIUS)
 
 
-def ball(camera, radius=0.6, distance=3.0):
-    """Depth, normal, mask, and cosine of incidence of a ball straight ahead."""
+def back_of_ball(camera):
+    """[H, W, 3] outward normals where camera rays leave the ball."""
+    depth, _, _, thick = ball(camera, CENTRE, RADIUS)
     rays = pixel_rays(camera).astype(float)
-    d = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    centre = np.array([0.0, 0, -distance])
-    b = d @ centre
-    inside = b**2 - distance**2 + radius**2
-    mask = inside > 1e-4
-    point = d * (b - np.sqrt(np.maximum(inside, 0)))[..., None]
-    normal = np.where(mask[..., None], (point - centre) / radius, [0, 0, 1])
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    cosine = np.where(mask, -np.sum(normal * d, -1), 1)
-    return np.where(mask, -point[..., 2], 0), normal, mask, cosine
-
-
-def back_of_ball(camera, thickness, radius=0.6, distance=3.0):
-    """[H, W, 3] outward normals where camera rays leave the ball, `thickness` behind its front."""
-    depth, *_ = ball(camera, radius, distance)
-    rays = pixel_rays(camera).astype(float)
-    far = rays * (depth + thickness / np.linalg.norm(rays, axis=-1))[..., None]
-    return ti._unit(far - [0, 0, -distance])
+    far = rays * (depth + thick / np.linalg.norm(rays, axis=-1))[..., None] - CENTRE
+    return far / np.linalg.norm(far, axis=-1, keepdims=True)
 
 
 def shown(maps, thickness, away, picture, sky=0.0, back=None, camera=CAMERA, **options):
@@ -78,11 +66,10 @@ def test_a_pane_moves_rays_aside_and_keeps_their_direction(tilt):
 
 def test_a_ball_bends_rays_twice_by_the_difference_of_angles():
     camera = Camera(160, 160, 30)
-    depth, normal, mask, cosine = ball(camera)
-    thick = np.where(mask, 1.2 * cosine, 0)
-    mask &= cosine > 0.4  # at the border the depth map of the back ends
-    front = ti.Front(camera, normal, depth, mask, back_of_ball(camera, thick), thick)
-    ci = cosine[mask]
+    depth, normal, mask, thick = ball(camera, CENTRE, RADIUS)
+    mask &= thick > 0.48  # at the border the depth map of the back ends
+    front = ti.Front(camera, normal, depth, mask, back_of_ball(camera), thick)
+    ci = thick[mask] / (2 * RADIUS)
     cr = np.sqrt(1 - (1 - ci**2) / 1.5**2)
     crossing = ti.cross(front, thick[mask], ior=1.5)
     # The exit lies on the ball, and the deviation is 2 (i - r), as for every ball lens.
@@ -109,11 +96,10 @@ def test_a_back_of_its_own_bends_rays_as_that_back_does():
 
 
 def test_without_refraction_the_background_is_seen_unchanged():
-    *maps, cosine = ball(CAMERA)
-    out, picture = shown(maps, 1.2 * cosine, 6.0, gradient(CAMERA), 1.0, ior=1.0), gradient(CAMERA)
-    inner = maps[2] & (cosine > 0.3)  # next to the silhouette some rays of a pixel pass beside the ball
+    out, picture = shown(MAPS, THICK, 6.0, gradient(CAMERA), 1.0, ior=1.0), gradient(CAMERA)
+    inner = MAPS[2] & (THICK > 0.36)  # next to the silhouette some rays of a pixel pass beside the ball
     np.testing.assert_allclose(out[inner], picture[inner], atol=1e-3)
-    assert (out[~maps[2]] == 0).all()
+    assert (out[~MAPS[2]] == 0).all()
 
 
 def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
@@ -121,11 +107,10 @@ def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
 
     def glass(fine):
         camera = Camera(48 * fine, 40 * fine, 40)
-        *maps, cosine = ball(camera)
+        *maps, thick = ball(camera, CENTRE, RADIUS)
         stripe = np.sin(2 * np.pi * (np.arange(camera.width) + 0.5) / (6 * fine)) > 0
-        picture = np.broadcast_to(stripe[None, :, None], (*cosine.shape, 3)).astype(np.float32)
-        thick = 1.2 * cosine
-        return shown(maps, thick, 9.0, picture, back=back_of_ball(camera, thick), camera=camera), maps[2]
+        picture = np.broadcast_to(stripe[None, :, None], (*thick.shape, 3)).astype(np.float32)
+        return shown(maps, thick, 9.0, picture, back=back_of_ball(camera), camera=camera), maps[2]
 
     monkeypatch.setattr(ti, "SIDES", (1, 1))
     fine, inside = glass(5)
@@ -140,20 +125,18 @@ def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
 
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 def test_no_light_is_made_or_lost(roughness):
-    *maps, cosine = ball(CAMERA)
-    out = shown(maps, 1.2 * cosine, 6.0, np.ones((*SHAPE, 3)), 1.0, roughness=roughness)
+    out = shown(MAPS, THICK, 6.0, np.ones((*SHAPE, 3)), 1.0, roughness=roughness)
     # In a white room clear glass is white, whatever it does: what stays inside at the back leaves elsewhere.
-    np.testing.assert_allclose(out[maps[2]], 1, atol=1e-6)
+    np.testing.assert_allclose(out[MAPS[2]], 1, atol=1e-6)
 
 
 def test_tint_scales_what_is_behind():
-    *maps, cosine = ball(CAMERA)
     clear, dim, mirror = (
-        shown(maps, 1.2 * cosine, 6.0, gradient(CAMERA), ior=1.3, tint=tint)
+        shown(MAPS, THICK, 6.0, gradient(CAMERA), ior=1.3, tint=tint)
         for tint in ((1.0, 1.0, 1.0), (1.0, 0.5, 0.0), (0.0, 0.0, 0.0))
     )
     np.testing.assert_allclose(dim - mirror, (clear - mirror) * [1, 0.5, 0], atol=1e-6)
-    assert np.median(mirror[maps[2]]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
+    assert np.median(mirror[MAPS[2]]) == 0 < mirror.max()  # most of it reflects the dark behind the camera
 
 
 @pytest.mark.parametrize(("roughness", "tilt"), [(0.3, 75.0), (0.6, 45.0), (1.0, 0.0)])

@@ -1,12 +1,13 @@
 """A small scene that no mirroring or transposing leaves alone: a room's corner with a box, each part in a colour."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from edit_scenes import scene_of
 
 from materialist.camera import pixel_rays
-from materialist.geometry.build import build_geometry
-from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
+from materialist.types import Camera, FitReport, Materials, Scene
 
 
 @cache
@@ -27,18 +28,16 @@ def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str =
     albedo = (albedo * (0.7 + 0.3 * checks[..., None])).astype(np.float32)
     roughness = np.linspace(0.3, 0.9, width, dtype=np.float32)[None].repeat(height, 0)
     metallic = np.where(label == 2, 0.8, 0.1).astype(np.float32)
+    scene = scene_of(camera, depth, normal, albedo, photo=albedo * 0.8, envmap=sky(), completion=completion)
+    photo = replace(scene.photo, path='dir/<b>ro"om.png', fov_source="default")
     materials = Materials(albedo, roughness, metallic)
-    photo = Photo(albedo * 0.8, camera, albedo * 0.8, path='dir/<b>ro"om.png')
     report = FitReport(
         ({"name": "light", "steps": 3, "seconds": 0.5},),
         {"rerender_psnr_path": 31.25, "poor_fraction": float("nan")},
         ("too </script> dark",),
     )
-    return Scene(
-        camera, photo, Prediction(materials, normal, depth, "made"), materials, normal, depth,
-        build_geometry(depth, normal, camera, completion=completion), sky(), photo.linear * 0.9, report,
-        {"tau": 6.0, "seed": 0},
-    )  # fmt: skip
+    made = replace(scene, photo=photo, materials=materials, rerender=photo.linear * 0.9, report=report)
+    return replace(made, provenance={"tau": 6.0, "seed": 0})
 
 
 def sky(height: int = 16) -> np.ndarray:

@@ -24,6 +24,16 @@ def sphere_depth(camera: Camera, centre, radius: float):
     return depth, (points - centre) / radius
 
 
+def ball(camera: Camera, centre, radius: float):
+    """Depth [H, W] (0 beside it), normals [H, W, 3] (towards the viewer beside it), mask, and thickness along rays."""
+    depth, normal = sphere_depth(camera, centre, radius)
+    mask = np.isfinite(depth)
+    rays = pixel_rays(camera).astype(float)
+    cosine = -(rays * normal).sum(-1) / np.linalg.norm(rays, axis=-1)
+    normal = np.where(mask[..., None], normal, [0.0, 0, 1])
+    return np.where(mask, depth, 0), normal, mask, np.where(mask, 2 * radius * cosine, 0)
+
+
 def box_depth(camera: Camera, low, high):
     """Depth [H, W] of an axis-aligned box (corners low, high), inf where missed, and its face normals [H, W, 3]."""
     rays = pixel_rays(camera).astype(float)

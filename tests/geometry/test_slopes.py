@@ -1,6 +1,7 @@
 """Slopes of normals and of depth: exact on planes, up to where they end, and near the truth on a ball."""
 
 import numpy as np
+from geometry_scenes import ball
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import pixel_rays
@@ -14,7 +15,8 @@ from materialist.geometry.slopes import (
 )
 from materialist.types import Camera
 
-RAYS = pixel_rays(Camera(64, 48, 40.0)).astype(float)
+CAMERA = Camera(64, 48, 40.0)
+RAYS = pixel_rays(CAMERA).astype(float)
 ROWS, COLUMNS = np.mgrid[:48, :64].astype(float)
 DISC = np.hypot(ROWS - 24, COLUMNS - 32) < 15
 PLANE = 3 + 0.2 * COLUMNS - 0.05 * ROWS
@@ -69,12 +71,9 @@ def test_a_flat_slanting_back_has_one_normal_even_next_to_an_edge():
 
 
 def test_the_back_of_a_ball_and_its_blurred_normals():
-    centre = np.array([0, 0, -3.0])
-    a, b = (RAYS**2).sum(-1), RAYS @ centre
-    root = b * b - a * (9 - 0.36)
-    inside = root > 0
-    depth = (b + np.sqrt(np.maximum(root, 0))) / a
-    true = (RAYS * depth[..., None] - centre) / 0.6
+    front, _, inside, thick = ball(CAMERA, (0, 0, -3), 0.6)
+    depth = front + thick / np.linalg.norm(RAYS, axis=-1)
+    true = (RAYS * depth[..., None] - [0, 0, -3]) / 0.6
     cosine = (back_normals(depth, inside, RAYS) * true).sum(-1)[inside]
     assert np.median(cosine) > 0.9999 and np.quantile(cosine, 0.1) > 0.99
     assert np.quantile((blurred_normals(true, inside, 1.0) * true).sum(-1)[inside], 0.1) > 0.99

@@ -5,7 +5,6 @@ import torch
 
 from materialist.predict.efficientnet import shipped
 
-STRIDES = (4, 8, 16, 32)
 FIGURES = (
     (24, -1.2621, 8.2813, 9.2987, 8.4701, -5.9386),
     (48, -0.5538, 7.8424, 9.9643, -6.1738, 6.2877),
@@ -32,17 +31,3 @@ def test_the_package_has_the_classifier_it_names():
         assert one.std().item() == pytest.approx(spread, rel=4e-3)
         places = [one[0, 0, 0, 0], one[0, -1, -1, -1], one[0, 7, 1, 1]]
         assert [v.item() for v in places] == pytest.approx(values, abs=0.03 * spread)
-
-
-def test_features_lie_where_the_networks_add_them():
-    encoder = shipped("lite2")
-    with torch.no_grad():
-        found = encoder(torch.rand(1, 3, 64, 96))
-    for one, stride in zip(found, STRIDES, strict=True):
-        assert one.shape[-2:] == (64 // stride, 96 // stride)
-    assert not encoder.training and not any(p.requires_grad for p in encoder.parameters())
-
-
-def test_another_encoder_is_refused():
-    with pytest.raises(ValueError, match=r"no encoder 'huge'.*lite2"):
-        shipped("huge")

@@ -2,18 +2,12 @@
 
 import numpy as np
 import pytest
+from geometry_scenes import ball, plane_depth
 
-from materialist.camera import pixel_rays
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Camera
 
 CAMERA = Camera(72, 48, 50.0)
-
-
-def plane_depth(normal: np.ndarray, distance: float) -> np.ndarray:
-    """[H, W] planar depth of the plane n . p = -distance, 0 where the ray misses it."""
-    cosine = pixel_rays(CAMERA).astype(np.float64) @ normal
-    return np.where(cosine < -1e-9, -distance / np.minimum(cosine, -1e-9), 0)
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -25,14 +19,14 @@ def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("radius", [0, 2])
 def test_a_plane_is_exact_up_to_the_border(normal, radius):
     n = np.asarray(normal, float) / np.linalg.norm(normal)
-    depth = plane_depth(n, 3.0)
+    depth = plane_depth(CAMERA, n, -3.0)
     assert (depth > 0).all()
     assert angle(normals_from_depth(depth, CAMERA, radius=radius), n).max() < 0.01
 
 
 def test_two_planes_keep_their_normals_at_the_edge_between_them():
     wall, floor = np.array([0, 0, 1.0]), np.array([0, 1.0, 0])
-    d_wall, d_floor = plane_depth(wall, 4.0), plane_depth(floor, 1.0)
+    d_wall, d_floor = plane_depth(CAMERA, wall, -4.0), plane_depth(CAMERA, floor, -1.0)
     on_floor = (d_floor > 0) & (d_floor < d_wall)
     normal = normals_from_depth(np.where(on_floor, d_floor, d_wall), CAMERA)
     assert np.percentile(angle(normal[on_floor], floor), 99) < 0.1
@@ -40,27 +34,21 @@ def test_two_planes_keep_their_normals_at_the_edge_between_them():
 
 
 def test_a_sphere_is_close_to_its_normals():
-    rays = pixel_rays(CAMERA).astype(np.float64)
-    centre, radius = np.array([0, 0, -4.0]), 1.0
-    a, b = (rays**2).sum(-1), rays @ centre
-    root = b**2 - a * (centre @ centre - radius**2)
-    depth = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, 0)
-    truth = (rays * depth[..., None] - centre) / radius
-    inside = (depth > 0) & (truth[..., 2] > 0.5)
-    error = angle(normals_from_depth(depth, CAMERA), truth)[inside]
+    depth, truth, mask, _ = ball(CAMERA, (0, 0, -4), 1.0)
+    error = angle(normals_from_depth(depth, CAMERA), truth)[mask & (truth[..., 2] > 0.5)]
     assert error.mean() < 1.0 and error.max() < 6.0
 
 
 def test_a_wide_window_calms_quantised_depth():
     n = np.array([0, 0.8, 0.6])
-    depth = np.round(plane_depth(n, 3.0) * 256) / 256
+    depth = np.round(plane_depth(CAMERA, n, -3.0) * 256) / 256
     rough = angle(normals_from_depth(depth, CAMERA), n).mean()
     calm = angle(normals_from_depth(depth, CAMERA, radius=2), n).mean()
     assert calm < 0.75 * rough
 
 
 def test_holes_face_the_viewer_and_do_not_spread():
-    depth = plane_depth(np.array([0.6, 0, 0.8]), 3.0)
+    depth = plane_depth(CAMERA, np.array([0.6, 0, 0.8]), -3.0)
     depth[:, 40:] = 0
     depth[5, 5] = 0
     normal = normals_from_depth(depth, CAMERA)

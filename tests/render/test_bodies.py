@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from render_scenes import empty
 
+from materialist.procedural.objects import shapes
 from materialist.render.bodies import is_transparent
 from materialist.render.coverage import coverage, first_hits
 from materialist.render.scene import GLASS_DEPTH, RenderScene
@@ -13,21 +14,11 @@ CAMERA = Camera(48, 32, 40.0)
 DISTANCE, RADIUS = 5.0, 1.0
 
 
-def sphere(surface: Surface, rows: int = 96) -> Body:
-    """A sphere on the camera's axis, with exact normals."""
-    theta, phi = np.meshgrid(np.linspace(0, np.pi, rows), np.linspace(0, 2 * np.pi, 2 * rows), indexing="ij")
-    unit = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), -np.sin(theta) * np.sin(phi)], -1).reshape(-1, 3)
-    index = np.arange(rows * 2 * rows).reshape(rows, 2 * rows)
-    a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    vertices = unit * RADIUS + [0, 0, -DISTANCE]
-    corner = vertices[faces]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=-1)
-    uv = np.stack([phi / (2 * np.pi), theta / np.pi], -1).reshape(-1, 2)
-    return Body(
-        vertices.astype(np.float32), faces[area > 1e-9].astype(np.int32), unit.astype(np.float32),
-        uv.astype(np.float32), surface,
-    )  # fmt: skip
+def sphere(surface: Surface) -> Body:
+    """A sphere on the camera's axis."""
+    solid = shapes.moved(shapes.ball(192), (0, 0, -DISTANCE), scale=RADIUS)
+    vertices, normals, uv = (a.astype(np.float32) for a in (solid.vertices, solid.normals, solid.uv))
+    return Body(vertices, solid.faces.astype(np.int32), normals, uv, surface)
 
 
 def surface(albedo=0.5, roughness=0.0, metallic=0.0, **glass) -> Surface:

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from geometry_scenes import ball
 from solid_scenes import volume
 
 from materialist.bench.glass_scenes import is_closed
-from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.solids.closed import closed_proxy
 from materialist.types import Camera
@@ -13,18 +13,10 @@ from materialist.types import Camera
 CAMERA = Camera(72, 60, 40.0)
 
 
-def ball(radius=0.6, centre=(0.1, 0.0, -3.0), camera=CAMERA):
+def before_a_wall():
     """Depth, normal, mask and thickness of a ball before a wall at depth 5."""
-    rays = pixel_rays(camera).astype(float)
-    centre = np.asarray(centre)
-    a, b = (rays**2).sum(-1), rays @ centre
-    root = b * b - a * (centre @ centre - radius**2)
-    mask = root > 0
-    near = (b - np.sqrt(np.maximum(root, 0))) / a
-    depth = np.where(mask, near, 5.0)
-    normal = np.where(mask[..., None], (rays * near[..., None] - centre) / radius, [0, 0, 1])
-    thick = np.where(mask, 2 * np.sqrt(np.maximum(root, 0)) / a * np.linalg.norm(rays, axis=-1), 0)
-    return depth, normal, mask, thick
+    depth, normal, mask, thick = ball(CAMERA, (0.1, 0, -3), 0.6)
+    return np.where(mask, depth, 5.0), normal, mask, thick
 
 
 def plate(mask, camera=None):
@@ -50,7 +42,7 @@ def assert_watertight(shell):
 
 
 def test_a_ball_has_the_volume_and_the_normals_of_a_ball():
-    shell = closed_proxy(*ball(), CAMERA)
+    shell = closed_proxy(*before_a_wall(), CAMERA)
     assert_watertight(shell)
     assert euler(shell) == 2
     assert volume(shell) == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
@@ -62,7 +54,7 @@ def test_a_ball_has_the_volume_and_the_normals_of_a_ball():
 
 
 def test_a_back_has_the_normals_that_are_known_of_it():
-    depth, normal, mask, thick = ball()
+    depth, normal, mask, thick = before_a_wall()
     leaning = np.tile(np.array([0.6, 0, -0.8]), (*mask.shape, 1))
     shell = closed_proxy(depth, normal, mask, thick, CAMERA, back=leaning)
     out = (shell.vertices - [0.1, 0, -3]) / 0.6
@@ -74,7 +66,7 @@ def test_a_back_has_the_normals_that_are_known_of_it():
 
 
 def test_hollow_is_a_wall_around_a_cavity():
-    solid, hollow = (closed_proxy(*ball(), CAMERA, wall=wall) for wall in (None, 0.1))
+    solid, hollow = (closed_proxy(*before_a_wall(), CAMERA, wall=wall) for wall in (None, 0.1))
     assert_watertight(hollow)
     assert euler(hollow) == 4
     cavity = volume(solid) - volume(hollow)
@@ -108,14 +100,14 @@ def test_any_mask_gives_a_watertight_surface(name, mask, expected):
 
 
 def test_the_back_stays_before_what_stands_behind():
-    depth, normal, mask, thick = ball()
+    depth, normal, mask, thick = before_a_wall()
     shell = closed_proxy(depth, normal, mask, thick, CAMERA, behind=np.full(depth.shape, 3.1))
     assert -shell.vertices[:, 2].min() < 3.105
     assert_watertight(shell)
 
 
 def test_bad_input_is_named():
-    depth, normal, mask, thick = ball()
+    depth, normal, mask, thick = before_a_wall()
     with pytest.raises(InputError, match="thickness goes from"):
         closed_proxy(depth, normal, mask, -thick, CAMERA)
     with pytest.raises(InputError, match="covers no surface"):

@@ -1,25 +1,21 @@
 """The smooth front of an object, against a ball of known depth."""
 
 import numpy as np
+from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
 from materialist.solids.front import smooth_front
 from materialist.types import Camera
 
-RAYS = pixel_rays(Camera(64, 64, 30.0))
-
-
-def _ball() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Planar depth [64, 64], unit normals and mask of a ball of radius 0.5 at depth 3."""
-    centre = np.array([0, 0, -3.0])
-    along, squared = RAYS @ centre, (RAYS**2).sum(-1)
-    rest = along**2 - squared * (centre @ centre - 0.25)
-    depth = (along - np.sqrt(np.maximum(rest, 0))) / squared
-    return depth, (RAYS * depth[..., None] - centre) / 0.5, rest > 0.1  # 0.25 in the middle, 0 at the outline
+CAMERA = Camera(64, 64, 30.0)
+RAYS = pixel_rays(CAMERA)
+DEPTH, NORMAL, SEEN, THICK = ball(CAMERA, (0, 0, -3), 0.5)
+DEPTH[~SEEN] = 3.0
+INSIDE = THICK > 0.64
 
 
 def test_exact_depth_and_normals_stay():
-    depth, normal, inside = _ball()
+    depth, normal, inside = DEPTH, NORMAL, INSIDE
     front = smooth_front(depth, normal, inside, RAYS, smooth=0.0)
     assert np.abs(front / depth - 1)[inside].max() < 4e-4  # the ball is a sixth as deep as it is far
     np.testing.assert_array_equal(front[~inside], depth[~inside])
@@ -39,7 +35,7 @@ def test_an_edge_stays_where_it_is():
 
 
 def test_normals_take_away_the_noise_of_the_depth():
-    depth, normal, inside = _ball()
+    depth, normal, inside = DEPTH, NORMAL, INSIDE
     noisy = depth * np.exp(np.random.default_rng(0).normal(0, 0.005, depth.shape))
     front = smooth_front(noisy, normal, inside, RAYS, smooth=0.0)
     error = lambda z: np.sqrt(np.mean(np.log(z / depth)[inside] ** 2))  # noqa: E731

@@ -7,12 +7,12 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from edit_scenes import scene_of
 
-from materialist.geometry.build import build_geometry
 from materialist.io.package import save_scene
 from materialist.studio.selection import read_pick
 from materialist.studio.widgets import PageContext
-from materialist.types import Camera, FitReport, Materials, Photo, Prediction, Scene
+from materialist.types import Camera, FitReport, Scene
 
 HEIGHT, WIDTH = 48, 64
 
@@ -27,26 +27,20 @@ def block() -> np.ndarray:
 @lru_cache(maxsize=1)
 def room() -> Scene:
     """A red block before a grey wall; the top rows are sky."""
-    camera = Camera(WIDTH, HEIGHT, 40.0)
-    mask = block()
-    depth = np.where(mask, 2.0, 3.0).astype(np.float32)
+    depth = np.where(block(), 2.0, 3.0)
     depth[:4] = 0
-    normal = np.zeros((HEIGHT, WIDTH, 3), np.float32)
-    normal[..., 2] = 1
-    albedo = np.where(mask[..., None], [0.6, 0.12, 0.08], [0.5, 0.5, 0.45]).astype(np.float32)
-    materials = Materials(albedo, np.full((HEIGHT, WIDTH), 0.5, np.float32), np.zeros((HEIGHT, WIDTH), np.float32))
-    photo = Photo(albedo, camera, albedo, fov_source="exif", path="room <b>.png")
-    geometry = build_geometry(depth, normal, camera, completion="none")
-    prior = Prediction(materials, normal, depth, "made")
+    albedo = np.where(block()[..., None], [0.6, 0.12, 0.08], [0.5, 0.5, 0.45])
+    normal = np.broadcast_to([0, 0, 1], albedo.shape)
+    scene = scene_of(Camera(WIDTH, HEIGHT, 40.0), depth, normal, albedo, completion="none")
+    photo = replace(scene.photo, fov_source="exif", path="room <b>.png")
     report = FitReport(metrics={"rerender_psnr_path": 31.5}, warnings=("It is too dark.",))
-    envmap = np.ones((8, 16, 3), np.float32)
-    return Scene(camera, photo, prior, materials, normal, depth, geometry, envmap, photo.linear, report)
+    return replace(scene, photo=photo, report=report)
 
 
 def package(folder: Path) -> Path:
     """The room as a scene package."""
     path = folder / "room.scene"
-    save_scene(replace(room()), path)
+    save_scene(room(), path)
     return path
 
 

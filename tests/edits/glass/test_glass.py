@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import block_mask, flat_scene, rendered_scene, scene_of
+from geometry_scenes import plane_depth, sphere_depth
 
-from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import LID, NO_ROOM, SOLID, glass
 from materialist.edits.glass.thickness import object_thickness, objects_in
 from materialist.errors import InputError
-from materialist.geometry.build import build_geometry
-from materialist.types import Camera, Materials, Photo, Prediction, Scene
+from materialist.types import Camera
 
 MASK = block_mask(36, 48)
 PAPER = {"model": "two-interface", "thickness": "symmetry"}
@@ -110,27 +109,15 @@ def test_what_a_vessel_cannot_be_is_said():
 def balls(*spheres):
     """(scene, number of the ball [H, W]): balls on a floor before a wall."""
     camera = Camera(96, 72, 45.0)
-    rays = pixel_rays(camera).astype(float)
-    floor = np.where(rays[..., 1] < -1e-6, -0.6 / np.minimum(rays[..., 1], -1e-6), np.inf)
-    depth, normal = np.minimum(floor, 5.0), np.where((floor < 5)[..., None], [0, 1, 0], [0, 0, 1]).astype(float)
+    floor = plane_depth(camera, (0, 1, 0), -0.6)
+    depth, normal = np.minimum(floor, 5.0), np.where((floor < 5)[..., None], [0.0, 1, 0], [0.0, 0, 1])
     number = np.full(depth.shape, -1)
-    a = (rays**2).sum(-1)
-    for k, (centre, radius) in enumerate(spheres):
-        b = rays @ np.array(centre)
-        root = np.sqrt(np.maximum(b**2 - a * (np.dot(centre, centre) - radius**2), 0))
-        here = (root > 0) & ((b - root) / a < depth)
-        depth = np.where(here, (b - root) / a, depth)
-        normal[here] = ((rays * depth[..., None] - centre) / radius)[here]
-        number[here] = k
-    depth, normal = depth.astype(np.float32), normal.astype(np.float32)
-    grey = np.full((*depth.shape, 3), 0.4, np.float32)
-    materials = Materials(grey, np.full(depth.shape, 0.5, np.float32), np.zeros_like(depth))
-    light = (grey * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None]).astype(np.float32)
-    photo = Photo(light, camera, light, fov_source="option")
-    prior = Prediction(materials, normal, depth, "made")
-    geometry = build_geometry(depth, normal, camera)
-    made = Scene(camera, photo, prior, materials, normal, depth, geometry, np.ones((8, 16, 3), np.float32), light)
-    return replace(made, rerender=light), number
+    for k, sphere in enumerate(spheres):
+        front, outward = sphere_depth(camera, *sphere)
+        here = front < depth
+        depth[here], normal[here], number[here] = front[here], outward[here], k
+    light = (0.4 * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None] * np.ones(3)).astype(np.float32)
+    return scene_of(camera, depth, normal, np.full((*depth.shape, 3), 0.4), photo=light), number
 
 
 def test_two_objects_are_as_thick_together_as_alone():

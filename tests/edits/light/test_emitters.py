@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from edit_scenes import scene_of
 
 from materialist import metrics
 from materialist.camera import pixel_rays
@@ -14,10 +15,9 @@ from materialist.edits.core.surfaces import KEY, emitting
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight
 from materialist.errors import InputError
-from materialist.geometry.build import build_geometry
 from materialist.io.package import load_scene, save_scene
-from materialist.render.scene import RenderScene
-from materialist.types import Camera, Materials, Photo, Prediction, Scene
+from materialist.pipeline import render_scene
+from materialist.types import Camera, Scene
 
 LIGHT = np.zeros((30, 40), bool)
 LIGHT[3:12, 8:32] = True
@@ -25,10 +25,7 @@ RADIANCE = 8.0
 
 
 def picture(scene: Scene, seed: int = 0, spp: int = 256) -> np.ndarray:
-    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
-    target.set_materials(scene.materials)
-    target.set_envmap(scene.envmap)
-    return target.render(spp=spp, seed=seed)
+    return render_scene(scene, spp=spp, seed=seed)
 
 
 @cache
@@ -39,16 +36,12 @@ def rooms() -> tuple[Scene, Scene]:
     floor = np.where(rays[..., 1] < -0.02, 1.0 / np.maximum(-rays[..., 1], 1e-3), 1e6)
     depth = np.minimum(floor, 3.5).astype(np.float32)
     normal = np.where((floor < 3.5)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
-    albedo = np.full((30, 40, 3), 0.5, np.float32)
-    materials = Materials(albedo, np.full((30, 40), 0.8, np.float32), np.zeros((30, 40), np.float32))
-    geometry = build_geometry(depth, normal, camera, completion="none")
     envmap = np.full((8, 16, 3), 0.15, np.float32)
-    dark = Photo(albedo, camera, albedo, fov_source="option")
-    prior = Prediction(materials, normal, depth, "made")
-    bare = Scene(camera, dark, prior, materials, normal, depth, geometry, envmap, albedo)
+    albedo = np.full((30, 40, 3), 0.5)
+    bare = scene_of(camera, depth, normal, albedo, roughness=0.8, envmap=envmap, completion="none")
     true = replace(bare, bodies=(emitting(_patch(bare, LIGHT, "window"), (RADIANCE,) * 3),))
     linear = np.clip(picture(true), 0, 1)
-    photo = Photo(linear, camera, linear, fov_source="option")
+    photo = replace(bare.photo, linear=linear, original=linear)
     rendered = picture(bare)
     factor = float((linear * rendered)[~LIGHT].sum() / (rendered**2)[~LIGHT].sum())  # what a fit of the map would do
     brighter = replace(bare, photo=photo, envmap=envmap * np.float32(factor), rerender=rendered * np.float32(factor))

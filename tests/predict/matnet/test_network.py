@@ -1,12 +1,11 @@
 """The network: shapes, ranges, and its fast parts against slow twins."""
 
-import numpy as np
 import pytest
 import torch
 from made_matnet import TINY, made_network
 
 from materialist.predict.matnet.encoder import PATCH
-from materialist.predict.matnet.inference import network_size, planar_depth
+from materialist.predict.matnet.inference import network_size
 
 
 def test_outputs_have_the_promised_shapes_and_ranges():
@@ -39,9 +38,3 @@ def test_network_size_keeps_the_aspect_and_the_shorter_side(height, width, wante
     found = network_size(height, width)
     assert found == wanted
     assert min(found) >= 518 and all(side % PATCH == 0 for side in found)
-
-
-def test_planar_depth_turns_the_output_round():
-    output = np.array([[0, 1], [4, 2]], np.float32)
-    assert planar_depth(output).tolist() == [[8, 7], [4, 6]]
-    assert (planar_depth(np.zeros((2, 3), np.float32)) == 1).all()

@@ -9,7 +9,7 @@ import torch
 from made_matnet import install, made_network, made_photo
 from safetensors.torch import save_file
 
-from materialist.errors import SetupError, WeightsError
+from materialist.errors import WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.matnet.inference import infer, planar_depth
 from materialist.predict.matnet.predictor import FORMAT, MatNetPredictor
@@ -166,10 +166,3 @@ def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
     own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu", input_size=28).predict(photo).depth
     np.testing.assert_allclose(own, np.maximum(output, 1e-3), rtol=1e-2, atol=1e-2 * output.max())
-
-
-def test_a_device_that_is_not_there(tmp_path, state):
-    if torch.cuda.is_available():
-        pytest.skip("there is a CUDA device here")
-    with pytest.raises(SetupError, match="no CUDA device"):
-        MatNetPredictor(saved(tmp_path / "w.pth", state), device="cuda")

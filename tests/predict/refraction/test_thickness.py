@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError, WeightsError
@@ -16,20 +17,11 @@ from materialist.types import Camera
 SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 
 
-def ball(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
+def seen(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
     """Photo, mask, normal, depth and true thickness of a ball."""
-    rays = pixel_rays(camera).astype(float)
-    length = np.linalg.norm(rays, axis=-1)
-    d, centre = rays / length[..., None], np.asarray(centre)
-    b = d @ centre
-    square = b**2 - centre @ centre + radius**2
-    mask = square > 0
-    chord = np.sqrt(np.maximum(square, 0))
-    point = d * (b - chord)[..., None]
-    normal = np.where(mask[..., None], (point - centre) / radius, [0, 0, 1])
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    photo = np.clip(np.where(mask[..., None], 0.3 + 0.4 * normal[..., 1:2], 0.2), 0, 1) * np.ones(3)
-    return photo, mask, normal, np.where(mask, -point[..., 2], 5.0), np.where(mask, 2 * chord, 0)
+    depth, normal, mask, thick = ball(camera, centre, radius)
+    photo = np.clip(np.where(mask, 0.3 + 0.4 * normal[..., 1], 0.2), 0, 1)[..., None] * np.ones(3)
+    return photo, mask, normal, np.where(mask, depth, 5.0), thick
 
 
 @pytest.fixture
@@ -43,7 +35,7 @@ def plain(tmp_path):
 @pytest.mark.parametrize("size", [(70, 64), (260, 300)])
 def test_an_untrained_network_gives_the_symmetry_prior(plain, size):
     camera = Camera(size[1], size[0], 45)
-    photo, mask, normal, depth, _ = ball(camera)
+    photo, mask, normal, depth, _ = seen(camera)
     found = thickness(photo, mask, normal, depth, camera, weights=plain)
     mirror = symmetric_thickness(depth, normal, mask, camera)
     step = LEAST * np.sqrt(mask.sum()) * np.median(depth[mask]) / camera.focal
@@ -62,7 +54,7 @@ def test_an_untrained_network_gives_the_symmetry_prior(plain, size):
 
 def test_thickness_is_in_scene_units(plain):
     camera = Camera(80, 80, 45)
-    photo, mask, normal, depth, _ = ball(camera)
+    photo, mask, normal, depth, _ = seen(camera)
     one, ten = (thickness(photo, mask, normal, s * depth, camera, weights=plain).solid for s in (1, 10))
     np.testing.assert_allclose(ten, 10 * one, rtol=1e-3, atol=1e-4)
 
@@ -88,7 +80,7 @@ def test_windows_reach_over_the_border_and_come_back():
 
 def test_bad_input_is_refused(plain, tmp_path):
     camera = Camera(48, 48, 45)
-    photo, mask, normal, depth, _ = ball(camera)
+    photo, mask, normal, depth, _ = seen(camera)
     with pytest.raises(InputError, match="covers no surface"):
         thickness(photo, 0 * mask, normal, depth, camera, weights=plain)
     with pytest.raises(InputError, match="photo has shape"):
@@ -117,7 +109,7 @@ def test_the_network_is_bounded_and_zero_outside():
 @pytest.mark.skipif(not WEIGHTS.is_file(), reason="this checkout has no weights of RefractionNet")
 def test_the_shipped_weights_know_a_ball():
     camera = Camera(160, 160, 40)
-    photo, mask, normal, depth, true = ball(camera)
+    photo, mask, normal, depth, true = seen(camera)
     found = thickness(photo, mask, normal, depth, camera)
     assert np.abs(found.solid - true)[mask].sum() < 0.25 * true[mask].sum()
     assert WEIGHTS.stat().st_size < 15e6
@@ -125,7 +117,7 @@ def test_the_shipped_weights_know_a_ball():
 
 def test_a_ball_is_a_surface_of_revolution_and_half_a_ball_is_the_networks():
     camera = Camera(64, 64, 40)
-    photo, mask, normal, depth, true = ball(camera, (0, 0, -3.0), 0.6)
+    photo, mask, normal, depth, true = seen(camera, (0, 0, -3.0), 0.6)
     guess = thickness(photo, mask, normal, depth, camera)
     found = best_thickness(photo, mask, normal, depth, camera, up=np.array([0.0, 1, 0]))
     assert found.method == "revolution" and found.revolution is not None and found.back is None
