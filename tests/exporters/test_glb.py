@@ -88,11 +88,14 @@ def test_textures(parsed):
     assert all(material["doubleSided"] for material in document["materials"])
 
 
-def test_planes_have_constants(parsed):
-    _, parts, document, _ = parsed
-    pbr = document["materials"][2]["pbrMetallicRoughness"]
-    np.testing.assert_allclose(pbr["baseColorFactor"][:3], parts[2].materials.albedo[0, 0], rtol=1e-6)
-    assert pbr["roughnessFactor"] == pytest.approx(float(parts[2].materials.roughness[0, 0]))
+def test_planes_have_textures_of_one_pixel(parsed):
+    _, parts, document, binary = parsed
+    pbr, m = document["materials"][2]["pbrMetallicRoughness"], parts[2].materials
+    color, packed = (
+        picture(document, binary, pbr[k]["index"]) for k in ("baseColorTexture", "metallicRoughnessTexture")
+    )
+    assert np.abs(color[0, 0] / 255 - linear_to_srgb(m.albedo[0, 0])).max() <= 0.5 / 255 + 1e-6
+    assert packed[0, 0, 1] / 255 == pytest.approx(float(m.roughness[0, 0]), abs=0.5 / 255)
 
 
 def test_the_light_beside_it(tmp_path):

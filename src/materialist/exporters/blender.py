@@ -65,9 +65,8 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
         mesh = part.mesh
         for key in ("vertices", "normals", "uv", "faces"):
             arrays[f"{part.name}_{key}"] = getattr(mesh, key)
-        if not part.constant:
-            for key in ("albedo", "roughness", "metallic"):
-                write_exr(folder / f"{_prefix(part)}{key}.exr", getattr(part.materials, key))
+        for key in ("albedo", "roughness", "metallic"):
+            write_exr(folder / f"{part.prefix}{key}.exr", getattr(part.materials, key))
     np.savez_compressed(folder / "meshes.npz", **arrays)  # type: ignore[arg-type]
     write_exr(folder / "envmap.exr", scene.envmap)
     write_png(folder / "photo.png", scene.photo.original)
@@ -91,20 +90,10 @@ def _in_photo(scene: Scene) -> int:
     return max((int(stage.get("bodies", len(scene.bodies))) for stage in saved), default=0)
 
 
-def _prefix(part: Part) -> str:
-    """What the names of a part's maps begin with."""
-    return "" if part.surface is None else f"{part.name}_"
-
-
 def _look(part: Part) -> dict:
-    """The material of a part, for `build.py`: its maps or three constants, and for a body what it has beyond them."""
-    m, surface = part.materials, part.surface
-    look: dict = {"maps": _prefix(part), "repeat": surface is not None}
-    if part.constant:
-        look = {
-            "albedo": m.albedo[0, 0].tolist(), "roughness": float(m.roughness[0, 0]),
-            "metallic": float(m.metallic[0, 0]),
-        }  # fmt: skip
+    """The material of a part, for `build.py`: its maps, and for a body what it has beyond them."""
+    surface = part.surface
+    look: dict = {"maps": part.prefix, "repeat": surface is not None}
     if surface is not None and is_glowing(surface):
         look["emission"] = [float(c) for c in surface.emission]
     if surface is not None and is_transparent(surface):

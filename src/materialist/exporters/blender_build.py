@@ -72,7 +72,7 @@ def add_meshes(scene, facts, additive) -> None:
 
 
 def material(name, look, additive):
-    """Material of a part: its maps, or constants; glass over them, and what it gives off."""
+    """Material of a part: its maps; glass over them, and what it gives off."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     nodes, links = made.node_tree.nodes, made.node_tree.links
@@ -91,12 +91,9 @@ def material(name, look, additive):
         both.location, result = (450, 0), both.outputs["Shader"]
     links.new(result, output.inputs["Surface"])
     for row, (key, sockets) in enumerate(slots.items()):
-        source = add_texture(nodes, look, key, (-700, 300 - 300 * row)) if "maps" in look else None
+        source = add_texture(nodes, look, key, (-700, 300 - 300 * row))
         for socket in sockets:
-            if source is not None:
-                links.new(source, socket)
-            else:
-                socket.default_value = (*look[key], 1) if key == "albedo" else look[key]
+            links.new(source, socket)
     return made
 
 

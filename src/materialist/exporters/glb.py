@@ -108,25 +108,19 @@ class _Document:
         attributes = {
             "POSITION": self._accessor(mesh.vertices.astype("<f4"), "VEC3", bounds=True),
             "NORMAL": self._accessor(_unit(mesh.normals).astype("<f4"), "VEC3"),
+            "TEXCOORD_0": self._accessor(mesh.uv.astype("<f4"), "VEC2"),
         }
-        if not part.constant:
-            attributes["TEXCOORD_0"] = self._accessor(mesh.uv.astype("<f4"), "VEC2")
         indices = self._accessor(mesh.faces.astype("<u4").ravel(), "SCALAR", indices=True)
         primitive = {"attributes": attributes, "indices": indices, "material": self._material(part)}
         return self._add("meshes", {"name": part.name, "primitives": [primitive]})
 
     def _material(self, part: Part) -> int:
-        pbr: dict = {}
-        m = _passing(part)
-        if part.constant or (part.surface is not None and part.surface.transmission >= 1):
-            pbr["baseColorFactor"] = [*(float(c) for c in m.albedo[0, 0]), 1.0]
-            pbr["roughnessFactor"] = float(m.roughness[0, 0])
-            pbr["metallicFactor"] = float(m.metallic[0, 0])
-        else:
-            sampler = 0 if part.surface is None else 1
-            pbr["baseColorTexture"] = {"index": self._texture("base_color", srgb_levels(m.albedo), sampler)}
-            packed = to_bytes(np.stack([np.zeros_like(m.roughness), m.roughness, m.metallic], -1))
-            pbr["metallicRoughnessTexture"] = {"index": self._texture("metallic_roughness", packed, sampler)}
+        m, sampler = passing(part), 0 if part.surface is None else 1
+        packed = to_bytes(np.stack([np.zeros_like(m.roughness), m.roughness, m.metallic], -1))
+        pbr = {
+            "baseColorTexture": {"index": self._texture("base_color", srgb_levels(m.albedo), sampler)},
+            "metallicRoughnessTexture": {"index": self._texture("metallic_roughness", packed, sampler)},
+        }
         material: dict = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": pbr}
         if part.surface is not None and max(part.surface.emission) > 0:
             strength = float(max(part.surface.emission))
@@ -140,7 +134,7 @@ class _Document:
         return self._add("materials", material)
 
     def _glass(self, surface: Surface, thick: float) -> dict:
-        """KHR_materials_transmission, _ior and _volume; the base colour tints what passes, see `_passing`.
+        """KHR_materials_transmission, _ior and _volume; the base colour tints what passes, see `passing`.
 
         Without a thickness glass is a thin wall by the specification, and bends nothing.
         """
@@ -204,7 +198,7 @@ def _mean_chord(part: Part) -> float:
     return 0.0 if open_edges or area == 0 else 4 * abs(volume(mesh.vertices, mesh.faces)) / area
 
 
-def _passing(part: Part) -> Materials:
+def passing(part: Part) -> Materials:
     """The maps of a part; one colour of glTF is for what glass reflects diffusely and what passes: their mean."""
     m, surface = one_roughness(part), part.surface
     if surface is None or surface.transmission == 0:

@@ -32,6 +32,11 @@ class Part:
     """For a body: its own material, whose maps repeat and are filtered ."""
 
     @property
+    def prefix(self) -> str:
+        """What the names of its maps begin with, where they are files."""
+        return "" if self.name == "surface" else f"{self.name}_"
+
+    @property
     def constant(self) -> bool:
         """Whether one value stands for the whole part."""
         return self.materials.roughness.size == 1

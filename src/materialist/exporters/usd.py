@@ -74,7 +74,7 @@ def _mesh(stage: Any, part: Part, material: Any) -> None:
 
 
 def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
-    """Preview surface of the maps as 8-bit PNG, or of constants."""
+    """Preview surface of the maps as 8-bit PNG."""
     from pxr import UsdShade
 
     path = f"/Scene/Materials/{part.name}"
@@ -93,12 +93,7 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
     if part.surface is not None and part.surface.transmission > 0:
         surface.GetInput("ior").Set(float(part.surface.ior))
         surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(1 - float(part.surface.transmission))
-    if part.constant:
-        base.Set(tuple(float(c) for c in m.albedo[0, 0]))
-        roughness.Set(float(m.roughness[0, 0]))
-        metallic.Set(float(m.metallic[0, 0]))
-        return material
-    prefix, wrap = ("", "clamp") if part.surface is None else (f"{part.name}_", "repeat")
+    wrap = "clamp" if part.surface is None else "repeat"
     reader = UsdShade.Shader.Define(stage, f"{path}/st")
     reader.CreateIdAttr("UsdPrimvarReader_float2")
     reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
@@ -107,7 +102,7 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
         (roughness, "roughness", to_bytes(m.roughness), "raw", "r"),
         (metallic, "metallic", to_bytes(m.metallic), "raw", "r"),
     ):
-        file = f"{prefix}{name}.png"
+        file = f"{part.prefix}{name}.png"
         (folder / file).write_bytes(encoded(pixels))
         texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
         texture.CreateIdAttr("UsdUVTexture")
