@@ -66,8 +66,9 @@ def _seen(network: ClickNet, photo: ClickMaps, clicks: Sequence[tuple[int, int]]
     scale = SIDE / max(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
     way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    rgb, normal = (np.asarray(cv2.resize(np.float32(v), size, interpolation=way)) for v in (photo.rgb, photo.normal))
-    depth = np.asarray(cv2.resize(np.float32(photo.depth), size, interpolation=cv2.INTER_NEAREST))
+    whole = ClickMaps(*(np.ascontiguousarray(v, np.float32) for v in photo))
+    rgb, normal = (np.asarray(cv2.resize(v, size, interpolation=way)) for v in (whole.rgb, whole.normal))
+    depth = np.asarray(cv2.resize(whole.depth, size, interpolation=cv2.INTER_NEAREST))
     normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     places = [(min(int((x + 0.5) * scale), size[0] - 1), min(int((y + 0.5) * scale), size[1] - 1)) for x, y in clicks]
     maps = features(rgb, normal, depth, places)
