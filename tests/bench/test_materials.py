@@ -3,6 +3,7 @@
 import json
 
 import cv2
+import made_samples
 import numpy as np
 import pytest
 
@@ -58,16 +59,7 @@ def test_maps_that_are_not_there_are_no_truth(folder, tmp_path):
 
 
 def test_samples_are_seen_by_their_own_camera(tmp_path):
-    (tmp_path / "samples").mkdir()
-    size = (16, 24)
-    plane = {
-        "image": np.full((*size, 3), 0.5, np.float16), "albedo": np.full((*size, 3), 128, np.uint8),
-        "roughness": np.zeros(size, np.uint8), "metallic": np.zeros(size, np.uint8),
-        "normal": np.broadcast_to(np.array([0, 0, 127], np.int8), (*size, 3)), "depth": np.ones(size, np.float16),
-        "mask": np.ones(size, np.uint8), "fov": np.float32(48.0),
-    }  # fmt: skip
-    for k in range(5):
-        np.savez(tmp_path / "samples" / f"{k:07d}.npz", **plane)
+    made_samples.write_set(tmp_path, 5, fov=48.0)
     report = Report("", "", {}, ())
     found = list(materials.MaterialsBench(limit=2, photographic=False).samples(tmp_path, report))
     assert [name for name, _, _ in found] == ["0000000", "0000004"]

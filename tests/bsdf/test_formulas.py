@@ -29,7 +29,7 @@ def test_formulas_agree_with_the_reference(name):
     there, back = LIBRARIES[name]
     rng = np.random.default_rng(1)
     wi, wo, rough, metal, albedo = directions(500, 0), directions(500, 1), *rng.uniform(0.1, 1, (3, 500))
-    wi, wo = wi, wo
+
     h = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
     cos_d = (h * wi).sum(1)
     alpha, sin2, cos_i, cos_o = (there(x) for x in (rough**2, h[:, 0] ** 2 + h[:, 1] ** 2, wi[:, 2], wo[:, 2]))

@@ -7,7 +7,6 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from materialist.errors import InputError
 from materialist.geometry.boundary import corner_inverse_depth, corner_vertices, depth_to_mesh
 from materialist.geometry.cuts import find_cuts
 from materialist.types import Camera
@@ -178,20 +177,3 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     mesh = depth_to_mesh(depth, np.broadcast_to(normal, (*depth.shape, 3)), camera)
     assert len(mesh.vertices) == (width + 1) * (height + 1)  # one sheet
     np.testing.assert_allclose(mesh.vertices @ normal, -distance, rtol=2e-5)
-
-
-@pytest.mark.parametrize(
-    "depth, normal, tau, said",
-    [
-        (np.ones((4, 5)), np.ones((4, 4, 3)), 6, r"\(4, 4, 3\)"),
-        (np.zeros((4, 5)), np.ones((4, 5, 3)), 6, "0 everywhere"),
-        (np.full((4, 5), np.nan), np.ones((4, 5, 3)), 6, "20 NaN"),
-        (np.full((4, 5), -2.0), np.ones((4, 5, 3)), 6, "-2"),
-        (np.ones((4, 5)), np.full((4, 5, 3), np.nan), 6, "normal map has NaN"),
-        (np.ones((4, 5)), np.ones((4, 5, 3)), 0, "tau is 0"),
-        (np.ones((4, 5)), np.ones((4, 5, 3)), float("nan"), "tau is nan"),
-    ],
-)
-def test_bad_input_is_named(depth, normal, tau, said):
-    with pytest.raises(InputError, match=said):
-        depth_to_mesh(depth, normal, Camera(5, 4), tau=tau)

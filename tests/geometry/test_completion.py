@@ -5,7 +5,7 @@ import pytest
 from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
 
 from materialist.errors import InputError
-from materialist.geometry.build import build_geometry, completion_of
+from materialist.geometry.build import build_geometry
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 60.0)
@@ -111,19 +111,3 @@ def test_walls_can_end_at_the_frame(furnished):
     assert faces(bare, floor) == faces(geometry, floor)
     assert 0 < faces(bare, wall) < faces(geometry, wall)  # it still goes on behind the box
     np.testing.assert_array_equal(bare.plane_label, geometry.plane_label)
-
-
-def test_the_completion_of_a_stored_scene_is_told_by_its_provenance_or_its_mesh(furnished):
-    geometry, depth, normal = furnished[0], furnished[1], room(CAMERA)[1]
-    told = ("planes", "planes,backs", "floors,backs", "none", "something older", None)
-    assert [completion_of(geometry, name) for name in told] == [
-        "planes",
-        "planes",
-        "floors",
-        "none",
-        "planes",
-        "planes",
-    ]
-    assert completion_of(build_geometry(depth, normal, CAMERA, completion="none")) == "none"
-    again = build_geometry(depth, normal, CAMERA, completion="planes,backs")
-    np.testing.assert_array_equal(again.mesh.faces, geometry.mesh.faces)

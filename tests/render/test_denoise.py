@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from materialist.errors import InputError, SetupError
+from materialist.errors import SetupError
 from materialist.render.denoise import denoise
 
 
@@ -43,12 +43,6 @@ def test_tiny_pictures_keep_their_light(shape):
     result = denoise(flat, albedo=flat, normal=np.broadcast_to(np.float32([0, 0, 1]), flat.shape))
     assert result.shape == flat.shape
     assert result == pytest.approx(0.5, rel=0.15)
-
-
-def test_guides_of_another_size():
-    image = np.ones((4, 6, 3), np.float32)
-    with pytest.raises(InputError, match=r"albedo guide is \(6, 4, 3\), the image is \(4, 6, 3\)"):
-        denoise(image, albedo=np.ones((6, 4, 3), np.float32), normal=image)
 
 
 def test_missing_package_names_the_command(monkeypatch):

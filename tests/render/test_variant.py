@@ -7,7 +7,7 @@ import pytest
 
 from materialist.errors import InputError, SetupError
 from materialist.render import variant
-from materialist.render.variant import find_llvm, llvm_version, setup
+from materialist.render.variant import find_llvm, setup
 
 
 @pytest.fixture
@@ -25,26 +25,12 @@ def libraries(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "version"),
-    [
-        ("libLLVM.so.19.1", 19),
-        ("libLLVM-17.so.1", 17),
-        ("libLLVM-14.0.6.so.1", 14),
-        ("libLLVM-18.dylib", 18),
-        ("libLLVM.20.dylib", 20),
-        ("libLLVM.so", None),
-    ],
-)
-def test_version_from_the_file_name(libraries, name, version):
-    assert llvm_version(str(libraries(name) / name)) == version
-
-
-@pytest.mark.parametrize(
     ("names", "best"),
     [
         (["libLLVM-14.so.1", "libLLVM-17.so.1", "libLLVM.so.19.1"], 19),
         (["libLLVM-17.so.1", "libLLVM-18.so.1", "libLLVM.so.22.1"], 18),
-        (["libLLVM.so.21.1", "libLLVM.so.20.1", "libLLVM-15.so.1"], 20),
+        (["libLLVM.so.21.1", "libLLVM.20.dylib", "libLLVM-15.so.1"], 20),
+        (["libLLVM-14.0.6.so.1", "libLLVM-18.dylib", "libLLVM.so"], 18),
     ],
 )
 def test_the_best_library_is_taken(libraries, names, best):

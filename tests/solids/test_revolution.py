@@ -6,7 +6,6 @@ from solid_scenes import AXIS, CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, 
 
 from materialist.bench.glass_scenes import is_closed
 from materialist.solids.finder import surface_of_revolution
-from materialist.solids.profile import fitted
 from materialist.solids.revolution import Revolution, profile_of, vessel
 
 POT = lines((0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.0, 0.7))
@@ -98,16 +97,6 @@ def test_a_cylinder_becomes_an_open_pot(pot):
     assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (facing[side & (place[:, 0] < 0.27)] < -0.9).all()
     assert vessel(body.profile, 0.4) is None  # no room inside
     assert vessel(revolved(turned(arc((0.4, 0.15), 0.15, -180, 180)))[0].profile, 0.03) is None  # a ring
-
-
-def test_the_function_goes_on_as_it_went():
-    """Points of the upper half of a circle around the axis: the lower half follows by its curvature."""
-    angle = np.radians(np.linspace(0, 90, 200))
-    lean = np.stack([np.cos(angle), np.sin(angle)], -1)
-    found = fitted(0.5 * lean + [0, 1.0], lean, np.zeros((0, 2)), 0.01, 0.4)
-    (line, normals), *_ = found.lines()
-    assert np.abs(np.linalg.norm(line - [0, 1.0], axis=1) - 0.5).max() < 0.03
-    assert np.sum((line - [0, 1.0]) * normals, -1).min() > 0.4
 
 
 @pytest.mark.parametrize("up", [UP, None])
