@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
 from edit_scenes import flat_scene
-from PIL import Image
 
 from materialist.edits.composite.output import is_deep, write_composite
 from materialist.io.decode import decode
@@ -18,23 +18,16 @@ def photo_from(path):
     return replace(SCENE.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes())
 
 
-def test_every_8_bit_value_comes_back(tmp_path):
-    pixels = np.arange(256, dtype=np.uint8).reshape(16, 16)[..., None].repeat(3, -1)
-    Image.fromarray(pixels).save(tmp_path / "a.png")
-    photo = photo_from(tmp_path / "a.png")
-    write_composite(tmp_path / "b.png", photo.original, photo)
-    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "b.png")), pixels)
-    assert not is_deep(photo)
-
-
-def test_every_16_bit_value_comes_back(tmp_path):
-    pixels = np.arange(65536, dtype=np.uint16).reshape(256, 256)[..., None].repeat(3, -1)
+@pytest.mark.parametrize(("dtype", "side"), [(np.uint8, 16), (np.uint16, 256)])
+def test_every_value_comes_back(tmp_path, dtype, side):
+    pixels = np.arange(side**2).astype(dtype).reshape(side, side)[..., None].repeat(3, -1)
     cv2.imwrite(str(tmp_path / "a.png"), pixels)
     photo = photo_from(tmp_path / "a.png")
     write_composite(tmp_path / "b.png", photo.original, photo)
     back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
+    assert back.dtype == dtype and is_deep(photo) == (dtype == np.uint16)
     np.testing.assert_array_equal(back, pixels)
-    assert is_deep(photo) and sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
 
 
 def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):

@@ -36,16 +36,6 @@ def test_a_true_background_is_what_is_seen():
     assert np.sqrt(((picture - truth) ** 2)[MASK].mean()) < 0.04
 
 
-def test_what_is_odd_about_a_background_is_told(tmp_path):
-    from PIL import Image
-
-    picture = np.full((36, 48, 4), 120, np.uint8)
-    picture[:, 20:, 3] = 0
-    Image.fromarray(picture).save(tmp_path / "cut.png")
-    (note,) = remove(flat_scene(), MASK, background=tmp_path / "cut.png").report.warnings
-    assert "cut.png" in note and "white" in note
-
-
 def test_options_out_of_range_and_backgrounds_of_another_aspect():
     scene = flat_scene()
     for options, message in (

@@ -38,14 +38,6 @@ def test_floor_and_wall_go_on_and_meet_in_a_line():
     assert np.abs(found.normal - normal)[right].max() < 0.02
 
 
-def test_it_never_comes_before_what_hid_it():
-    depth, normal, plane = room()
-    hole = disc()
-    front = np.where(hole, 5.0, 0)
-    found = behind(np.where(hole, 5.0, depth), normal, plane, hole, front, CAMERA)
-    assert (found.depth[hole] > 5.0).all()
-
-
 def test_sky_and_things_that_are_no_planes():
     depth, normal, plane = np.full((60, 80), 3.0), np.tile([0.0, 0, 1], (60, 80, 1)), np.full((60, 80), LOOSE)
     depth[:30] = 0

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.composite import upsample
 from materialist.edits.remove.native import outline, with_hole
 from materialist.types import Camera, Photo
 
@@ -42,15 +41,3 @@ def test_detail_comes_from_the_sources_and_the_rest_is_the_photo():
     found = with_hole(photo, photo.linear, hole, source)
     np.testing.assert_array_equal(found.original[:40], spoiled[:40].astype(np.float32))
     np.testing.assert_allclose(found.original[46:74, 46:74], fine[46:74, 46:74], atol=0.02)
-
-
-def test_strips_have_no_seams(monkeypatch):
-    rng = np.random.default_rng(0)
-    photo = photo_of(rng.random((24 * 5, 32 * 5, 3)), 5)
-    rows, columns = np.mgrid[:24, :32]
-    hole = np.hypot(rows - 12, columns - 15) < 8
-    source = rows * 32 + np.where(hole, (columns + 9) % 32, columns)
-    whole = with_hole(photo, photo.linear[:, ::-1], hole, source).original
-    monkeypatch.setattr(upsample.strips, "__defaults__", (7, 0))
-    np.testing.assert_array_equal(with_hole(photo, photo.linear[:, ::-1], hole, source).original, whole)
-    assert (whole != photo.original).mean() > 0.2

@@ -87,15 +87,6 @@ def test_what_does_not_repeat_gives_no_source():
         assert (sources(noisy, depth) < 0).all()
 
 
-@pytest.mark.parametrize("size", [(1, 40), (90, 114)])
-def test_holes_of_any_shape_are_borne(size):
-    depth, picture = slanted(chequers)
-    hole = np.zeros(SHAPE, bool)
-    hole[: size[0], : size[1]] = True
-    found = sources(picture, depth, hole=hole)
-    assert not hole.ravel()[found[found >= 0]].any() and (found[~hole] < 0).all()
-
-
 def test_shadows_beside_the_hole_are_not_copied():
     depth, picture = slanted(chequers)
     shadow = np.hypot(ROWS - 50, COLUMNS - 98) < 12  # where the nearest repeats of much of the hole lie
