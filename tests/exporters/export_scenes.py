@@ -1,5 +1,7 @@
 """A small scene that no mirroring or transposing leaves alone: a room's corner with a box, each part in a colour."""
 
+import json
+import struct
 from dataclasses import replace
 from functools import cache
 
@@ -7,6 +9,9 @@ import numpy as np
 from edit_scenes import scene_of
 
 from materialist.camera import pixel_rays
+from materialist.exporters.glb import glb_bytes
+from materialist.exporters.parts import body_parts, scene_parts
+from materialist.render.scene import RenderScene
 from materialist.types import Camera, FitReport, Materials, Scene
 
 
@@ -50,6 +55,14 @@ def sky(height: int = 16) -> np.ndarray:
     return np.stack([red, green, blue], -1).astype(np.float32)
 
 
+def renderer(scene: Scene) -> RenderScene:
+    """Our own, of the scene."""
+    made = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
+    made.set_materials(scene.materials)
+    made.set_envmap(scene.envmap)
+    return made
+
+
 def load_xml(mi, path, **options):
     """Mitsuba's scene of an XML file. Its reader waits for ever where Dr.Jit has one thread (OMP_NUM_THREADS=1)."""
     import drjit as dr
@@ -60,3 +73,10 @@ def load_xml(mi, path, **options):
         return mi.load_file(str(path), **options)
     finally:
         dr.set_thread_count(count)
+
+
+def document(scene: Scene) -> dict:
+    """The JSON in a scene's GLB."""
+    data = glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)])
+    (size,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size])

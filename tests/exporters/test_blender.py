@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 import pytest
-from export_scenes import room
+from export_scenes import renderer, room
 
 import materialist as mt
 from materialist.io.exr import read_exr
@@ -76,16 +76,12 @@ def test_cycles_sees_what_we_see(tmp_path):
     if not shutil.which(BPY):
         pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
     from materialist.metrics import psnr
-    from materialist.render.scene import RenderScene
 
     scene = room()
     folder = mt.export(scene, tmp_path / "out", to="blend").path
     command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
     subprocess.run(command, check=True, capture_output=True)
-    renderer = RenderScene(scene.geometry, scene.camera)
-    renderer.set_materials(scene.materials)
-    renderer.set_envmap(scene.envmap)
-    ours, theirs = renderer.render(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
+    ours, theirs = renderer(scene).render(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
     assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30

@@ -1,17 +1,16 @@
 """Inserted bodies in exports: their textures, their glass, and the picture that Mitsuba makes of them."""
 
 import json
-import struct
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
-from export_scenes import load_xml, room
+from export_scenes import document, load_xml, renderer, room
 
 from materialist.edits.core.surfaces import uniform_surface
-from materialist.exporters.glb import glb_bytes, passing
-from materialist.exporters.parts import body_parts, scene_parts
+from materialist.exporters.glb import passing
+from materialist.exporters.parts import body_parts
 from materialist.exporters.run import export
 from materialist.io.exr import read_exr
 from materialist.types import Body, Lamp, Scene, Surface
@@ -36,12 +35,6 @@ CHECKS = Surface(
 GLASS = uniform_surface(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
 FROSTED = uniform_surface(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
 COATED = uniform_surface((0.2, 0.6, 0.3), 0.4, 0.0, transmission=0.5, ior=1.4)
-
-
-def document(scene):
-    data = glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)])
-    (size,) = struct.unpack_from("<I", data, 12)
-    return json.loads(data[20 : 20 + size])
 
 
 def test_glb_has_textures_that_repeat_and_glass():
@@ -79,12 +72,10 @@ GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
     "surface", [CHECKS, GLASS, GLOW, FROSTED, COATED], ids=["texture", "glass", "glow", "frosted", "coated"]
 )
 def test_mitsuba_renders_the_same_picture(tmp_path, surface):
-    from materialist.render.scene import GLASS_DEPTH, RenderScene
+    from materialist.render.scene import GLASS_DEPTH
 
     scene = with_bodies(surface)
-    target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
-    target.set_materials(scene.materials)
-    target.set_envmap(scene.envmap)
+    target = renderer(scene)
     expected = target.render(spp=64, seed=1, max_depth=GLASS_DEPTH)
     done = export(scene, tmp_path / "scene", to="mitsuba")
     own = done.path.with_name("scene_materialist.xml")
@@ -188,11 +179,3 @@ def test_bodies_that_the_photo_lacks_catch_no_shadows(tmp_path):
     assert caught(saved, "b") == ["body0"]
     older = replace(scene, report=replace(scene.report, stages=({"name": "edit", "edits": []},)))
     assert caught(older, "c") == ["body0", "body1"]
-
-
-def test_maps_of_several_sizes_are_brought_to_one():
-    surface = Surface(CHECKS.albedo, np.linspace(0, 1, 4, dtype=np.float32).reshape(4, 1), CHECKS.metallic)
-    (part,) = body_parts(with_bodies(surface))
-    assert part.materials.albedo.shape == (4, 2, 3) and part.materials.roughness.shape == (4, 2)
-    np.testing.assert_allclose(part.materials.roughness[:, 1], [0, 1 / 3, 2 / 3, 1], atol=1e-6)
-    np.testing.assert_allclose(part.materials.albedo[::2], CHECKS.albedo)

@@ -1,14 +1,13 @@
-"""The XML as Mitsuba loads it, against our own renderer."""
+"""The XML as Mitsuba loads it, against our own target."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from export_scenes import load_xml, room
+from export_scenes import load_xml, renderer, room
 
 from materialist.exporters.mitsuba_xml import write_mitsuba
 from materialist.exporters.parts import scene_parts
-from materialist.render.scene import RenderScene
 from materialist.types import Lamp
 
 OWN = "scene_materialist.xml"
@@ -24,19 +23,17 @@ def written(tmp_path_factory):
 
 def test_it_renders_as_ours_does(written, capfd):
     scene, folder = written
-    renderer = RenderScene(scene.geometry, scene.camera)
-    renderer.set_materials(scene.materials)
-    renderer.set_envmap(scene.envmap)
-    mi = renderer.mi
+    target = renderer(scene)
+    mi = target.mi
     loaded = load_xml(mi, folder / OWN, spp=64, max_depth=3)
-    ours = [renderer.render(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
+    ours = [target.render(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
     theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
     # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
     noise = np.sqrt(np.mean((ours[0] - ours[1]) ** 2))
     assert np.sqrt(np.mean((ours[0] - theirs[1]) ** 2)) < 1.15 * noise
     assert np.mean(theirs) == pytest.approx(np.mean(ours), rel=0.01)
     light = next(value for name, value in mi.traverse(loaded) if name.endswith(".data") and "bsdf" not in name)
-    np.testing.assert_array_equal(np.array(light), np.array(renderer.params["light.data"]))
+    np.testing.assert_array_equal(np.array(light), np.array(target.params["light.data"]))
     assert "WARN" not in capfd.readouterr().out
 
 
@@ -48,11 +45,9 @@ def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
     assert ((normals * mesh.vertices).sum(-1) > 0).mean() > 0.1
     scene = replace(scene, geometry=replace(scene.geometry, mesh=replace(mesh, normals=normals)))
     write_mitsuba(tmp_path, scene, scene_parts(scene))
-    renderer = RenderScene(scene.geometry, scene.camera)
-    renderer.set_materials(scene.materials)
-    renderer.set_envmap(scene.envmap)
-    loaded = load_xml(renderer.mi, tmp_path / OWN, spp=256, max_depth=3)
-    ours, theirs = renderer.render(spp=256, seed=1, max_depth=3), np.array(renderer.mi.render(loaded, seed=2))
+    target = renderer(scene)
+    loaded = load_xml(target.mi, tmp_path / OWN, spp=256, max_depth=3)
+    ours, theirs = target.render(spp=256, seed=1, max_depth=3), np.array(target.mi.render(loaded, seed=2))
     blocks = [image.reshape(5, 8, 8, 8, 3).mean((1, 3)) for image in (ours, theirs)]
     np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.05)  # inside `twosided`: 0.19
 
