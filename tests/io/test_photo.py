@@ -2,13 +2,13 @@
 
 import io
 import struct
-import zlib
 
 import cv2
 import numpy as np
 import OpenEXR
 import pytest
 from made_dng import write_dng
+from made_png import chunk, png_header
 from PIL import Image, ImageCms
 
 from materialist.color import linear_to_srgb, srgb_to_linear
@@ -173,8 +173,7 @@ def test_orientation_turns_the_photo_upright(tmp_path, orientation, depth):
         cv2.imwrite(str(tmp_path / "b.png"), pixels.astype(np.uint16) * 257)
         data = (tmp_path / "b.png").read_bytes()
         block = exif.tobytes().removeprefix(b"Exif\0\0")
-        chunk = struct.pack(">I", len(block)) + b"eXIf" + block + struct.pack(">I", zlib.crc32(b"eXIf" + block))
-        (tmp_path / "a.png").write_bytes(data[:33] + chunk + data[33:])
+        (tmp_path / "a.png").write_bytes(data[:33] + chunk(b"eXIf", block) + data[33:])
     linear = read_photo(tmp_path / "a.png").linear[..., 0]
     height, width = linear.shape
     first = {1: "tl", 2: "tr", 3: "br", 4: "bl", 5: "tl", 6: "tr", 7: "br", 8: "bl"}[orientation]
@@ -230,6 +229,9 @@ def test_fov_option_wins_and_must_make_sense(tmp_path):
     for bad in (0, 1, 170, -5, float("nan"), "wide"):
         with pytest.raises(InputError, match="field of view"):
             read_photo(path, fov=bad)
+    for bad in (7, 9000, 2.5, True):
+        with pytest.raises(InputError, match="working size"):
+            read_photo(path, size=bad)
 
 
 def test_example_photos(tmp_path):
@@ -286,22 +288,9 @@ def test_bad_files_get_one_clear_sentence(tmp_path):
 
 
 def test_a_huge_photo_is_refused_before_decoding(tmp_path):
-    """A PNG header that claims 20000 x 20000; nothing of that size may be allocated."""
-    head = struct.pack(">IIBBBBB", 20000, 20000, 8, 2, 0, 0, 0)
-
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
-    (tmp_path / "a.png").write_bytes(data)
+    (tmp_path / "a.png").write_bytes(png_header(20000, 20000))
     with pytest.raises(InputError, match="400 megapixels; the limit is 200"):
         read_photo(tmp_path / "a.png")
-
-
-@pytest.mark.parametrize("size", [7, 9000, 2.5, True])
-def test_working_size_must_make_sense(tmp_path, size):
-    with pytest.raises(InputError, match="working size"):
-        read_photo(save(tmp_path / "a.png", picture()), size=size)
 
 
 def test_raw_without_rawpy_says_how_to_get_it(tmp_path, monkeypatch):

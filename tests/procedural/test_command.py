@@ -1,6 +1,9 @@
 """`materialist train data` from the command line."""
 
 import json
+import os
+
+from materialist.procedural.dataset import sample_path
 
 
 def test_makes_resumes_refuses_and_draws(run, tmp_path):
@@ -19,3 +22,6 @@ def test_makes_resumes_refuses_and_draws(run, tmp_path):
     code, _, err = run(*draw)
     assert code == 2 and "--force" in err and sheet.read_bytes() == drawn
     assert run(*draw, "--force")[0] == 0
+    os.truncate(sample_path(folder, 1), 900)
+    code, _, err = run(*draw, "--force")
+    assert code == 2 and "0000001.npz cannot be read" in err

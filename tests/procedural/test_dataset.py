@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,10 +13,10 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError, OutputError
-from materialist.procedural.dataset import produce, read_description, sample_path, write_data_sheet
+from materialist.procedural.dataset import produce, read_description, sample_path
 from materialist.procedural.objects import things
-from materialist.procedural.options import HELD_OUT, KINDS, DataSetOptions
-from materialist.procedural.sample import make_sample, make_world
+from materialist.procedural.options import HELD_OUT, DataSetOptions
+from materialist.procedural.sample import make_sample
 
 SIZE = 32
 CONTRACT = {
@@ -106,12 +105,6 @@ def test_resume_makes_what_is_missing_and_nothing_else(made, options):
     assert not list((made / "samples").glob(".*"))
 
 
-def test_only_one_kind_of_scene_when_asked(options):
-    for kind in KINDS:
-        world = make_world(np.random.default_rng(0), replace(options, only=kind))
-        assert world.kind.replace(" ", "-") == kind
-
-
 def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
     with pytest.raises(InputError, match="--resume"):
         produce(made, options, count=6)
@@ -183,17 +176,6 @@ def test_the_splits_share_no_file(tmp_path):
     train, aside = (DataSetOptions(meshes=tmp_path, split=split).mesh_files for split in ("train", "heldout"))
     assert [p.stem for p in train] == ["teapot", "vase"]
     assert {p.stem for p in aside} == HELD_OUT
-
-
-def test_the_sheet(made, tmp_path):
-    assert write_data_sheet(made, tmp_path / "sheet.png", count=3) == 3
-    assert (tmp_path / "sheet.png").stat().st_size > 5000
-    with pytest.raises(InputError, match="holds no samples yet"):
-        write_data_sheet(tmp_path, tmp_path / "none.png")
-    shutil.copytree(made, tmp_path / "copy")
-    os.truncate(sample_path(tmp_path / "copy", 2), 900)
-    with pytest.raises(InputError, match=r"0000002\.npz cannot be read"):
-        write_data_sheet(tmp_path / "copy", tmp_path / "none.png")
 
 
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):

@@ -1,34 +1,29 @@
 """The path tracer of the data set against Mitsuba's own, against closed forms, and against itself."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from disney_reference import diffuse_coefficients, specular_split
+from made_worlds import X, Z, plain, reference, room, still
 
-from materialist.errors import InputError
 from materialist.procedural import packing, sample, tiles, tracer
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.options import DataSetOptions
-from materialist.procedural.world import ScenePart, World, look, one_thing
+from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
-
-sys.path.insert(0, str(Path(__file__).parent))
-from made_worlds import X, Z, plain, reference, room, still
 
 SIZE = 32
 
 
-def traced(world, spp=400, seed=1, size=SIZE):
+def tracer_of(world, size=SIZE):
     packed = packing.pack(world, np.random.default_rng(0))
-    return tracer.SampleTracer(packed, Camera(size, size, world.view.fov), device="cpu").render(spp=spp, seed=seed)
+    return tracer.SampleTracer(packed, Camera(size, size, world.view.fov), device="cpu")
 
 
-def probed(world, side=4, size=SIZE):
-    packed = packing.pack(world, np.random.default_rng(0))
-    return tracer.SampleTracer(packed, Camera(size, size, world.view.fov), device="cpu").probe(side)
+def traced(world, spp=400):
+    return tracer_of(world).render(spp=spp, seed=1)
 
 
 @pytest.mark.parametrize(
@@ -62,8 +57,6 @@ def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     image, shading = traced(world, spp=100)
     theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
     wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    from disney_reference import diffuse_coefficients, specular_split
-
     up = np.array([0.0, 0.0, 1.0])
     c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])
     expected = 2.0 * (c * wi[..., 2]).mean() * 2 * np.pi / np.pi
@@ -90,7 +83,7 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
     colour = (0.5, 0.3, 0.1)
     ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain(colour, 0.7))
     world = World([ground], np.ones((8, 16, 3), np.float32), look((0, 2, 0), (0, 0, -3), 40))
-    labels = sample.labels_of(probed(world))
+    labels = sample.labels_of(tracer_of(world).probe(4))
     up = world.view.to_scene.T @ np.array([0, 1, 0])
     assert labels["mask"].all()
     np.testing.assert_allclose(labels["normal"], np.broadcast_to(up, (SIZE, SIZE, 3)), atol=1e-5)
@@ -107,12 +100,12 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
 def test_normals_face_the_viewer_even_from_behind():
     behind = ScenePart(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
     world = World([behind], np.ones((8, 16, 3), np.float32), look((0, 0, 0), (0, 0, -1), 40))
-    labels = sample.labels_of(probed(world))
+    labels = sample.labels_of(tracer_of(world).probe(4))
     np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
 
 
 def test_the_sky_has_no_labels():
-    labels = sample.labels_of(probed(still()))
+    labels = sample.labels_of(tracer_of(still()).probe(4))
     sky = ~labels["mask"]
     assert 0.05 < sky.mean() < 0.95
     for name in ("depth", "normal", "albedo", "roughness", "metallic"):
@@ -135,35 +128,15 @@ def test_a_second_world_compiles_nothing():
     assert all(k["cache_hit"] for k in large)
 
 
-def test_sizes_that_do_not_fill_vectors_are_refused():
-    packed = packing.pack(still(), np.random.default_rng(0))
-    with pytest.raises(InputError, match="33 x 33"):
-        tracer.SampleTracer(packed, Camera(33, 33, 40.0), device="cpu")
-
-
-def test_parts_of_one_thing_have_its_number_and_walls_negative_ones():
-    block = still().parts[1]
-    floor, cup, ball = block, one_thing([block, block]), one_thing([block])
-    world = replace(still(), parts=[floor, *cup, *ball])
-    owner = np.array([[[-1] * 4, [0] * 4, [1] * 4, [2] * 4, [3] * 4]])
-    found = sample.things_of(world, {"owner": owner})[0]
-    assert found[0] == 0 and found[1] < 0 and found[2] == found[3] > 0 and found[4] > 0 and found[4] != found[2]
-
-
-def developed(world):
-    """The stored arrays of a world, and what its label rays saw."""
-    rng = np.random.default_rng(0)
-    seen = tracer.SampleTracer(packing.pack(world, rng), Camera(64, 64, world.view.fov), device="cpu")
-    probe = seen.probe(sample.PROBE)
-    return sample._developed(world, probe, seen, rng, DataSetOptions(size=64, device="cpu")), probe
-
-
 def test_texture_is_not_printed_into_the_shading():
     """A chequered floor under an even sky: its light is even, too."""
     tile = tiles.bank()[1]["checker"][0]
     floor = Material(tile, ((0.1, 0.1, 0.1), (0.8, 0.8, 0.8), (0.9, 0.3, 0.1)), 0.3, (0.6, 0.6), repeat=(0.3, 0.3))
     ground = ScenePart(s.sheet((-9, 0, 9), 18 * X, -18 * Z), floor)
-    arrays, probe = developed(World([ground], np.ones((16, 32, 3), np.float32), look((0, 2, 1e-3), (0, 0, 0), 50)))
+    world = World([ground], np.ones((16, 32, 3), np.float32), look((0, 2, 1e-3), (0, 0, 0), 50))
+    seen = tracer_of(world, 64)
+    probe = seen.probe(sample.PROBE)
+    arrays = sample._developed(world, probe, seen, np.random.default_rng(0), DataSetOptions(size=64, device="cpu"))
     texture = probe["albedo"].mean((2, 3))
     shading = arrays["shading"].astype(np.float32).mean(-1)
     assert texture.std() > 0.4 * texture.mean(), "the floor has a texture to print"

@@ -1,7 +1,5 @@
 """Small scenes for the studio: `edit_scenes` again, with a field of view and a warning, as packages on disk."""
 
-import struct
-import zlib
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -42,13 +40,6 @@ def package(folder: Path) -> Path:
     path = folder / "room.scene"
     save_scene(room(), path)
     return path
-
-
-def png_header(width: int, height: int) -> bytes:
-    """A PNG that claims a size and holds next to nothing."""
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))  # noqa: E731
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
 
 
 def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:

@@ -4,7 +4,8 @@ import zipfile
 
 import numpy as np
 import pytest
-from studio_scenes import package, png_header
+from made_png import png_header
+from studio_scenes import package
 
 from materialist.errors import InputError
 from materialist.io.decode import image_size

@@ -1,7 +1,6 @@
 """The training of RefractionNet, on two shapes."""
 
 import os
-import shutil
 import signal
 
 import made_runs
@@ -12,13 +11,12 @@ from torch.utils.data import default_collate
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
-from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness import dataset
 from materialist.procedural.thickness.errors import mean_errors
 from materialist.train import checkpoint
-from materialist.train.refraction import RECIPE, RefractionTask, ViewExamples
+from materialist.train.refraction import ViewExamples
 from materialist.train.trainer import Trainer
 
 
@@ -78,15 +76,3 @@ def test_a_mirrored_view_is_a_view_of_the_mirrored_shape(views):
     for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
                                 ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
         np.testing.assert_array_equal(flipped[name][channel], sign * full[name][0, channel, :, ::-1])
-
-
-def test_views_that_cannot_be_used(views, tmp_path):
-    shutil.copytree(views, tmp_path / "views")
-    os.truncate(tmp_path / "views" / "00001.npz", 500)
-    with pytest.raises(InputError, match=r"00001\.npz cannot be read .*; delete it"):
-        dataset.load(tmp_path / "views")
-    (tmp_path / "views" / dataset.DESCRIPTION).write_text("")
-    with pytest.raises(InputError, match="name another folder"):
-        dataset.produce(tmp_path / "views", dataset.ViewPlan(shapes=1, views=3))
-    with pytest.raises(InputError, match="views have 64"):
-        RefractionTask(views, None, RECIPE.changed(side=96))

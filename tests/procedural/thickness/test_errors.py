@@ -6,7 +6,6 @@ import trimesh
 
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import MASK
-from materialist.procedural.thickness import errors
 from materialist.procedural.thickness.errors import of_meshes
 
 
@@ -24,18 +23,3 @@ def test_views_of_a_ball_have_the_chords_of_a_ball(tmp_path):
 def test_a_folder_without_meshes_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no \.ply"):
         of_meshes(tmp_path)
-
-
-def test_relative_errors():
-    truth = np.ones((2, 4, 4))
-    inside = np.zeros((2, 4, 4), bool)
-    inside[:, 1:3] = True
-    assert errors.relative_error(truth * [[[1.5]], [[1.0]]], truth, inside).tolist() == [0.5, 0]
-
-
-def test_angles_between_backs():
-    turned = np.zeros((1, 3, 4, 4))
-    turned[:, 0], turned[:, 2] = np.sin(np.radians(30)), -np.cos(np.radians(30))
-    straight = np.zeros((1, 3, 4, 4))
-    straight[:, 2] = -1
-    assert errors.degrees(turned, straight, np.ones((1, 4, 4), bool)).tolist() == pytest.approx([30])
