@@ -10,7 +10,6 @@ import torch
 from materialist.errors import WeightsError
 from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet, Size
-from materialist.predict.matnet.predictor import FORMAT
 from materialist.predict.weights import metadata
 from materialist.train.matnet import PaperTask, freeze, load_start
 from materialist.train.stream import epoch
@@ -86,6 +85,6 @@ def test_starting_from_other_checkpoints(network, tmp_path):
 
 def test_a_run_leaves_weights_that_the_predictor_takes_for_its_own(task, tmp_path):
     file = tmp_path / "w.safetensors"
-    task.save(file, task.network(), {"step": 1})
-    assert metadata(file)["format"] == FORMAT and json.loads(metadata(file)["facts"]) == {"step": 1}
+    task.network().save(file, {"step": 1})
+    assert metadata(file)["format"] == MatNet.FORMAT and json.loads(metadata(file)["facts"]) == {"step": 1}
     assert not any(p.requires_grad for n, p in task.network().named_parameters() if n.startswith("pretrained."))

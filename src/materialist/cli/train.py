@@ -52,9 +52,9 @@ class Views(OperationOptions):
 
     data: Path | None = option(
         None, "Folder for the views, used again by later runs; default: RUN/views.", kind="file")
-    shapes: int = option(640, "Shapes to learn from.", kind="whole")
-    views: int = option(24, "Views of each.", kind="whole")
-    heldout: int = option(64, "Shapes kept aside for the figures.", kind="whole")
+    shapes: int = option(640, "Shapes to learn from.", kind="whole", low=1)
+    views: int = option(24, "Views of each.", kind="whole", low=1)
+    heldout: int = option(64, "Shapes kept aside for the figures.", kind="whole", low=1)
 
 
 # fmt: on

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -52,7 +51,6 @@ class BundledLoss:
 class BundledTask(MapsTask):
     """The network that ships in the package."""
 
-    name: ClassVar[str] = "bundled"
     notes: tuple[str, ...] = (
         "Albedo is compared by L1, L2, gradients at four scales, and after one factor a picture; there is no LPIPS: "
         "its backbone is not part of this project.",
@@ -64,10 +62,6 @@ class BundledTask(MapsTask):
     ):  # fmt: skip
         super().__init__(source, recipe, init=init, score_samples=score_samples)
         self.architecture = architecture
-
-    def identity(self) -> dict[str, Any]:
-        """The architecture."""
-        return {"name": self.name, "network": self.architecture.as_dict()}
 
     def make(self) -> BundledNetwork:
         """A network of the architecture."""

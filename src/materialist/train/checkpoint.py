@@ -11,7 +11,7 @@ import torch
 from materialist.errors import InputError, OutputError, WeightsError
 
 NAME = "checkpoint.pt"
-VERSION = 2
+VERSION = 3
 WEIGHTS = "weights.safetensors"
 """The averaged weights, ready to use, beside the checkpoint."""
 CURVE = "curve.jsonl"

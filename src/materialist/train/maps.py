@@ -52,8 +52,6 @@ class MapsTask(Task):
     """A network from a picture to all maps, on procedural samples or on InteriorVerse."""
 
     kind: ClassVar[str] = "matnet"
-    name: ClassVar[str]
-    """The --config of the command."""
 
     def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
         """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -19,8 +17,7 @@ from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.encoder import PATCH
 from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.network import MatNet, Size
-from materialist.predict.matnet.predictor import FORMAT
-from materialist.predict.weights import read_state, write_weights
+from materialist.predict.weights import read_state
 from materialist.train import augment, losses
 from materialist.train.maps import MapsTask
 from materialist.train.task import Batch, Recipe
@@ -38,8 +35,6 @@ DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
 class PaperTask(MapsTask):
     """MatNet: LPIPS + L1 for albedo, L1 for roughness and metallic, SiLog for depth, cosine for normals."""
 
-    name: ClassVar[str] = "paper"
-
     def __init__(
         self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
         size: str | Size = "vitb",
@@ -56,10 +51,6 @@ class PaperTask(MapsTask):
         )  # fmt: skip
         self.notes = (perceptual, start)
         super().__init__(source, recipe, init=init, score_samples=score_samples)
-
-    def identity(self) -> dict[str, Any]:
-        """The size of MatNet."""
-        return {"name": self.name, "network": self.size if isinstance(self.size, str) else asdict(self.size)}
 
     def make(self) -> MatNet:
         """MatNet, its encoder frozen and of its depth decoder all but the RefineNet layers."""
@@ -118,10 +109,6 @@ class PaperTask(MapsTask):
         normal = maps["normal"] / np.maximum(np.linalg.norm(maps["normal"], axis=-1, keepdims=True), 1e-6)
         unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
         return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
-
-    def save(self, path: Path, network: MatNet, facts: dict[str, Any]) -> None:
-        """Write the network as `--predictor matnet:FILE` reads it."""
-        write_weights(path, network.state_dict(), {"format": FORMAT, "facts": json.dumps(facts)})
 
 
 def freeze(network: MatNet) -> None:

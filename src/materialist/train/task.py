@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from torch import Tensor, nn
 
 from materialist.errors import InputError
-from materialist.predict.network import shared_tensors
+from materialist.predict.network import StoredNetwork, shared_tensors
 from materialist.predict.weights import load_weights, read_state
 from materialist.types import Array
 
@@ -60,10 +60,6 @@ class Recipe:
         given = {k: v for k, v in changes.items() if v is not None}
         return replace(self, **(({"growth": ()} if "side" in given else {}) | given))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
-        return asdict(self)
-
 
 class Examples(ABC):
     """What a network learns from."""
@@ -93,7 +89,7 @@ class Task(ABC):
         self.examples, self.recipe, self.init = examples, recipe, init
 
     @abstractmethod
-    def make(self) -> Any:
+    def make(self) -> StoredNetwork:
         """A new network; parameters that do not learn have requires_grad False."""
 
     @abstractmethod
@@ -104,21 +100,13 @@ class Task(ABC):
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
 
-    def network(self) -> Any:
+    def network(self) -> StoredNetwork:
         """A network to begin from. Raises WeightsError for weights that are damaged or of another architecture."""
         network = self.make()
         if self.init is not None:
             load_weights(network, read_state(self.init) | shared_tensors(network), self.init)
         return network
 
-    def identity(self) -> dict[str, Any]:
-        """Plain values that a resumed run must share."""
-        return {"network": self.make().architecture.as_dict()}
-
     def data(self) -> dict[str, Any]:
         """Plain values about the data, stored with the weights."""
         return {"views": len(self.examples)}
-
-    def save(self, path: Path, network: Any, facts: dict[str, Any]) -> None:
-        """Write the network as `predict` reads it."""
-        network.save(path, facts)

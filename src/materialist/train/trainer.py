@@ -6,7 +6,7 @@ import copy
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -119,14 +119,15 @@ class Trainer:
         schedule = self.schedule.as_dict()
         facts = {
             "step": schedule["step"], "minutes": round(schedule["seconds"] / 60, 1),
-            "examples": schedule["step"] * self.recipe.batch, "recipe": self.recipe.as_dict(),
+            "examples": schedule["step"] * self.recipe.batch, "recipe": asdict(self.recipe),
             "data": self.task.data(), "scores": self.last_scores,
         }  # fmt: skip
-        self.task.save(self.folder / checkpoint.WEIGHTS, self.averaged, facts)
+        self.averaged.save(self.folder / checkpoint.WEIGHTS, facts)
         state = {
-            "kind": self.task.kind, "task": self.task.identity(), "network": self.network.state_dict(),
-            "averaged": self.averaged.state_dict(), "optimizer": self.optimizer.state_dict(), "schedule": schedule,
-            "epoch": self.epoch, "batch": self.batch, "random": torch.get_rng_state(), "scores": self.last_scores,
+            "kind": self.task.kind, "architecture": self.network.architecture.as_dict(),
+            "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
+            "optimizer": self.optimizer.state_dict(), "schedule": schedule, "epoch": self.epoch, "batch": self.batch,
+            "random": torch.get_rng_state(), "scores": self.last_scores,
         }  # fmt: skip
         checkpoint.save(self.folder, state)
 
@@ -194,7 +195,7 @@ class Trainer:
 
     def _restore(self, state: dict[str, Any]) -> None:
         """Go on from a checkpoint."""
-        if state["task"] != self.task.identity():
+        if state["architecture"] != self.network.architecture.as_dict():
             raise InputError(f"{self.folder} holds a run of another network; resume it with the options it began with.")
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])

@@ -12,7 +12,8 @@ from safetensors.torch import save_file
 from materialist.errors import WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.matnet.inference import infer, planar_depth
-from materialist.predict.matnet.predictor import FORMAT, MatNetPredictor
+from materialist.predict.matnet.network import MatNet
+from materialist.predict.matnet.predictor import MatNetPredictor
 from materialist.predict.weights import write_weights
 
 
@@ -159,7 +160,7 @@ def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
 def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     """SiLog makes the output depth; the published weights' output falls with distance, and is turned round."""
     photo = made_photo(42, 56)
-    write_weights(tmp_path / "own.safetensors", state, {"format": FORMAT})
+    write_weights(tmp_path / "own.safetensors", state, {"format": MatNet.FORMAT})
     published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu", input_size=28)
     output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0

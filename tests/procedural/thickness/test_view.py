@@ -104,5 +104,3 @@ def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
         dataset.produce(tmp_path / "set", replace(plan, seed=5))
     with pytest.raises(InputError, match="no views to learn from"):
         dataset.load(tmp_path)
-    with pytest.raises(InputError, match="split is 'odd'"):
-        dataset.ViewPlan(split="odd")

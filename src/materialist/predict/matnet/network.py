@@ -13,10 +13,11 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.predict.matnet.encoder import GRID, PATCH, Encoder
+from materialist.predict.network import Architecture, StoredNetwork
 
 
 @dataclass(frozen=True)
-class Size:
+class Size(Architecture):
     """How large the network is."""
 
     width: int
@@ -37,17 +38,18 @@ SIZES = {
 """The published MatNet is 'vitb'; the others follow Depth Anything, whose checkpoints can start their training."""
 
 
-class MatNet(nn.Module):
+class MatNet(StoredNetwork):
     """One encoder, one decoder for depth, one for materials and normals (paper, section "Material Prediction Network").
 
     The state dict has the names of the published checkpoint, so `load_state_dict(..., strict=True)` takes it.
     """
 
+    FORMAT, COMMAND = "materialist-matnet-1", "materialist train matnet --config paper"
+    ARCHITECTURE = Size
+
     def __init__(self, size: str | Size = "vitb"):
-        super().__init__()
-        if isinstance(size, str):
-            size = SIZES[size]
-        self.size = size
+        size = SIZES[size] if isinstance(size, str) else size
+        super().__init__(size)
         self.pretrained = Encoder(size.width, size.blocks, size.heads, size.grid)
         self.depth_head = Head(size.width, size.pyramid, size.fused, outputs=1)
         self.material_head = Head(size.width, size.pyramid, size.fused, outputs=8)
@@ -63,7 +65,7 @@ class MatNet(nn.Module):
             [B, 3, H, W]: unit, camera frame (+X right, +Y up, +Z to the viewer). What `depth` means depends on the
             weights: in the published ones it falls with distance (see `planar_depth`).
         """
-        features = self.pretrained(image, self.size.layers)
+        features = self.pretrained(image, self.architecture.layers)
         materials = self.material_head(features)
         positive = F.relu(materials[:, :5])
         return {

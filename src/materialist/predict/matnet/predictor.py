@@ -17,9 +17,6 @@ from materialist.predict.protocol import MapSet, Predictor
 from materialist.predict.weights import INSTEAD, load_weights, metadata, read_state, verify_file
 from materialist.types import Array, Photo
 
-FORMAT = "materialist-matnet-1"
-"""What a file of `train matnet --config paper` calls itself in its metadata: its depth output is depth."""
-
 
 class MatNetPredictor(Predictor):
     """MatNet with weights from a file, a folder, or a model that was downloaded from a hub.
@@ -37,7 +34,7 @@ class MatNetPredictor(Predictor):
         path = _locate(str(where))
         digest = verify_file(path)
         state = read_state(path)
-        self.trained_here = metadata(path).get("format") == FORMAT
+        self.trained_here = metadata(path).get("format") == MatNet.FORMAT  # its depth output is depth
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
