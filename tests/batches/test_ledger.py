@@ -16,13 +16,6 @@ def write(runs, *entries, **how):
     return ledger
 
 
-def test_what_was_written_is_read_again(tmp_path):
-    write(tmp_path, ("begin", "a.png"), ("done", "a.png"), ("begin", "b.png"))
-    ledger = write(tmp_path, resume=True)
-    assert {id: entry["event"] for id, entry in ledger.last.items()} == {"a.png": "done", "b.png": "begin"}
-    assert ledger.names == {"a.png": "a", "b.png": "b"}
-
-
 def test_a_line_that_was_cut_off_is_passed_over_and_spoils_no_other(tmp_path):
     write(tmp_path, ("done", "a.png"), ("done", "b.png"))
     path = tmp_path / LEDGER

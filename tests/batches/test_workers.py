@@ -23,10 +23,3 @@ def test_one_worker_a_gpu_or_one_a_processor_as_far_as_memory_reaches(gpus, monk
     assert run.default_workers("cpu", 1024) == 1 < run.default_workers("cpu", 128) == 5
     monkeypatch.setattr("psutil.virtual_memory", lambda: type("Memory", (), {"available": 1e6}))
     assert run.default_workers("cpu") == 1
-
-
-def test_each_worker_has_one_thread_and_its_gpu(gpus):
-    assert [one.get("CUDA_VISIBLE_DEVICES") for one in run.environments(3, "auto")] == ["3", "GPU-5f", "3"]
-    assert all(
-        one["OMP_NUM_THREADS"] == "1" and "CUDA_VISIBLE_DEVICES" not in one for one in run.environments(2, "cpu")
-    )

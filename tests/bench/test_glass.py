@@ -49,19 +49,6 @@ def test_without_refraction_both_models_show_the_background(scene, true):
         assert (found[~mask] == 0).all()
 
 
-def test_the_background_looks_like_its_picture_in_the_light(scene):
-    envmap = GREY.copy()
-    envmap[2:4, 10:12] = 20
-    room = scene.render(envmap, "room", spp=256)
-    behind = models.true_background(scene, room, envmap)
-    again = models.lit(scene, behind, envmap, length=6, spp=256, seed=5)
-    there = behind.depth > 0
-    # Between the pixels a fine pattern is blurred, no brighter or darker.
-    assert np.abs(again - room)[there].mean() < 0.08 * room[there].mean()
-    assert again[there].mean() == pytest.approx(room[there].mean(), rel=0.01)
-    assert behind.albedo[there].std() > 0.05 and behind.albedo.max() <= 1
-
-
 def test_figures_look_inside_the_mask_alone(scene):
     truth = np.random.default_rng(1).random((40, 40, 3)).astype(np.float32)
     one = case(scene, truth, gain=0.5)

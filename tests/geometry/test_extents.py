@@ -10,8 +10,8 @@ from geometry_scenes import room, trace
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.geometry.completion import continued_walls
-from materialist.geometry.extents import PlaneExtent, axes, extent_of, read_extents
-from materialist.geometry.planes import Plane, find_planes
+from materialist.geometry.extents import PlaneExtent, read_extents
+from materialist.geometry.planes import find_planes
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 60.0)
@@ -22,14 +22,6 @@ def wall_at(mesh, x: float, y: float) -> bool:
     """Whether a ray along -z from (x, y, -3) meets the wall at z = -6."""
     distance, face = trace(mesh, np.array([x, y, -3.0]), np.array([[0.0, 0, -1]]))
     return bool(face[0] >= 0 and distance[0] == pytest.approx(3, abs=0.05))
-
-
-@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 0, 0), (-0.6, 0.2, 0.77), (0, -1, 0), (0.02, -0.99, 0.1)])
-def test_axes_are_right_handed_and_upright(normal):
-    normal = np.array(normal) / np.linalg.norm(normal)
-    across, up = axes(normal)
-    np.testing.assert_allclose(np.cross(across, up), normal, atol=1e-12)
-    assert abs(normal[1]) >= 0.9 or (abs(across[1]) < 1e-12 and up[1] > 0)
 
 
 def test_a_wall_ends_where_it_is_told():
@@ -45,15 +37,6 @@ def test_a_wall_ends_where_it_is_told():
                      (0, up - 0.2)):  # fmt: skip
             inside = -half - 0.5 < x < right and y < up
             assert wall_at(mesh, x, y) == inside, (right, up, x, y)
-
-
-def test_ends_are_those_of_the_nearest_plane():
-    first = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1, 1, -1, 1)
-    tilted = replace(first, normal=(0.2, 0.0, 0.98))
-    plane = Plane(np.array([0.05, 0, 0.9987]), -3.1, NONE)
-    assert extent_of(plane, [tilted, first]) is first
-    assert extent_of(replace(plane, offset=-4.0), [first]) is None
-    assert extent_of(replace(plane, normal=np.array([1.0, 0, 0])), [first]) is None
 
 
 def test_provenance_holds_ends():

@@ -6,7 +6,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.io.datasets import open_sources
-from materialist.io.samples import SampleFolder, read_sample
+from materialist.io.samples import read_sample
 
 
 def test_a_sample_in_our_conventions(tmp_path):
@@ -24,14 +24,6 @@ def test_a_sample_in_our_conventions(tmp_path):
     rest = sample.image - sample.albedo * (1 - sample.metallic[..., None]) * sample.shading
     dielectric = surface & (sample.metallic == 0)
     np.testing.assert_allclose(rest[dielectric], 0.05, atol=2e-3)
-
-
-def test_a_growing_set_is_listed_again(tmp_path):
-    source = SampleFolder(made_samples.write_set(tmp_path, 2))
-    made_samples.write_set(tmp_path, 5)
-    assert len(source) == 2
-    source.refresh()
-    assert len(source) == 5 and source.seed() == [5]
 
 
 def test_several_sets_are_one(tmp_path):

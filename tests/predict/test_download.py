@@ -7,14 +7,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from materialist.errors import InputError, OutputError, WeightsError
+from materialist.errors import OutputError, WeightsError
 from materialist.predict.models import (
     chosen,
     download,
     folder_of,
     hub_model,
     is_complete,
-    is_hub_id,
     require,
     weights_file,
 )
@@ -142,11 +141,3 @@ def test_the_best_format_of_each_folder_is_chosen():
         "model_index.json", "tokenizer/vocab.json", "tokenizer/merges.txt", "unet/config.json",
         "unet/a.fp16.safetensors", "vae/b.safetensors", "old/c.fp16.bin", "w.pth",
     }  # fmt: skip
-
-
-def test_names_and_ids():
-    assert hub_model("Lez/MatNet") is hub_model("matnet")
-    assert hub_model("someone/theirs").repo == "someone/theirs"
-    with pytest.raises(InputError, match="matnet, marigold-appearance"):
-        hub_model("nonsense")
-    assert is_hub_id("a/b-c_d.e") and not is_hub_id("a/b.pth") and not is_hub_id("./b") and not is_hub_id("a/b/c")

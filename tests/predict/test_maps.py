@@ -147,17 +147,6 @@ def test_slight_excess_is_clipped_and_told(tmp_path):
     assert len(prediction.warnings) == 2
 
 
-def test_damaged_files_are_named(tmp_path):
-    spec = write(tmp_path, **good_maps())
-    (tmp_path / "roughness.exr").unlink()
-    (tmp_path / "roughness.png").write_bytes(b"\x89PNG\r\n\x1a\n rubbish")
-    with pytest.raises(InputError, match=r"roughness\.png"):
-        get_predictor(spec).predict(photo())
-    (tmp_path / "roughness.png").write_bytes(b"")
-    with pytest.raises(InputError, match=r"roughness\.png"):
-        get_predictor(spec).predict(photo())
-
-
 @pytest.mark.parametrize("far", [1e10, 3.4e38])
 def test_depths_that_no_scene_has_are_sky(tmp_path, far):
     """Renderers write such numbers for rays that meet nothing; most of the picture may be such."""

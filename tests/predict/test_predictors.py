@@ -167,19 +167,3 @@ def test_bad_names_are_refused(spec, parts, message, tmp_path, monkeypatch):
         write_moge(tmp_path / folder)
     with pytest.raises(InputError, match=message):
         get_predictor(spec, **parts)
-
-
-def test_damaged_output_of_moge_is_refused(photo, tmp_path):
-    write_moge(tmp_path)
-    for content in ("{}", "no json", '{"fov_x": 200}'):
-        (tmp_path / "fov.json").write_text(content)
-        with pytest.raises(InputError, match="fov"):
-            get_predictor("constant", depth=f"moge:{tmp_path}")
-    (tmp_path / "fov.json").unlink()
-    (tmp_path / "mask.png").write_bytes(b"no png")
-    predictor = get_predictor("constant", depth=f"moge:{tmp_path}")
-    with pytest.raises(InputError, match=r"mask\.png"):
-        predictor.predict(photo)
-    cv2.imwrite(str(tmp_path / "mask.png"), np.zeros((H, W), np.uint8))
-    with pytest.raises(InputError, match="no surface"):
-        predictor.predict(photo)

@@ -13,8 +13,7 @@ from studio_scenes import block, package, room
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import glass as studio_glass
-from materialist.studio.glass import GlassClient, Pane, checked, is_traced
-from materialist.studio.preview import LivePreview
+from materialist.studio.glass import GlassClient, checked, is_traced
 from materialist.studio.workspace import write_mask
 
 
@@ -101,38 +100,6 @@ def test_bad_glass_is_refused_at_once(tmp_path):
     with pytest.raises(InputError, match="only sky"):
         checked(room(), Step("glass", {"mask": write_mask(tmp_path, sky)}, tmp_path))
     assert is_traced(good) and not is_traced(Step("glass", {"mask": name, "model": "two-interface"}))
-
-
-class _Told:
-    """A tracer that knows one pane."""
-
-    def __init__(self, pane):
-        self._pane = pane
-
-    def pane(self, step):
-        return self._pane
-
-
-def test_a_pane_lies_over_edits_and_a_sketch_stands_for_it(tmp_path):
-    live = LivePreview(room())
-    step = Step("glass", {"mask": write_mask(tmp_path, block()), "tint": "0.2,1,0.2"}, tmp_path)
-    sketch = live.picture((step,))
-    before = room().photo.linear
-    assert np.array_equal(sketch[~block()], before[~block()])
-    inner = sketch[20:28, 20:30]
-    assert (inner[..., 1] > inner[..., 0]).all()  # red block, green glass
-    filled = np.zeros((2, 3), bool)
-    filled[0, 0] = True
-    share = np.array([[0, 1, 0.5], [0, 0, 0]], np.float32)
-    pane = Pane((20, 22, 20, 23), np.full((2, 3, 3), 0.9, np.float32), share, filled)
-    dim = Step("relight", {"ambient": "0.5"}, tmp_path)
-    with_pane, alone = live.picture((step, dim), _Told(pane)), live.picture((dim,))
-    np.testing.assert_allclose(with_pane[20, 20:22], 0.9)
-    np.testing.assert_allclose(with_pane[20, 22], 0.5 * 0.9 + 0.5 * alone[20, 22], rtol=1e-5)
-    outside = np.ones(block().shape, bool)
-    outside[20, 20:23] = False
-    assert np.array_equal(with_pane[outside], alone[outside])
-    live.close()
 
 
 class _Report:

@@ -47,13 +47,6 @@ def test_the_loss_has_a_closed_form():
     assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
 
 
-def test_scores_of_views_kept_aside(folder, tmp_path):
-    task = made_runs.clicks(folder, side=64)
-    assert task.scores(task.network(), tmp_path) == {}, "three views are too few"
-    task.held_out = task.examples.views[:1]
-    assert 0 <= task.scores(task.network().eval(), tmp_path)["iou"] <= 1
-
-
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):

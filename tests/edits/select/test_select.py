@@ -77,19 +77,6 @@ def test_boxes_need_not_be_exact(table, which, more):
     assert overlap(select(scene, box=around(things[which], more)), things[which]) > 0.85
 
 
-@pytest.mark.parametrize("certain", [False, True])
-def test_the_network_is_believed_where_it_is_certain(table, monkeypatch, certain):
-    """It is told a half of the object."""
-    scene, first, _ = table
-    half = first & (np.indices(first.shape)[1] < 50)
-    likely = np.where(half, 0.95 if certain else 0.55, 0.02 if certain else 0.4).astype(np.float32) * (first | half)
-    assert (objects.certainty(likely) > 0.7) == certain
-    monkeypatch.setattr(objects, "clicknet", lambda scene, points: likely)
-    monkeypatch.setattr(objects, "grabcut", lambda scene, label, **_: first)
-    for found in (select(scene, box=around(half, 2)), select(scene, click=(45, 50))):
-        assert overlap(found, half if certain else first) > 0.9
-
-
 def test_a_box_on_nothing_says_what_to_do(table, monkeypatch):
     monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: np.zeros(label.shape, bool))
     with pytest.raises(InputError, match="draw the box a little larger"):

@@ -67,12 +67,6 @@ def test_a_mirrored_photo_has_mirrored_features():
     np.testing.assert_allclose(there, features(*photo, [(70, 50)]), atol=1e-6)
 
 
-def test_a_click_on_the_sky_and_photos_without_surfaces_are_finite():
-    photo, _ = scene()
-    empty = photo._replace(depth=np.zeros_like(photo.depth))
-    assert np.isfinite(features(*empty, [(5, 5)])).all()
-
-
 @pytest.mark.parametrize("size", [(40, 300), (9, 9)])
 def test_photos_of_any_shape(untrained, size):
     rng = np.random.default_rng(0)

@@ -6,7 +6,6 @@ import torch
 from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
-from materialist.errors import InputError, WeightsError
 from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction import WEIGHTS, best_thickness, thickness
 from materialist.predict.refraction.crop import BACK_X, CHANNELS, MASK, MIRROR, SIDE, Window
@@ -76,20 +75,6 @@ def test_windows_reach_over_the_border_and_come_back():
     assert view.rays[0, 0, 0] == pytest.approx(
         rays[0, 0, 0] + step * (window.left - 0.5 + window.side / SIDE / 2), abs=1e-5
     )
-
-
-def test_bad_input_is_refused(plain, tmp_path):
-    camera = Camera(48, 48, 45)
-    photo, mask, normal, depth, _ = seen(camera)
-    with pytest.raises(InputError, match="covers no surface"):
-        thickness(photo, 0 * mask, normal, depth, camera, weights=plain)
-    with pytest.raises(InputError, match="photo has shape"):
-        thickness(photo[1:], mask, normal, depth, camera, weights=plain)
-    with pytest.raises(WeightsError, match="no weights of RefractionNet"):
-        thickness(photo, mask, normal, depth, camera, weights=tmp_path / "none.safetensors")
-    (tmp_path / "odd.safetensors").write_bytes(plain.read_bytes()[:2000])
-    with pytest.raises(WeightsError):
-        thickness(photo, mask, normal, depth, camera, weights=tmp_path / "odd.safetensors")
 
 
 def test_the_network_is_bounded_and_zero_outside():
