@@ -23,24 +23,13 @@ def rows(mitsuba, tmp_path_factory):
 
 
 def test_every_table_has_its_rows(rows):
-    names = list(rows)
-    for part in (["delta 0, ARM", "delta 50, RM&A", "2 steps", "init 1", "U-Net, 20 steps",
-                              "direct w/o R, M", "fov x 0.8"]):  # fmt: skip
-        assert part in names, part
-    assert all("psnr" in row for row in rows.values())
+    names = {"delta 0, ARM", "delta 50, RM&A", "2 steps", "init 1", "U-Net, 20 steps", "direct w/o R, M", "fov x 0.8"}
+    assert names <= set(rows) and all("psnr" in row for row in rows.values())
 
 
-def test_more_steps_and_a_smaller_price_fit_the_photo_closer(rows):
-    assert rows["30 steps"]["steps"] == 30 and rows["2 steps"]["steps"] == 2
-    assert rows["30 steps"]["loss"] < rows["2 steps"]["loss"]
-    assert rows["delta 0, ARM"]["loss"] < rows["delta 50, ARM"]["loss"]
-
-
-def test_first_weights_hardly_matter(rows):
-    assert rows["init 0"]["loss"] == pytest.approx(rows["init 1"]["loss"], rel=0.2)
-    assert rows["init 0"]["loss"] != rows["init 1"]["loss"]
-
-
-def test_the_true_field_of_view_is_the_reference(rows):
-    assert rows["fov x 1"]["psnr"] > 20 and {"relit_psnr"} <= set(rows["fov x 0.8"])
-    assert rows["fov x 1"]["psnr"] > rows["fov x 1.2"]["psnr"] - 0.5
+def test_what_matters_does_and_first_weights_hardly(rows):
+    loss = {name: row.get("loss") for name, row in rows.items()}
+    assert rows["30 steps"]["steps"] == 30 and loss["30 steps"] < loss["2 steps"]
+    assert loss["delta 0, ARM"] < loss["delta 50, ARM"]
+    assert loss["init 0"] == pytest.approx(loss["init 1"], rel=0.2) and loss["init 0"] != loss["init 1"]
+    assert rows["fov x 1"]["psnr"] > max(20, rows["fov x 1.2"]["psnr"] - 0.5) and "relit_psnr" in rows["fov x 0.8"]

@@ -74,16 +74,5 @@ def test_command(run, package, tmp_path):
     assert run(*arguments, "--force", "--max-triangles", 1000)[0] == 0
     assert len(target.read_bytes()) < len(before) / 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.light.hdr"]
-
-
-def test_command_with_bad_input(run, package, tmp_path):
-    for source, to, *more in (
-        (tmp_path / "none", "html"),
-        (package, "html", "--max-triangles", 5),
-        (package, "glb"),
-        (package, "vrml"),
-        (package, "html", "--shadow-catcher"),
-    ):
-        code, _, err = run("export", source, "--to", to, "-o", tmp_path / "a.html", *more)
-        assert code == 2 and err
-    assert list(tmp_path.iterdir()) == []
+    code, _, err = run("export", package, "--to", "html", "-o", tmp_path / "a.html", "--shadow-catcher")
+    assert code == 2 and "options for Blender" in err and not (tmp_path / "a.html").exists()

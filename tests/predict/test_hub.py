@@ -87,15 +87,6 @@ def test_marigold_sees_srgb_and_only_the_wanted_model_runs(marigold, monkeypatch
     assert prediction.sources["depth"] == prediction.sources["metallic"] == "constant"
 
 
-def test_one_marigold_model_from_a_folder(marigold):
-    folder = marigold / "prs-eth--marigold-normals-v1-1"
-    prediction = get_predictor("constant", normal=f"marigold:{folder}", device="cpu").predict(made_photo())
-    check_normals = np.linalg.norm(prediction.normal, axis=-1)
-    assert np.allclose(check_normals, 1, atol=1e-5) and prediction.sources["normal"].startswith("marigold (prs-eth--")
-    with pytest.raises(InputError, match="gives only normal"):
-        get_predictor("constant", albedo=f"marigold:{folder}")
-
-
 def test_a_damaged_or_incomplete_marigold_is_refused(marigold):
     from safetensors.torch import load_file, save_file
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
 from materialist.procedural.dataset import produce, read_description, sample_path
 from materialist.procedural.objects import things
 from materialist.procedural.options import HELD_OUT, DataSetOptions
@@ -135,16 +135,6 @@ def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
 def test_options_that_cannot_be(wrong, said):
     with pytest.raises(InputError, match=said):
         DataSetOptions(**wrong)
-
-
-def test_folders_and_counts_that_cannot_be(options, tmp_path):
-    with pytest.raises(InputError, match="count is 0"):
-        produce(tmp_path / "x", options, count=0)
-    with pytest.raises(InputError, match=r"\.ply"):
-        DataSetOptions(meshes=tmp_path)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot be written"):
-        produce(tmp_path / "file/set", options, count=1)
 
 
 CORNERS = "0 0 0\n1 0 0\n0 1 0\n"

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from made_meshes import floor_scene
-from studio_scenes import named
 
 from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.studio import objects
-from materialist.studio.controls import control_values
 from materialist.studio.objects import library_file
 from materialist.studio.preview import LivePreview
 
@@ -38,19 +36,3 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     assert session.undo() and session.undo()
     assert [s.kind for s in session.edits.steps] == ["insert"]
     floor.close()
-
-
-def test_choosing_an_object_brings_its_values(session):
-    objects.set_option(session, "mesh", library_file(session, "Ring"))
-    for name, value in (("scale", "0.5"), ("turn", "-20"), ("material", "#102030")):
-        objects.set_option(session, name, value)
-    objects.place(session, 50, 40)
-    ring = {"thing": "Ring", "scale": 0.5, "turn": -20, "made_of": "colour", "thing_colour": "#102030"}
-    session.deselect()
-    assert "thing" not in control_values(session)  # no current step: the controls are for the next
-    session.act("choose", 0)
-    shown = named().everything(session)
-    assert {name: shown[name] for name in ring} == ring
-    session.deselect()
-    objects.place(session, 30, 40)  # the next is as the controls show it
-    assert session.edits.steps[1].options == {**session.edits.steps[0].options, "at": ["30", "40"]}

@@ -1,30 +1,11 @@
 """Pictures and words for the page, lights, and the tasks of the worker."""
 
-import base64
-
-import cv2
 import numpy as np
-from studio_scenes import block, package, room
+from studio_scenes import package, room
 
 from materialist.edits.light.relight import checked_envmap
 from materialist.edits.recipe import read_recipe
 from materialist.studio import lights, stage, tasks
-from materialist.studio.selection import Selection
-
-
-def decoded(url: str) -> np.ndarray:
-    data = np.frombuffer(base64.b64decode(url.split(",", 1)[1]), np.uint8)
-    return cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-
-
-def test_the_stage_shows_the_photo_and_the_mask():
-    picture = decoded(stage.jpeg_url(room().photo.linear))[..., ::-1]
-    assert picture.shape == (48, 64, 3) and picture[24, 25, 0] > 180 > picture[24, 25, 1]
-    urls = Selection((block(),)).pictures
-    assert np.array_equal(decoded(urls["fill"])[..., 3] > 0, block())
-    outline = decoded(urls["outline"])[..., 3] > 0
-    assert outline.any() and not outline[24, 25]
-    assert Selection().pictures == {"fill": "", "outline": ""}
 
 
 def test_the_report_is_plain_and_harmless():

@@ -8,7 +8,7 @@ from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import widgets
-from materialist.studio.server import check_host, first_target, new_studio
+from materialist.studio.server import check_host, new_studio
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
 
@@ -73,21 +73,6 @@ def test_bad_options_end_with_2(run, arguments, tmp_path):
     port = [] if "--port" in arguments else ["--port", "47391"]
     code, _, err = run("studio", *arguments, *work, *port)
     assert code == 2 and err.startswith("Error: ")
-
-
-def test_a_scene_elsewhere_is_known_again(tmp_path):
-    scene = tmp_path / "kitchen.scene"
-    scene.mkdir()
-    (scene / "scene.json").write_text("{}")
-    studio = new_studio(tmp_path / "work", single_user=True)
-    first = first_target(studio.work, str(scene))
-    assert first.scene == scene and first == first_target(studio.work, str(scene))
-    assert first_target(studio.work, None) is None
-    assert first_target(studio.work, "example:coffee").name == "coffee.png"
-    (tmp_path / "a.txt").write_text("x")
-    with pytest.raises(InputError, match="not a photo"):
-        first_target(studio.work, str(tmp_path / "a.txt"))
-    studio.jobs.close()
 
 
 def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):

@@ -43,18 +43,6 @@ def test_colours_at_the_sky_are_those_of_the_surface(sample, size):
     np.testing.assert_allclose(scaled.metallic[here], 0.8, atol=1e-5)
 
 
-@pytest.mark.parametrize("size", [(96, 128), (24, 32), (30, 100)])
-def test_rays_of_a_resized_picture_are_those_of_its_camera(sample, size):
-    height, width = size
-    x = ((np.arange(width) + 0.5) / width * 2 - 1) * np.tan(np.radians(25))
-    y = (1 - (np.arange(height) + 0.5) / height * 2) * np.tan(np.radians(25)) * 48 / 64
-    rays = augment.resized(sample, height, width).rays
-    np.testing.assert_allclose(rays[..., 0], np.broadcast_to(x, size), atol=1e-6)
-    np.testing.assert_allclose(rays[..., 1], np.broadcast_to(y[:, None], size), atol=1e-6)
-    mirrored = augment.resized(augment.flip(sample), height, width)
-    np.testing.assert_allclose(mirrored.rays[:, ::-1] * [-1, 1], rays, atol=1e-6)
-
-
 def test_flips_mirror_the_geometry(sample):
     mirrored = augment.flip(sample)
     _on_plane(mirrored, made_samples.NORMAL * [-1, 1, 1], 2e-3)

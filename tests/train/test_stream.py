@@ -58,17 +58,3 @@ def test_held_out_samples_are_never_trained_on(tmp_path):
     (tmp_path / "samples" / "0000005.npz").unlink()
     source.refresh()
     assert {source.number(k) for k in maps.trained_on(source)} == before - {5}
-
-
-def test_scores_say_what_they_are_of(tmp_path):
-    small = made_runs.bundled(made_samples.write_set(tmp_path / "small", 3), samples=3)
-    network = small.network().eval()
-    assert small.scores(network, tmp_path)["of"] == maps.TRAINED_ON
-    spoil(tmp_path / "small", "0000001.npz")
-    assert len(maps.held_out(small.source, 3)[1]) == 2, "what cannot be read is left out"
-    spoil(tmp_path / "small")
-    assert small.scores(network, tmp_path) == {}
-    enough = made_samples.write_set(tmp_path / "enough", maps.HELD_OUT_EVERY)
-    assert made_runs.bundled(enough, samples=1).scores(network, tmp_path)["of"] == maps.HELD_OUT
-    with pytest.raises(InputError, match="--score-samples is -1"):
-        made_runs.bundled(enough, samples=-1)

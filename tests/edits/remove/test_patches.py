@@ -128,13 +128,6 @@ def test_levels_do_not_cross_from_surface_to_surface():
     np.testing.assert_allclose(found[HOLE & (label == 0)], 0.5, atol=1e-3)
 
 
-def test_another_thing_beside_the_hole_gives_no_level():
-    picture = np.full(SHAPE, 0.5)
-    picture[10:30, 15:20] = 0.05  # a dark post at its left
-    found = seamless(colours(picture), HOLE, sources_from((0, 20)), ONE)
-    np.testing.assert_allclose(found[HOLE], 0.5, atol=1e-3)
-
-
 @pytest.mark.parametrize("place", [np.s_[30:, 50:], np.s_[:, 25:35]])
 def test_holes_at_the_frame_are_solved_too(place):
     rng = np.random.default_rng(0)

@@ -94,21 +94,3 @@ def test_shadows_beside_the_hole_are_not_copied():
     found = sources(np.where(HOLE[..., None], 0.9, seen), depth)
     told = found >= 0
     assert told[HOLE].mean() > 0.97 and shadow.ravel()[found[told]].mean() < 0.03
-
-
-def test_a_large_tile_that_is_seen_three_times_goes_on(seed=0):
-    """A hidden place has one or two repeats in the picture, a known one hardly more."""
-    depth, picture = slanted(wallpaper(seed))
-    torn = np.where(HOLE[..., None], 0.5, picture)
-    found = sources(torn, depth)
-    told = found >= 0
-    assert told[HOLE].mean() > 0.7
-    error = np.abs(torn.reshape(-1, 3)[found[told]] - picture[told]).mean()
-    assert error < 0.5 * np.abs(picture[told] - np.median(picture, (0, 1))).mean()
-
-
-def test_a_pattern_that_does_not_go_on_beside_the_hole_is_not_taken():
-    depth, picture = slanted(chequers)
-    other = slanted(wallpaper(3, (7.0, 7.0), 900))[1]
-    near = np.hypot(ROWS - 50, COLUMNS - 62) < 19 * 1.6
-    assert (sources(np.where(near[..., None], other, picture), depth) < 0).all()
