@@ -66,8 +66,8 @@ def test_edit_writes_the_photo_with_only_the_block_changed(run, folder, tmp_path
 
 def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(run, folder, tmp_path):
     common = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--roughness", "+0", "--spp", 4]
-    code, shown, err = run(*common, "-o", tmp_path / "o.png")
-    assert code == 0 and "nothing of the edit is to be seen" in shown, err
+    code, _, err = run(*common, "-o", tmp_path / "o.png")
+    assert code == 0, err
     photo = np.round(linear_to_srgb(load_scene(folder / "a.scene").photo.original) * 255).astype(np.uint8)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "o.png")), photo)
     assert run(*common, "--full-render", "--no-denoise", "-o", tmp_path / "b.png")[0] == 0

@@ -78,8 +78,7 @@ def relight(
     from materialist.edits.light.relight import relight as change
 
     edited = change(loaded, wanted, sun=suns[0] if suns else None)
-    unseen = "Walls, or what else the photo shows, keep the sun out; --sun 180,40 comes from behind the camera."
-    write_result("relight", loaded, edited, output, rendering, run, unseen=unseen if suns else "")
+    write_result("relight", loaded, edited, output, rendering, run)
 
 
 def drop(

@@ -74,14 +74,13 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | N
 
 
 def write_result(
-    command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = (),
-    unseen: str = "",
+    command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
-    """Render, composite, write, report; `unseen` says what may be done where nothing of the edit is to be seen."""
+    """Render, composite, write, report."""
     from materialist.edits.composite.composite import composite, developed
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import warnings_since
-    from materialist.edits.core.renderer import is_relit, paths_for
+    from materialist.edits.core.renderer import paths_for
     from materialist.io.package import save_scene
 
     start, save = time.monotonic(), rendering.save
@@ -95,8 +94,6 @@ def write_result(
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
     warnings = warnings_since(scene, edited)
-    if not rendering.full_render and is_unseen(picture, scene.photo.original, relit=is_relit(scene, edited)):
-        warnings.append(f"The picture looks like the photo: nothing of the edit is to be seen. {unseen}".rstrip())
     shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]
     if save is not None:
         shown.append(f"The edited scene is {save}")
@@ -104,15 +101,3 @@ def write_result(
         command, run.as_json, shown, image=str(output), scene=str(save) if save else None, spp=spp,
         seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings,
     )  # fmt: skip
-
-
-def is_unseen(picture: Any, photo: Any, *, relit: bool = False) -> bool:
-    """Whether two pictures [H, W, 3] linear look the same: encoded, fewer than one pixel in 10 000 differ by 1/255.
-
-    Another light reaches every pixel, and its noise, too: there fewer than one in 100 by 4/255.
-    """
-    from materialist.color import srgb_levels
-
-    step, share = (4, 1e-2) if relit else (1, 1e-4)
-    away = abs(srgb_levels(picture).astype("int16") - srgb_levels(photo)).max(-1)
-    return bool((away > step).mean() < share)

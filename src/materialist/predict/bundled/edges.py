@@ -12,11 +12,6 @@ import numpy as np
 
 from materialist.types import Array
 
-HALVED = 8
-"""Radius from which windows are summed at half the resolution (He and Sun 2015, "Fast Guided Filter"): a quarter of the
-work for sums that hardly differ (windows are one coarse pixel wider or narrower); the colours that they are compared
-with stay whole. Pictures narrower than twice that are summed as they are."""
-
 
 class GuidedFilter:
     """The photo as a guide: weights W_ij = mean over windows k of 1 + (I_i - m_k)^T (S_k + eps)^-1 (I_j - m_k).
@@ -31,13 +26,10 @@ class GuidedFilter:
     """
 
     def __init__(self, photo: Array, *, radius: int, eps: float = 1e-3):
-        self.size = photo.shape[:2]
-        step = 2 if radius >= HALVED and min(self.size) >= 2 * HALVED else 1
-        self.coarse = tuple(-(-n // step) for n in self.size)
-        self.window = (2 * round(radius / step) + 1,) * 2
+        self.window = (2 * radius + 1,) * 2
         self.planes = [np.ascontiguousarray(c, np.float32) for c in np.moveaxis(photo, -1, 0)]
         self.mean = [self._box(c) for c in self.planes]
-        covariance = np.empty((*self.coarse, 3, 3), np.float64)
+        covariance = np.empty((*photo.shape[:2], 3, 3), np.float64)
         for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)):
             entry = self._box(self.planes[i] * self.planes[j]) - self.mean[i] * self.mean[j]
             covariance[..., i, j] = covariance[..., j, i] = entry
@@ -50,19 +42,11 @@ class GuidedFilter:
         with_colour = [self._box(c * members) - m * level for c, m in zip(self.planes, self.mean, strict=True)]
         slopes = [sum(r * c for r, c in zip(row, with_colour, strict=True)) for row in self.inverse]
         offset = level - sum(s * m for s, m in zip(slopes, self.mean, strict=True))
-        near = sum(self._spread(s) * c for s, c in zip(slopes, self.planes, strict=True))
-        return near + self._spread(offset)
+        return self._box(offset) + sum(self._box(s) * c for s, c in zip(slopes, self.planes, strict=True))
 
     def _box(self, plane: Array) -> Array:
-        """Means over the windows of a plane [H, W], at their resolution."""
-        if self.coarse != self.size:
-            plane = cv2.resize(plane, self.coarse[::-1], interpolation=cv2.INTER_AREA)
+        """[H, W] means of a plane over the windows."""
         return cv2.blur(plane, self.window, borderType=cv2.BORDER_REFLECT)
-
-    def _spread(self, plane: Array) -> Array:
-        """[H, W] means over the windows of a plane at their resolution."""
-        mean = cv2.blur(plane, self.window, borderType=cv2.BORDER_REFLECT)
-        return mean if self.coarse == self.size else cv2.resize(mean, self.size[::-1], interpolation=cv2.INTER_LINEAR)
 
 
 def weighted_median(values: Array, guide: GuidedFilter, *, known: Array | None = None, bins: int = 32) -> Array:
