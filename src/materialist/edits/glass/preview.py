@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
 from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
+
+if TYPE_CHECKING:
+    from materialist.render.scene import RenderScene
 
 PATHS = 600_000
 """Paths of one picture, as far as FEWEST a pixel allow."""
@@ -24,20 +27,18 @@ MARGIN = 2
 class GlassPreview:
     """An object of a fitted scene as glass, again and again with other glass.
 
-    The background, the closed body and the ray tracer's scene are made when it is built (seconds); a picture then takes
-    the paths inside the object's rectangle alone. Its shadow and caustics on the surroundings, which `composite` adds,
-    are not shown: around the object stands the photo with the object gone.
+    The background and the closed body are made when it is built (seconds); a picture then takes the paths inside the
+    object's rectangle alone. Its shadow and caustics on the surroundings, which `composite` adds, are not shown: around
+    the object stands the photo with the object gone.
 
     Args:
-        scene, mask, options, fitted, values: as for `glass.glass`; `model` must be `closed`.
+        scene, mask, options, values: as for `glass.glass`; `model` must be `closed`.
 
     Raises:
         InputError: as `glass.glass`, and for another model.
     """
 
-    def __init__(
-        self, scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None, **values: Any
-    ):
+    def __init__(self, scene: Scene, mask: Array, options: Glass | None = None, **values: Any):
         from materialist.edits.core.sky import photo_sky
         from materialist.render.variant import setup
 
@@ -47,10 +48,8 @@ class GlassPreview:
         setup(options.device)
         self.scene = scene
         # The glass itself is exchanged for every picture.
-        self._edited = glass(scene, mask, options, fitted=fitted, ior=1.5, transmission=1.0)
-        self._targets: dict[str, tuple[Any, Any]] = {}
-        as_photographed = np.array_equal((fitted or scene).envmap, scene.envmap)
-        sky = photo_sky(self._edited) if as_photographed else None
+        self._edited = glass(scene, mask, options, ior=1.5, transmission=1.0)
+        sky = photo_sky(self._edited)
         self._light = self._edited.envmap if sky is None else sky
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._look()
@@ -69,17 +68,12 @@ class GlassPreview:
         if spp < 1:
             raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
-        target, box = self._dressed(surface), self._box
+        target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // ((box[1] - box[0]) * (box[3] - box[2]))))
         seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
         calm = without_fireflies(spread(seen))
         guide = self._guide
-        return self._in_photo(denoised(calm, guide.albedo, guide.normal), surface)
-
-    @property
-    def edited(self) -> Scene:
-        """The scene that is traced, as `glass.glass` gives it, with clear glass of index 1.5."""
-        return self._edited
+        return self._in_photo(denoised(calm, guide.albedo, guide.normal))
 
     @property
     def share(self) -> Array:
@@ -109,30 +103,11 @@ class GlassPreview:
     def _sight(self, box: tuple[int, int, int, int]) -> Any:
         from materialist.render.coverage import first_hits
 
-        target = self._dressed(self._edited.bodies[-1].surface)
+        target = self._target(self._edited.bodies[-1].surface)
         return first_hits(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, self._size, box)
 
-    def _dressed(self, surface: Surface) -> Any:
-        """The ray tracer's scene with the body of that glass: made once for each kind of glass."""
-        from materialist.render.bodies import SMOOTH
-
-        rough = surface.interface_roughness
-        coated = surface.transmission < 1
-        kind = "coated" if coated else ("smooth" if rough < SMOOTH else "rough")
-        if coated or kind not in self._targets:
-            # The coat's share is no parameter of Mitsuba's: its scene is made anew each time, and not kept twice.
-            self._targets[kind] = self._built(surface)
-        target, params = self._targets[kind]
-        if surface.transmission >= 1:
-            start = f"{self._name}.bsdf." + ("interface." if kind == "rough" else "")
-            params[start + "eta"] = max(float(surface.ior), 1.0001)
-            params[start + "specular_transmittance.value"] = target.mi.Color3f(*(c**0.5 for c in surface.tint))
-            if kind == "rough":
-                params[start + "alpha.value"] = rough**2
-            params.update()
-        return target
-
-    def _built(self, surface: Surface) -> tuple[Any, Any]:
+    def _target(self, surface: Surface) -> RenderScene:
+        """The ray tracer's scene with the body of that glass."""
         from materialist.render.scene import RenderScene
 
         edited = self._edited
@@ -142,9 +117,9 @@ class GlassPreview:
         )  # fmt: skip
         target.set_materials(edited.materials)
         target.set_envmap(self._light)
-        return target, target.mi.traverse(target.mi_scene)
+        return target
 
-    def _in_photo(self, traced: Array, surface: Surface) -> Array:
+    def _in_photo(self, traced: Array) -> Array:
         """[H, W, 3] the traced rectangle in the photo without the object."""
         top, bottom, left, right = self._box
         out = self._edited.photo.linear.copy()
