@@ -57,9 +57,9 @@ class Removal(OperationOptions):
     """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
     shadow: float | None = option(
         None,
-        "Fill its shadow and reflection on the ground, too: where they are found, or by this share of its size.",
+        "How far its shadow and reflection on the ground are filled, too, share of its size; auto: 0.15.",
         low=0, high=2, choices=("auto",), metavar="auto|S")
-    """None and `auto` look for the shadow."""
+    """None and `auto` are 0.15."""
     grow: float = option(
         0.01, "Rim of the object that is filled as well, share of the picture's longer side.", low=0, high=0.2,
         called="rim", flag=None)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.edits.core.region import checked_region
-from materialist.edits.remove.contact_shadow import contact_shadow, morphed
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -17,6 +16,7 @@ class HoleSettings:
     """When there is no hole, and what else is filled."""
 
     most: float = 0.9  # part of the photo's surfaces beyond which nothing is left to tell what stood behind
+    shadow: float = 0.15  # how far around the object the ground is filled by default, part of the root of its area
     island: float = 0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
 
 
@@ -43,14 +43,13 @@ def make_hole(
     Raises:
         InputError: a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
-    import cv2
     from skimage.morphology import remove_small_holes
 
     own = checked_region(scene, mask) > 0.5
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     bodies = np.zeros_like(own) if bodies is None else bodies
-    gone = morphed(cv2.MORPH_DILATE, own, round(grow * max(own.shape)))
+    gone = _dilated(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
     if (gone & surface).sum() > settings.most * surface.sum() or (gone | ~surface).all():
         if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
@@ -64,8 +63,14 @@ def make_hole(
         )
     plane = scene.geometry.plane_label
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
-    if shadow is None:
-        painted = gone | contact_shadow(scene.photo.linear, plane, ground, own, gone)
-    else:
-        painted = gone | (ground & morphed(cv2.MORPH_DILATE, gone, round(shadow * float(np.sqrt(own.sum())))))
+    share = settings.shadow if shadow is None else shadow
+    painted = gone | (ground & _dilated(gone, round(share * float(np.sqrt(own.sum())))))
     return Hole(own, gone, remove_small_holes(painted, max_size=int(settings.island * own.sum())) & ~bodies)
+
+
+def _dilated(mask: Array, radius: int) -> Array:
+    """[H, W] bool: a mask grown by a disc of `radius` pixels."""
+    import cv2
+
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+    return cv2.dilate(mask.astype(np.uint8), kernel) > 0
