@@ -3,7 +3,7 @@
 import pytest
 from made_batch import photos
 
-from materialist.batches.edits import edits_key, missing_files
+from materialist.batches.edits import edits_key
 from materialist.batches.run import batch
 from materialist.errors import InputError
 
@@ -40,16 +40,6 @@ def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
     assert edits_key(tmp_path / "edits.yaml", "a", 8) == key
     (tmp_path / changed).write_text((tmp_path / changed).read_text() + " new\n")
     assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
-
-
-def test_files_that_are_missing_are_found_step_by_step(recipe):
-    folder = recipe.parent
-    assert missing_files(recipe, "c") == [f"{folder}/c.ply", f"{folder}/m/c.png"]
-    recipe.write_text(
-        "- glass: {click: [3, 4], thickness: network}\n- glass: {click: [3, 4], thickness: d.exr}\n"
-        "- edit: {mask: none.png, hue: 3, skip: true}\n- relight: {envmap: sky.exr}\n"
-    )
-    assert missing_files(recipe, "a") == [f"{folder}/d.exr", f"{folder}/sky.exr"]
 
 
 def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):

@@ -53,12 +53,6 @@ def test_an_insert_may_have_several_places(folder):
     assert len(replay(folder, "- insert: {mesh: box.ply, at: '8,30'}").bodies) == 1
 
 
-def test_a_plus_sign_is_a_shift_in_yaml_too(folder):
-    shifted = replay(folder, "- edit: {mask: block.png, roughness: +0.25}")
-    level = replay(folder, "- edit: {mask: block.png, roughness: 0.25}")
-    assert (shifted.materials.roughness[MASK] == 0.75).all() and (level.materials.roughness[MASK] == 0.25).all()
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -84,22 +78,6 @@ def test_what_is_wrong_is_named(folder, text, words):
     with pytest.raises(InputError) as error:
         replay(folder, text)
     assert words in str(error.value)
-
-
-def test_seeds_reach_what_chance_has_a_part_in(folder, monkeypatch):
-    """That of the step, else that of all steps."""
-    import materialist.edits.recipe as recipe
-
-    asked = []
-    monkeypatch.setattr(recipe, "remove", lambda scene, *given, fitted: asked.append(given[-1].seed) or scene)
-    monkeypatch.setattr(recipe, "glass", lambda scene, *given, fitted: asked.append(given[-1].seed) or scene)
-    monkeypatch.setattr(recipe, "settle", lambda scene, *given: asked.append(given[-1].seed) or scene)
-    (folder / "edits.yaml").write_text(
-        "- remove: {mask: block.png}\n- remove: {mask: block.png, seed: 4}\n- glass: {mask: block.png}\n"
-        "- drop: {mesh: a.ply, at: [1, 2]}\n- drop: {mesh: a.ply, at: [1, 2], seed: 0}\n"
-    )
-    apply(SCENE, read_recipe(folder / "edits.yaml"), seed=9)
-    assert asked == [9, 4, 9, 9, 0]
 
 
 @pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",

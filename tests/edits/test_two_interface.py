@@ -160,18 +160,6 @@ def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
     assert all(c.reflected[0, 2] > 0 for c in found if c.reflectance[0] > 0)
 
 
-def test_distance_to_a_slanting_background():
-    camera = Camera(64, 64, 50)
-    n = np.array([0.3, 0.8, 0.5])
-    depth = -1.5 * n[2] / np.minimum(pixel_rays(camera).astype(float) @ n, -1e-3)
-    depth = np.where((depth > 0) & (depth < 50), depth, 0)  # n.p = -1.5 n_z
-    origin = np.array([[0.0, 0.0, -1.0], [0.1, 0.2, -1.2]])
-    direction = np.array([[0.0, -0.6, -0.8], [0.1, -0.7, -0.4]])
-    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-    found = ti.background_distance(origin, direction, depth, camera)
-    np.testing.assert_allclose(found, (-1.5 * n[2] - origin @ n) / (direction @ n), rtol=0.02)
-
-
 def test_rays_that_meet_nothing_see_the_environment():
     sky = np.zeros((16, 32, 3))
     sky[:8] = 1.0  # the upper half

@@ -1,4 +1,4 @@
-"""Extents of walls: read from provenance, found again on changed maps, and kept to by the mesh."""
+"""Extents of walls: read from provenance, and kept to by the mesh."""
 
 import json
 from dataclasses import asdict, replace

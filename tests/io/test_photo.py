@@ -336,20 +336,6 @@ def test_turned_tiffs_are_upright(tmp_path, mode):
     np.testing.assert_array_equal(turned, plain.swapaxes(0, 1)[:, ::-1])
 
 
-def test_alpha_of_float_tiffs(tmp_path):
-    """Colours may be multiplied by it (ExtraSamples 1) or not: the same picture."""
-    import tifffile
-
-    rng = np.random.default_rng(1)
-    alpha, colour = rng.uniform(0.3, 1, (12, 16, 1)), rng.uniform(0.1, 0.9, (12, 16, 3))
-    found = []
-    for extra, pixels in (("unassalpha", colour), ("assocalpha", colour * alpha)):
-        data = np.concatenate([pixels, alpha], -1).astype(np.float32)
-        tifffile.imwrite(tmp_path / "a.tif", data, photometric="rgb", extrasamples=[extra])
-        found.append(decode_photo(tmp_path / "a.tif").over(1.0))
-    np.testing.assert_allclose(found[0], found[1], atol=1e-6)
-
-
 @pytest.mark.parametrize("channels", [1, 3])
 def test_portable_pixmaps_of_8_bits_alone(tmp_path, channels):
     pixels = picture()[..., :channels]

@@ -40,16 +40,6 @@ def test_several_sets_are_one(tmp_path):
         open_sources([*folders, tmp_path / "nowhere"])
 
 
-def test_bad_sets_are_named(tmp_path):
-    with pytest.raises(InputError, match="no data folder"):
-        open_sources([tmp_path / "nowhere"])
-    with pytest.raises(InputError, match="neither 'samples'"):
-        open_sources([tmp_path])
-    (tmp_path / "samples").mkdir()
-    with pytest.raises(InputError, match="no samples yet"):
-        open_sources([tmp_path])
-
-
 def test_damaged_samples_are_named(tmp_path):
     made_samples.write_set(tmp_path, 1)
     path = tmp_path / "samples" / "0000000.npz"

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from materialist.color import luminance
-from materialist.errors import InputError
 from materialist.metrics import sh_coefficients
 from materialist.procedural import lights
 
@@ -34,11 +33,6 @@ def test_a_tilted_camera_sees_the_sky_tilted():
     found = np.array([first, second, third]) / np.linalg.norm([first, second, third])
     # Orders -1, 0, 1 go with sin, pole, cos of the azimuth from -Z: x, y, -z.
     assert np.allclose(found, [up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
-
-
-def test_a_data_folder_without_captures_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"no \.exr"):
-        lights.environment(0, seed=0, data=tmp_path)
 
 
 def test_skies_have_a_mean_of_one_and_are_lighter_above():

@@ -39,17 +39,6 @@ def test_solids_face_outwards_and_stand_on_the_ground(name):
     assert volume(solid) == pytest.approx(expected, rel=0.01) if expected else volume(solid) > 0
 
 
-@pytest.mark.parametrize(
-    "flat",
-    [shapes.panel(np.zeros(3), np.array([2.0, 0, 0]), np.array([0, 0, -1.0]), (4, 2)),
-     shapes.sheet((0, 0, 0), (2, 0, 0), (0, 0, -3), 4)],
-    ids=["panel", "sheet"],
-)  # fmt: skip
-def test_flat_ones_face_right_cross_up(flat):
-    assert np.allclose(flat.normals, [0, 1, 0])
-    assert (shapes.face_normals(flat.vertices, flat.faces)[:, 1] > 0).all()
-
-
 def test_a_level_set_has_the_volume_the_radius_and_the_normals_of_a_ball():
     centre, radius = np.array([0.1, -0.2, 0.05]), 0.7
     ball = level_set(lambda p: np.linalg.norm(p - centre, axis=-1) - radius, 1.1, points=48)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from materialist import metrics
-from materialist.camera import pixel_rays, unproject
-from materialist.errors import InputError
+from materialist.camera import pixel_rays
 from materialist.procedural import arrangements as scenes
 from materialist.procedural.synthetic import make_sample
 
@@ -42,21 +41,6 @@ def test_render_repeats_the_photo_and_is_linear_in_the_light(sample):
     assert metrics.psnr(again, sample.photo.linear) > 25
     twice = sample.render(2 * sample.envmap, spp=64, seed=5)
     assert np.allclose(twice, 2 * again, rtol=1e-3, atol=1e-4)
-
-
-def test_depth_and_normals_agree_on_the_floor(sample):
-    """The floor is one plane of the camera frame: its points lie on the plane of its normal."""
-    normal, depth = sample.truth.normal, sample.truth.depth
-    floor_normal = normal[-1, 0]
-    floor = (depth > 0) & (normal @ floor_normal > 0.9999)
-    assert floor.sum() > 200 and floor_normal[1] > 0.7
-    distance = unproject(depth, sample.photo.camera)[floor] @ floor_normal
-    assert np.ptp(distance) < 1e-3
-
-
-def test_data_without_meshes_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"no \.ply"):
-        scenes.arrangement(0, seed=0, data=tmp_path)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")

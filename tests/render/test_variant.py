@@ -67,15 +67,3 @@ def test_setup_again_is_the_same_and_another_device_is_refused():
         setup("cuda")
     with pytest.raises(InputError, match="tpu"):
         setup("tpu")
-
-
-def test_what_kept_the_renderer_from_loading_is_the_first_cause():
-    try:
-        try:
-            raise ImportError("libatomic.so.1: cannot open shared object file: No such file or directory")
-        except ImportError:
-            raise NameError("name '_drjit_ext' is not defined")  # noqa: B904 - as Dr.Jit does it
-    except NameError as error:
-        said = variant.unloaded(error)
-    assert "libatomic.so.1 is missing" in said and "apt-get install -y libatomic1" in said
-    assert "pip install --force-reinstall" in variant.unloaded(ImportError("no module named mitsuba"))

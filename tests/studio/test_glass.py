@@ -1,4 +1,4 @@
-"""Glass that follows its sliders: the tracing process, what is asked of it, and what the stage shows meanwhile."""
+"""Glass that follows its sliders: the tracing process, what is asked of it, and what it answers."""
 
 import os
 from dataclasses import replace
@@ -73,19 +73,6 @@ def test_failures_are_told_and_the_next_value_is_tried(tracer):
     tracer.ask((), glass(1.4))
     until(lambda: not tracer.state.waiting)
     assert not tracer.state.bad and tracer.pane(glass(1.4)) is not None
-
-
-def test_nothing_stays_when_the_glass_is_gone(tracer):
-    tracer.ask((), glass(1.4))
-    until(lambda: not tracer.state.waiting)
-    worker = tracer._worker
-    tracer.keep((glass(1.2), Step("remove", {"mask": "mask-3.png"})))
-    assert tracer.pane(glass(1.4)) is not None and worker.running
-    tracer.keep((Step("remove", {"mask": "mask-1.png"}),))
-    assert tracer.pane(glass(1.4)) is None and not tracer.state.waiting
-    until(lambda: not worker.running)
-    tracer.ask((), glass(1.4))  # undone: it is made again
-    until(lambda: tracer.pane(glass(1.4)) is not None)
 
 
 def test_bad_glass_is_refused_at_once(tmp_path):

@@ -1,4 +1,4 @@
-"""What falls, what is glass and what is painted, on a small scene with a real preview."""
+"""What falls, on a small scene with a real preview."""
 
 import numpy as np
 import pytest

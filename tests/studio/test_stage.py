@@ -1,4 +1,4 @@
-"""Pictures and words for the page, lights, and the tasks of the worker."""
+"""Words for the page, lights, and the tasks of the worker."""
 
 import numpy as np
 from studio_scenes import package, room

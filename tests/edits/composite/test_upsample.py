@@ -1,7 +1,6 @@
 """Enlarged layers follow the photo's edges; mixed pixels are told apart by their colour."""
 
 import numpy as np
-import pytest
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.composite.upsample import GuidedUpsample, matte
@@ -57,14 +56,3 @@ def test_a_bright_rim_is_no_mixture():
     mask[8:10] = False  # the lip belongs to what is behind
     alpha = matte(mask, large.astype(np.float32))[:, 40]
     assert (alpha[42:] > 0.95).all() and (alpha[:38] < 0.05).all()
-
-
-@pytest.mark.parametrize("factor", [1, 3])
-def test_a_window_is_a_part_of_the_whole(factor):
-    rng = np.random.default_rng(2)
-    large, layer = rng.random((20 * factor, 30 * factor, 3), np.float32), rng.random((20, 30, 2), np.float32)
-    small = large.reshape(20, factor, 30, factor, 3).mean((1, 3))
-    guided, members = GuidedUpsample(small, large), rng.random((20, 30)) > 0.5
-    rows, columns = slice(4, 9), slice(7, 20)
-    whole = guided(layer, members, slice(0, 20 * factor))
-    np.testing.assert_array_equal(guided(layer, members, rows, columns), whole[rows, columns])

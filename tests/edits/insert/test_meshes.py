@@ -185,19 +185,6 @@ def test_an_inside_out_mesh_is_turned(tmp_path):
     assert (((body.vertices - [0, 0.5, 0]) * body.normals).sum(1) > 0).all()
 
 
-def test_other_materials(tmp_path):
-    model = read_model(box_file(tmp_path / "box.ply"))
-    assert repainted(model, "as-is") is model
-    glass = repainted(model, "glass").parts[0].surface
-    assert (glass.transmission, glass.ior) == (1, 1.5)
-    mirror = repainted(model, "mirror").parts[0].surface
-    assert mirror.metallic.min() == 1 and mirror.albedo.min() > 0.9 and mirror.roughness.max() < 0.1
-    np.testing.assert_allclose(repainted(model, "#ff0000").parts[0].surface.albedo[0, 0], RED)
-    np.testing.assert_allclose(repainted(model, "0.1,0.2,0.3").parts[0].surface.albedo[0, 0], [0.1, 0.2, 0.3])
-    with pytest.raises(InputError, match="as-is, glass, mirror"):
-        repainted(model, "wood")
-
-
 def test_a_mesh_far_from_its_origin_keeps_its_shape(tmp_path):
     box = trimesh.creation.box((0.2, 0.3, 0.4))
     box.apply_translation((500000, 4000000, 100))

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene
 
-from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.color import linear_to_srgb
 from materialist.edits.material.material import edit, shifted_hsv
 from materialist.errors import InputError
-from materialist.option_kinds import parse_colour
 
 SCENE = flat_scene()
 MASK = block_mask(36, 48)
@@ -55,14 +54,6 @@ def test_shift_and_set_differ_by_the_sign():
     for wanted, expected in (("+0.3", 0.8), ("-0.3", 0.2), ("0.3", 0.3), ("+0.9", 1.0), ("-0.9", 0.0)):
         got = edit(SCENE, MASK, roughness=wanted).materials.roughness[MASK]
         np.testing.assert_allclose(got, expected, atol=1e-6)
-
-
-def test_set_albedo_in_linear_and_in_srgb():
-    np.testing.assert_allclose(
-        edit(SCENE, MASK, albedo=(0.2, 0.4, 0.6)).materials.albedo[MASK], [[0.2, 0.4, 0.6]] * MASK.sum()
-    )
-    np.testing.assert_allclose(parse_colour("#ff8000"), srgb_to_linear(np.array([1, 128 / 255, 0])), atol=1e-6)
-    np.testing.assert_allclose(parse_colour("0.1,0.2,0.3"), [0.1, 0.2, 0.3], atol=1e-7)
 
 
 def test_texture_lies_upright_on_a_wall():

@@ -72,13 +72,6 @@ def test_the_same_weights_in_every_packing(tmp_path, state):
     assert np.allclose(maps[4], maps[0], atol=2e-2)
 
 
-def test_safetensors_come_before_pickles_in_a_folder(tmp_path, state):
-    saved(tmp_path / "matnet_weights.pth", state)
-    assert ".pth" in get_predictor(f"matnet:{tmp_path}").name
-    save_file(state, tmp_path / "matnet_weights.safetensors")
-    assert ".safetensors" in get_predictor(f"matnet:{tmp_path}").name
-
-
 def test_missing_extra_and_misshapen_tensors_are_named(tmp_path, state):
     bias = state.pop("pretrained.norm.bias")
     refused(saved(tmp_path / "less.pth", state), "Missing", "pretrained.norm.bias", "MatNet")

@@ -40,13 +40,6 @@ def test_chords_of_a_ball():
     np.testing.assert_allclose(leaving, normal * [1, 1, -1], atol=1e-2)
 
 
-def test_lengths_are_in_units_of_the_direction():
-    origin, direction = straight([0.2])
-    tracer = ShapeTracer(ball())
-    one, two = tracer.trace(origin, direction), tracer.trace(origin, 2 * direction)
-    assert one.solid[0] == pytest.approx(2 * two.solid[0], rel=1e-4)
-
-
 def test_a_hollow_ball_has_walls():
     shell = shapes.joined([ball(), inside_out(ball(0.4))])
     x = np.array([0.05, 0.35, 0.45])
