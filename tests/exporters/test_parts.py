@@ -5,9 +5,7 @@ import pytest
 from export_scenes import room
 
 from materialist.camera import project
-from materialist.errors import InputError
 from materialist.exporters.parts import scene_parts
-from materialist.types import Geometry, Mesh
 
 
 def test_parts_are_the_whole_mesh():
@@ -41,18 +39,6 @@ def test_fewer_triangles_on_the_same_frame(most):
     assert np.abs(pixels.min(0)).max() < 0.01 and np.abs(pixels.max(0) - (64, 40)).max() < 0.01
     distance = np.abs(pixels - surface.uv * (64, 40)).max(1)
     assert np.median(distance) < 0.01
-
-
-def test_bad_input():
-    from dataclasses import replace
-
-    scene = room()
-    with pytest.raises(InputError, match="give at least 100"):
-        scene_parts(scene, 3)
-    mesh = scene.geometry.mesh
-    planes = Mesh(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, mesh.face_pixel, mesh.face_plane * 0)
-    with pytest.raises(InputError, match="no depth surface"):
-        scene_parts(replace(scene, geometry=Geometry(planes, scene.geometry.plane_label)))
 
 
 def test_fewer_triangles_keep_the_ends_of_walls():

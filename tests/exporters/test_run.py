@@ -53,15 +53,6 @@ def test_only_an_earlier_export_is_replaced(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_the_page_is_reduced_unless_asked_otherwise(tmp_path, monkeypatch):
-    from materialist.exporters import run
-
-    monkeypatch.setattr(run, "PAGE_TRIANGLES", 1000)
-    small = mt.export(room(), tmp_path / "a.html").path.stat().st_size
-    whole = mt.export(room(), tmp_path / "b.html", max_triangles=10**6).path.stat().st_size
-    assert small < whole - 20_000
-
-
 def test_command(run, package, tmp_path):
     target = tmp_path / "room.glb"
     arguments = ["export", package, "--to", "glb", "-o", target]

@@ -27,18 +27,3 @@ def test_the_last_row_of_a_wall_has_the_walls_normal():
     np.testing.assert_array_equal(build_geometry(depth, normal, CAMERA, completion="none").mesh.normals, split.normals)
     own = normal.reshape(-1, 3)[split.face_pixel]  # [F, 3]
     np.testing.assert_allclose(split.normals[split.faces], np.repeat(own[:, None], 3, 1), atol=1e-6)
-
-
-def test_points_faces_and_everything_else_stay():
-    depth, normal, _ = _corner()
-    depth[10:20, 20:30] *= 0.5  # with tucks behind it
-    mesh = depth_to_mesh(depth, normal, CAMERA)
-    split = split_creases(mesh, depth, normal)
-    assert len(split.vertices) > len(mesh.vertices)
-    np.testing.assert_array_equal(split.vertices[split.faces], mesh.vertices[mesh.faces])
-    np.testing.assert_array_equal(split.uv[split.faces], mesh.uv[mesh.faces])
-    np.testing.assert_array_equal(split.face_pixel, mesh.face_pixel)
-    tucks = np.arange(len(mesh.faces)) >= 2 * (depth > 0).sum()
-    assert tucks.any()
-    np.testing.assert_array_equal(split.normals[split.faces[tucks]], mesh.normals[mesh.faces[tucks]])
-    assert np.unique(split.faces).size == len(split.vertices)

@@ -234,13 +234,6 @@ def test_fov_option_wins_and_must_make_sense(tmp_path):
             read_photo(path, size=bad)
 
 
-def test_example_photos(tmp_path):
-    assert read_photo("example:coffee").original.shape == (400, 600, 3)
-    assert read_photo("example:coffee", size=64).path == "example:coffee"
-    with pytest.raises(InputError, match="coffee"):
-        read_photo("example:tea")
-
-
 def _cut(path, fraction):
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * fraction)])

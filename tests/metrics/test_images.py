@@ -69,13 +69,6 @@ def test_shapes_must_agree():
         metrics.sh_coefficients(np.zeros((4, 4, 3)))
 
 
-def test_constant_map_has_one_coefficient():
-    coefficients = metrics.sh_coefficients(np.full((H, 2 * H, 3), 0.7))
-    assert coefficients.shape == (16, 3)
-    assert np.allclose(coefficients[0], 0.7 * np.sqrt(4 * np.pi), rtol=1e-9)
-    assert np.abs(coefficients[1:]).max() < 1e-3
-
-
 @pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0, -1), (1, 0, 0), (0.48, -0.6, 0.64)])
 def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
     """E(d) = d . a has only degree 1 with norm |a| sqrt(4 pi / 3)."""

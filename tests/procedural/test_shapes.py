@@ -2,17 +2,11 @@
 
 import numpy as np
 import pytest
+from solid_scenes import volume
 
 from materialist.bench.glass_scenes import is_closed
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.glassware import creature, level_set
-
-
-def volume(solid) -> float:
-    """Volume inside a closed mesh whose faces look outwards."""
-    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
-
 
 SOLIDS = {
     "box": (shapes.box(np.array([1.0, 2.0, 3.0])), 6.0),

@@ -104,15 +104,6 @@ def test_normals_face_the_viewer_even_from_behind():
     np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
 
 
-def test_the_sky_has_no_labels():
-    labels = sample.labels_of(tracer_of(still()).probe(4))
-    sky = ~labels["mask"]
-    assert 0.05 < sky.mean() < 0.95
-    for name in ("depth", "normal", "albedo", "roughness", "metallic"):
-        assert not labels[name][sky].any(), name
-    assert (labels["depth"][~sky] > 0).all()
-
-
 def test_a_second_world_compiles_nothing():
     import drjit as dr
 

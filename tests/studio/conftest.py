@@ -1,8 +1,8 @@
 """A session on a small scene; a studio that runs on it, and pages of a browser."""
 
 import pytest
+import studio_server
 from studio_scenes import package
-from studio_server import start
 
 from materialist.jobs.queue import JobQueue
 from materialist.studio.edit_list import EditList
@@ -15,10 +15,8 @@ def running(tmp_path_factory):
     """(address, work folder) of a studio that was started on the small scene."""
     pytest.importorskip("gradio", reason="needs gradio")
     folder = tmp_path_factory.mktemp("browser")
-    process, address = start(folder / "work", str(package(folder)))
-    yield address, folder / "work"
-    process.terminate()
-    process.wait(20)
+    with studio_server.studio(folder, str(package(folder))) as (_, address):
+        yield address, folder / "work"
 
 
 @pytest.fixture

@@ -24,12 +24,17 @@ def click_photo(page, x, y, modifiers=()):
     )
 
 
-def slide(page, name, value):
-    """Move a slider, and wait for the next picture."""
-    before = page.evaluate(PICTURE)
+def move(page, name, value):
+    """Move a slider, and wait for nothing."""
     script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
         r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
     page.evaluate(script, [name, value])
+
+
+def slide(page, name, value):
+    """Move a slider, and wait for the next picture."""
+    before = page.evaluate(PICTURE)
+    move(page, name, value)
     page.wait_for_function("(old) => document.querySelector('#stage .photo').src !== old", arg=before)
 
 

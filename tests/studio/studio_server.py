@@ -7,6 +7,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -36,3 +37,14 @@ def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen, str]:
                 process.kill()
                 raise AssertionError("the studio did not start") from None
             time.sleep(0.2)
+
+
+@contextmanager
+def studio(folder: Path, *arguments: str):
+    """(process, address) of a studio that runs as long."""
+    process, address = start(folder / "work", *arguments)
+    try:
+        yield process, address
+    finally:
+        process.terminate()
+        process.wait(20)

@@ -13,7 +13,7 @@ from studio_scenes import block, package, room
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import glass as studio_glass
-from materialist.studio.glass import GlassClient, checked, is_traced
+from materialist.studio.glass import GlassClient
 from materialist.studio.workspace import write_mask
 
 
@@ -73,20 +73,6 @@ def test_failures_are_told_and_the_next_value_is_tried(tracer):
     tracer.ask((), glass(1.4))
     until(lambda: not tracer.state.waiting)
     assert not tracer.state.bad and tracer.pane(glass(1.4)) is not None
-
-
-def test_bad_glass_is_refused_at_once(tmp_path):
-    name = write_mask(tmp_path, block())
-    good = Step("glass", {"mask": name, "tint": ["1", "0.5", "0.25"]}, tmp_path)
-    region, tint = checked(room(), good)
-    assert (region == block()).all() and tint == (1, 0.5, 0.25)
-    with pytest.raises(InputError, match="index of refraction"):
-        checked(room(), Step("glass", {"mask": name, "ior": "9"}, tmp_path))
-    sky = np.zeros_like(block())
-    sky[:3] = True
-    with pytest.raises(InputError, match="only sky"):
-        checked(room(), Step("glass", {"mask": write_mask(tmp_path, sky)}, tmp_path))
-    assert is_traced(good) and not is_traced(Step("glass", {"mask": name, "model": "two-interface"}))
 
 
 class _Report:

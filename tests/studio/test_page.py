@@ -10,9 +10,9 @@ import urllib.request
 import numpy as np
 import pytest
 from PIL import Image
-from studio_browser import READY, click_photo, opened, pixels, slide
+from studio_browser import READY, click_photo, move, opened, pixels, slide
 from studio_scenes import package
-from studio_server import start
+from studio_server import studio
 
 
 def test_select_edit_undo(page, running):
@@ -45,9 +45,7 @@ def test_select_edit_undo(page, running):
 def test_what_cannot_be_done_is_said_on_the_page(page, running):
     opened(page, running[0])
     page.get_by_role("button", name="Select nothing").click()
-    script = """() => { const r = document.querySelector('#hue input[type=range]');
-        r.value = 90; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
-    page.evaluate(script)
+    move(page, "hue", 90)
     page.wait_for_selector("#message:visible >> text=Click the object")
     page.locator("#message").click()
     page.wait_for_selector("#message", state="hidden")
@@ -150,8 +148,7 @@ def test_files_outside_the_cache_are_not_served(running):
 @pytest.mark.slow
 def test_a_password_closes_the_door(tmp_path):
     pytest.importorskip("gradio", reason="needs gradio")
-    process, address = start(tmp_path / "work", "--password", "open sesame")
-    try:
+    with studio(tmp_path, "--password", "open sesame") as (process, address):
 
         def enter(word):
             data = urllib.parse.urlencode({"username": "anna", "password": word}).encode()
@@ -164,7 +161,6 @@ def test_a_password_closes_the_door(tmp_path):
             urllib.request.urlopen(f"{address}/config")
         assert refused.value.code == 401
         assert enter("open sesame") == 200
-    finally:
         process.send_signal(2)
         assert process.wait(20) in (0, 130)
 
@@ -172,33 +168,22 @@ def test_a_password_closes_the_door(tmp_path):
 @pytest.mark.slow
 def test_two_people_at_once(browser, tmp_path):
     """Where others can reach it: on one's own machine two browsers are one person, and share the edits."""
-    process, address = start(tmp_path / "work", str(package(tmp_path)), "--host", "0.0.0.0", "--open")
-    try:
-        _two_people(browser, address)
-    finally:
-        process.terminate()
-        process.wait(20)
-
-
-def _two_people(browser, address):
-    contexts = [browser.new_context() for _ in range(2)]
-    pages = [context.new_page() for context in contexts]
-    for page in pages:
-        opened(page, address)
-    for page in pages:
-        click_photo(page, 0.39, 0.5)
-    for page in pages:
-        page.wait_for_selector("#stage .view[data-selected=yes]")
-    slide(pages[0], "hue", 120)
-    slide(pages[1], "hue", -120)
-    green, blue = pixels(pages[0])[24, 25], pixels(pages[1])[24, 25]
-    assert green.argmax() == 1 and blue.argmax() == 2
-    assert "hue 120" in pages[0].inner_text("#steps") and "hue -120" in pages[1].inner_text("#steps")
-    for page in pages:
-        page.locator("#steps [data-key=remove-0]").click()
-        page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
-    for context in contexts:
-        context.close()
+    with studio(tmp_path, str(package(tmp_path)), "--host", "0.0.0.0", "--open") as (_, address):
+        contexts = [browser.new_context() for _ in range(2)]
+        pages = [context.new_page() for context in contexts]
+        for page in pages:
+            opened(page, address)
+        for page in pages:
+            click_photo(page, 0.39, 0.5)
+        for page in pages:
+            page.wait_for_selector("#stage .view[data-selected=yes]")
+        slide(pages[0], "hue", 120)
+        slide(pages[1], "hue", -120)
+        green, blue = pixels(pages[0])[24, 25], pixels(pages[1])[24, 25]
+        assert green.argmax() == 1 and blue.argmax() == 2
+        assert "hue 120" in pages[0].inner_text("#steps") and "hue -120" in pages[1].inner_text("#steps")
+        for context in contexts:
+            context.close()
 
 
 @pytest.mark.slow
@@ -253,18 +238,11 @@ def test_the_whole_story(page, running, tmp_path):
 
 
 @pytest.mark.slow
-def test_every_tab_opens_without_a_scene(browser, tmp_path):
-    process, address = start(tmp_path / "work")
-    try:
-        page = browser.new_context(viewport={"width": 1280, "height": 1000}).new_page()
-        errors = []
-        page.on("pageerror", lambda error: errors.append(str(error)))
+def test_every_tab_opens_without_a_scene(page, tmp_path):
+    with studio(tmp_path) as (_, address):
         page.goto(address)
         for name in ("Material", "Light", "Objects", "Take away", "Look", "Open"):
             page.get_by_role("tab", name=name).click()
             page.wait_for_timeout(700)
             assert not page.locator(".toast-wrap .error, .toast-body.error").count(), name
-        assert not errors
-    finally:
-        process.terminate()
-        process.wait(20)
+        assert not page.errors

@@ -1,7 +1,7 @@
 """The brush, falling objects and live glass in a real browser."""
 
 import pytest
-from studio_browser import click_photo, mask, opened, pixels, place, press, slide
+from studio_browser import click_photo, mask, move, opened, pixels, place, press, slide
 
 MASK = "getComputedStyle(document.querySelector('#stage .fill')).maskImage"
 
@@ -25,9 +25,7 @@ def stroke(page, points, key=None):
 def test_the_brush_paints_and_rubs_out(page, running):
     opened(page, running[0])
     press(page, "Brush")
-    page.locator("#brush input[type=range]").evaluate(
-        "(r) => { r.value = 3; r.dispatchEvent(new Event('input', {bubbles: true})); }"
-    )
+    move(page, "brush", 3)
     page.mouse.move(*place(page, 0.5, 0.5))
     assert page.locator("#stage .ring").get_attribute("r") == "3"
     stroke(page, [(0.2, 0.75), (0.8, 0.75)])
@@ -74,12 +72,12 @@ def test_glass_follows_its_slider(page, running):
     page.wait_for_selector("#stage .view[data-waiting=yes]")
     page.wait_for_selector("#progress >> text=/glass/")
     sketch = pixels(page)
-    slide_glass(page, "glass_ior", 1.2)  # while the body is in the making
+    move(page, "glass_ior", 1.2)  # while the body is in the making
     page.wait_for_selector("#stage .badge >> text=Glass traced")
     assert "ior 1.2" in page.inner_text("#steps")
     clear = pixels(page)
     assert abs(clear[18:30, 18:32].astype(int) - sketch[18:30, 18:32]).max() > 10
-    slide_glass(page, "glass_transmission", 0.3)
+    move(page, "glass_transmission", 0.3)
     page.wait_for_selector("#stage .view[data-waiting=yes]")
     page.wait_for_selector("#stage .badge >> text=Glass traced")
     coated = pixels(page)[20:28, 20:30].reshape(-1, 3).mean(0)
@@ -93,13 +91,6 @@ def test_glass_follows_its_slider(page, running):
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Photo'")
     assert not page.errors
-
-
-def slide_glass(page, name, value):
-    """Move a slider without waiting for a picture."""
-    script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
-        r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
-    page.evaluate(script, [name, value])
 
 
 @pytest.mark.slow

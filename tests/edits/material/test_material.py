@@ -81,18 +81,3 @@ def test_impossible_values_are_named(options, words):
     with pytest.raises(InputError) as error:
         edit(SCENE, MASK, **options)
     assert words in str(error.value) and str(error.value).endswith(".")
-
-
-@pytest.mark.parametrize(
-    ("mask", "words"),
-    [
-        (np.zeros((36, 48), bool), "empty"),
-        (np.ones((36, 47), bool), "(36, 47)"),
-        (np.full((36, 48), 2.0), "0 to 1"),
-        (np.full((36, 48), np.nan), "0 to 1"),
-    ],
-)
-def test_masks_that_cannot_be_used(mask, words):
-    with pytest.raises(InputError) as error:
-        edit(SCENE, mask, roughness=0.2)
-    assert words in str(error.value)

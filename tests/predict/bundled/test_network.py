@@ -67,19 +67,6 @@ def test_rays_go_on_into_the_padding(network):
     np.testing.assert_allclose(np.diff(rays[:, 0, 1]), -1 / camera.focal, rtol=1e-3)
 
 
-def test_guided_enlarging_finds_the_photos_edge():
-    """A map whose edge is half a coarse pixel off the truth gets the edge of the photo."""
-    fine = np.full((96, 96, 3), 0.2, np.float32)
-    fine[:, 50:] = 0.8
-    truth = np.where(np.arange(96) >= 50, 0.9, 0.3)[None].repeat(96, 0).astype(np.float32)
-    coarse, guide = truth.reshape(24, 4, 24, 4).mean((1, 3)), fine.reshape(24, 4, 24, 4, 3).mean((1, 3))
-    enlarged = inference.guided(coarse, guide, fine)
-    plain = inference.resample.values(coarse, (96, 96))
-    assert np.abs(enlarged - truth).mean() < 0.4 * np.abs(plain - truth).mean()
-    flat = inference.guided(np.full((24, 24), 0.37, np.float32), guide, fine)
-    np.testing.assert_allclose(flat, 0.37, atol=1e-3)
-
-
 def test_bad_weights_are_refused(file, tmp_path):
     whole = file.read_bytes()
     broken = tmp_path / "broken.safetensors"

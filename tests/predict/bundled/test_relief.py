@@ -41,13 +41,3 @@ def test_an_edge_stays_where_it_is_sharp():
     assert step > 0.4  # in one pixel
     flattened = with_relief(far, sharp, normals, RAYS, reach=8)
     assert np.abs(flattened - far).max() < 1e-3, "where the network saw no edge there is none"
-
-
-def test_what_has_no_surface_stays_so():
-    depth, normals = _plane((0, 0.3, 1), 2.0)
-    depth[:10] = np.nan
-    found = with_relief(depth, depth, normals, RAYS, reach=4)
-    np.testing.assert_array_equal(np.isnan(found), np.isnan(depth))
-    assert np.nanmax(np.abs(found - depth)) < 1e-3
-    nothing = np.full_like(depth, np.nan)
-    assert np.isnan(with_relief(nothing, nothing, normals, RAYS, reach=4)).all()
