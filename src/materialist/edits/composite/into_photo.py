@@ -36,7 +36,7 @@ class CompositeSettings:
 DEFAULT = CompositeSettings()
 
 
-def into_photo(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAULT) -> Array:
+def into_photo(photo: Photo, layers: Layers) -> Array:
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
@@ -45,11 +45,11 @@ def into_photo(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAU
     out = photo.original.copy()
     if not layers.reached.any():
         return _in_front(out, layers.native, photo.hdr)
-    stack = np.concatenate(_terms(photo, layers, settings), -1)  # [H, W, 9]
+    stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
     alpha = matte(layers.changed, photo.original)
-    stack, clear = _under_bodies(stack, layers, settings)
+    stack, clear = _under_bodies(stack, layers)
     changed = layers.changed
     reached = (stack[..., :3] != 0).any(-1)
     if not reached.any():
@@ -70,25 +70,25 @@ def into_photo(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAU
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
-    with ThreadPoolExecutor(min(settings.threads, os.cpu_count() or 1)) as threads:
+    with ThreadPoolExecutor(min(DEFAULT.threads, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
     return _in_front(out, layers.native, photo.hdr)
 
 
-def onto_working(photo: Photo, layers: Layers, settings: CompositeSettings = DEFAULT) -> Array:
+def onto_working(photo: Photo, layers: Layers) -> Array:
     """[H, W, 3] the same at working size, where nothing is enlarged; borders as hard as the mask.
 
     A fraction of the time of `into_photo`: for pictures while a slider moves.
     """
-    change, excess, reference = _terms(photo, layers, settings)
+    change, excess, reference = _terms(photo, layers)
     held = photo.linear if photo.hdr or layers.relit else _unclipped(photo.linear, reference)
     moved = np.maximum(held + change + excess * (held - reference), 0)
     return np.where(layers.reached[..., None], moved, photo.linear)
 
 
-def _terms(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """(change, factor - 1, reference), [H, W, 3] each."""
-    change, excess, reference = (_other_light if layers.relit else _same_light)(photo, layers, settings)
+    change, excess, reference = (_other_light if layers.relit else _same_light)(photo, layers)
     if layers.covered is not None:
         # A body in place of the photo's surface: the rendering alone is seen, and no residual of the photo.
         own = layers.covered[..., None]
@@ -97,17 +97,17 @@ def _terms(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[A
     return change.astype(np.float32), excess.astype(np.float32), reference
 
 
-def _same_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """out = edited + factor (photo - base).
 
     The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
     factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
     """
-    factor = np.minimum((layers.edited + settings.floor) / (layers.base + settings.floor), 1)
+    factor = np.minimum((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor), 1)
     return layers.edited - layers.base, factor - 1, layers.base
 
 
-def _other_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array, Array]:
+def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """out = edited + factor (photo - small) + kept (small - base), small the photo at working size.
 
     Beyond working size the photo has texture, which goes with the light: factor = edited / base. At working size the
@@ -116,18 +116,18 @@ def _other_light(photo: Photo, layers: Layers, settings: CompositeSettings) -> t
     """
     import cv2
 
-    base, edited, floor = layers.base, layers.edited, settings.floor
+    base, edited, floor = layers.base, layers.edited, DEFAULT.floor
     ratio = np.log((np.maximum(edited, 0) + floor) / (np.maximum(base, 0) + floor))
     overall = np.median(ratio.reshape(-1, 3), axis=0)
     size = max(3, max(ratio.shape[:2]) // 8)
     away = cv2.blur(np.abs(ratio - overall), (size, size), borderType=cv2.BORDER_REFLECT)
-    kept = np.exp(overall - settings.light_fade * away)
+    kept = np.exp(overall - DEFAULT.light_fade * away)
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
     change = edited + kept * (held - base) - photo.linear
-    return change, np.minimum(np.exp(ratio), settings.most_detail) - 1, photo.linear
+    return change, np.minimum(np.exp(ratio), DEFAULT.most_detail) - 1, photo.linear
 
 
-def _under_bodies(stack: Array, layers: Layers, settings: CompositeSettings) -> tuple[Array, Array]:
+def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
     """(stack [H, W, 9], [H, W] bool where it is known), continued under the rim of bodies at native resolution.
 
     Pixels beside a body look up values under its rim when they are enlarged, where the layers show the body itself.
@@ -138,7 +138,7 @@ def _under_bodies(stack: Array, layers: Layers, settings: CompositeSettings) -> 
     if clear.all() or not clear.any():
         return stack, clear
     away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
-    return stack[row, column], away <= settings.rim
+    return stack[row, column], away <= DEFAULT.rim
 
 
 def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:

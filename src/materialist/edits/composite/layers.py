@@ -133,7 +133,7 @@ def difference(
     return Layers(b, e, reached, changed & reached)
 
 
-def significance(d0: Array, d1: Array, settings: LayerSettings = DEFAULT) -> Array:
+def significance(d0: Array, d1: Array) -> Array:
     """[H, W] in [0, 1]: how far the mean of a difference over a window stands out from its noise.
 
     d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
@@ -143,19 +143,19 @@ def significance(d0: Array, d1: Array, settings: LayerSettings = DEFAULT) -> Arr
     """
     import cv2
 
-    size = (settings.window, settings.window)
+    size = (DEFAULT.window, DEFAULT.window)
     box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), size, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     gain = np.zeros(d0.shape[:2])
     for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
         m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
         for k in range(first.shape[-1]):
             m2 += box((first[..., k] + second[..., k]) / 2) ** 2
-            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / settings.window**2
-        gain = np.maximum(gain, 1 - settings.sigmas**2 * variance / np.maximum(m2, 1e-30))
-    return np.where(gain > settings.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
+            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / DEFAULT.window**2
+        gain = np.maximum(gain, 1 - DEFAULT.sigmas**2 * variance / np.maximum(m2, 1e-30))
+    return np.where(gain > DEFAULT.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
 
 
-def without_fireflies(picture: Array, where: Array | None = None, settings: LayerSettings = DEFAULT) -> Array:
+def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     """[H, W, 3] linear with lone bright pixels brought down, their colour kept; a highlight of two pixels stays.
 
     They come from single paths, as where glass focuses small lights. `where` [H, W] bool: pixels that may change, all
@@ -166,6 +166,6 @@ def without_fireflies(picture: Array, where: Array | None = None, settings: Laye
     light = luminance(picture)
     around = np.ones((3, 3), bool)
     around[1, 1] = False
-    limit = np.maximum(settings.times * rank_filter(light, -2, footprint=around, mode="nearest"), settings.bright)
+    limit = np.maximum(DEFAULT.times * rank_filter(light, -2, footprint=around, mode="nearest"), DEFAULT.bright)
     found = (light > limit) & (True if where is None else where)
     return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(np.float32)

@@ -82,8 +82,8 @@ class GuidedUpsample:
         large: [H0, W0, 3] the same at native size.
     """
 
-    def __init__(self, small: Array, large: Array, settings: UpsampleSettings = UPSAMPLE):
-        self.guide, self.large, self.settings = linear_to_srgb(small), large, settings
+    def __init__(self, small: Array, large: Array):
+        self.guide, self.large = linear_to_srgb(small), large
         self.same = small.shape == large.shape
 
     def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
@@ -95,8 +95,8 @@ class GuidedUpsample:
             return (layer[nearest(members)] if members.any() else 0 * layer)[rows, columns].astype(np.float32)
         here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
         native, working = self.large.shape[:2], members.shape
-        y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], self.settings.radius)
-        x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1], self.settings.radius)
+        y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], UPSAMPLE.radius)
+        x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1], UPSAMPLE.radius)
         total = np.zeros((*here.shape[:2], layer.shape[2]), np.float32)
         if not members[y0.min() : y0.max() + 1].any():
             return total
@@ -108,7 +108,7 @@ class GuidedUpsample:
                     away = here[band] - self.guide[row, x0[j]]
                     away = np.einsum("ijk,ijk->ij", away, away)
                     # The small constant keeps a mean of the neighbourhood where nothing there looks alike.
-                    weight = np.exp(-0.5 / self.settings.colour**2 * away) + 1e-4
+                    weight = np.exp(-0.5 / UPSAMPLE.colour**2 * away) + 1e-4
                     weight *= ys[i][band, None] * (xs[j] * members[row, x0[j]])
                     total[band] += weight[..., None] * layer[row, x0[j]]
                     norm[band] += weight
@@ -116,7 +116,7 @@ class GuidedUpsample:
         return total.astype(np.float32)
 
 
-def matte(mask: Array, large: Array, settings: MatteSettings = MATTE) -> Array:
+def matte(mask: Array, large: Array) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
     Within about two working pixels of the mask's border a native pixel lies somewhere between the mean colours well
@@ -130,25 +130,25 @@ def matte(mask: Array, large: Array, settings: MatteSettings = MATTE) -> Array:
     soft = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     if mask.all() or not mask.any():
         return soft
-    wide = np.ones((2 * settings.border + 1,) * 2, np.uint8)
+    wide = np.ones((2 * MATTE.border + 1,) * 2, np.uint8)
     border = np.asarray(cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide))
     alpha = (soft >= 0.5).astype(np.float32)
-    margin = int(np.ceil((3 * settings.near + 4) * scale))
-    for tile in strips(mask.shape[0], settings.tile):
-        for part in strips(mask.shape[1], settings.tile):
+    margin = int(np.ceil((3 * MATTE.near + 4) * scale))
+    for tile in strips(mask.shape[0], MATTE.tile):
+        for part in strips(mask.shape[1], MATTE.tile):
             if not border[tile, part].any():
                 continue
             own = np.zeros_like(border)
             own[tile, part] = True
             rows, columns = window(own, (height, width))
             around = tuple(slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns))
-            found = _shares(soft[around], large[around], scale, settings)
+            found = _shares(soft[around], large[around], scale)
             top, left = rows.start - around[0].start, columns.start - around[1].start
             alpha[rows, columns] = found[top:, left:][: rows.stop - rows.start, : columns.stop - columns.start]
     return alpha
 
 
-def _shares(soft: Array, large: Array, scale: float, settings: MatteSettings = MATTE) -> Array:
+def _shares(soft: Array, large: Array, scale: float) -> Array:
     """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
     import cv2
 
@@ -156,16 +156,16 @@ def _shares(soft: Array, large: Array, scale: float, settings: MatteSettings = M
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     sure_in, sure_out = cv2.erode(soft, kernel) >= 0.999, cv2.dilate(soft, kernel) <= 0.001
     encoded = linear_to_srgb(large)
-    front, front_variance, known_front = _mean_of(encoded, sure_in, settings.near * scale)
-    back, back_variance, known_back = _mean_of(encoded, sure_out, settings.near * scale)
+    front, front_variance, known_front = _mean_of(encoded, sure_in, MATTE.near * scale)
+    back, back_variance, known_back = _mean_of(encoded, sure_out, MATTE.near * scale)
     line = front - back
     length = np.sqrt(np.maximum((line**2).sum(-1), 1e-6))
     place = ((encoded - back) * line).sum(-1) / length**2  # on the line: 0 is back, 1 front
-    deviation = np.sqrt(np.maximum(front_variance, back_variance) + settings.grain**2)
-    nearest = np.clip(place, -settings.beyond, 1 + settings.beyond)[..., None]
+    deviation = np.sqrt(np.maximum(front_variance, back_variance) + MATTE.grain**2)
+    nearest = np.clip(place, -MATTE.beyond, 1 + MATTE.beyond)[..., None]
     away = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
-    off = np.maximum(away - 2 * settings.grain, 0) / length
-    told = _ramp(length / deviation, *settings.apart) * (1 - _ramp(off, *settings.beside)) * known_front * known_back
+    off = np.maximum(away - 2 * MATTE.grain, 0) / length
+    told = _ramp(length / deviation, *MATTE.apart) * (1 - _ramp(off, *MATTE.beside)) * known_front * known_back
     alpha = soft + told * (np.clip(place, 0, 1) - soft)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)

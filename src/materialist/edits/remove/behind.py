@@ -31,6 +31,9 @@ class ContinuationSettings:
     gap: float = 1e-3  # least part of the depth between what was hidden and what hid it
 
 
+SETTINGS = ContinuationSettings()
+
+
 @dataclass(frozen=True)
 class HiddenGeometry:
     """What stands behind an object, at working size; outside the hole it is the scene's own."""
@@ -44,8 +47,7 @@ class HiddenGeometry:
 
 
 def behind(
-    depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera,
-    settings: ContinuationSettings = ContinuationSettings(),
+    depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera
 ) -> HiddenGeometry:  # fmt: skip
     """Continue the surfaces around a hole into it.
 
@@ -61,11 +63,9 @@ def behind(
     """
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
     out = HiddenGeometry(depth.astype(np.float32), normal.astype(np.float32), known)
-    margin = max(8, round(settings.window * float(np.sqrt(hole.sum()))) + 1)
+    margin = max(8, round(SETTINGS.window * float(np.sqrt(hole.sum()))) + 1)
     box = window(hole, hole.shape, margin)
-    around = _Surroundings(
-        depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float), settings
-    )
+    around = _Surroundings(depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float))
     label = around.labels()
     for k in np.unique(label[around.hole]):
         here = around.hole & (label == k)
@@ -78,21 +78,19 @@ def behind(
 class _Surroundings:
     """The hole and the surroundings that tell what is in it."""
 
-    def __init__(
-        self, depth: Array, normal: Array, known: Array, hole: Array, rays: Array, settings: ContinuationSettings
-    ):
-        self.normal, self.known, self.hole, self.rays, self.settings = normal, known, hole, rays, settings
+    def __init__(self, depth: Array, normal: Array, known: Array, hole: Array, rays: Array):
+        self.normal, self.known, self.hole, self.rays = normal, known, hole, rays
         surface = depth > 0
         self.inverse = np.where(surface, 1 / np.where(surface, depth, 1), 0).astype(np.float64)
         self.spanned = membrane(self.inverse, ~hole & surface)
-        self.ring = _ring(hole, settings.ring)
+        self.ring = _ring(hole, SETTINGS.ring)
 
     def labels(self) -> Array:
         """[h, w] int: the labels around, carried into the hole."""
         kinds, count = np.unique(self.known[~self.hole], return_counts=True)
         shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(self.ring.sum(), 1)
-        kept = kinds[shares >= self.settings.share] if self.ring.any() else kinds[count.argmax()][None]
-        if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= self.settings.firm:
+        kept = kinds[shares >= SETTINGS.share] if self.ring.any() else kinds[count.argmax()][None]
+        if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= SETTINGS.firm:
             kept = kept[kept != LOOSE]
         chosen = None if LOOSE in kept else self._parted(kept)
         if chosen is None:
@@ -108,17 +106,17 @@ class _Surroundings:
         from scipy.ndimage import distance_transform_edt
 
         size = float(np.sqrt(self.hole.sum()))
-        rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, self.settings.window))
+        rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, SETTINGS.window))
         if not len(rows):
             return None
         wanted = self.known[rows, columns][:, None] == kinds  # [N, K]
         y, x = (v / size for v in np.indices(self.hole.shape, float))
         basis = np.stack([np.ones_like(y), y - y[rows, 0].mean(), x - x[0, columns].mean()], -1)
-        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / self.settings.fades)
+        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / SETTINGS.fades)
         balance = near / np.maximum(near @ wanted, 1e-12)[wanted.argmax(1)]
         scores = basis @ _softmax(basis[rows, columns], wanted, balance / balance.sum())
         right = scores[rows, columns].argmax(-1) == wanted.argmax(-1)
-        return kinds[scores.argmax(-1)] if right @ near >= self.settings.straight * near.sum() else None
+        return kinds[scores.argmax(-1)] if right @ near >= SETTINGS.straight * near.sum() else None
 
     def surface(self, label: int, here: Array, front: Array) -> tuple[Array, Array]:
         """Depth [P] and normals [P, 3] of one surface at the pixels `here` [h, w] bool of the hole."""
@@ -127,7 +125,7 @@ class _Surroundings:
         own = ~self.hole & (self.known == label) & (self.inverse > 0)
         spanned = self._on_plane(own) if label >= 0 else membrane(self.inverse, own)
         spanned = np.where(spanned > 0, spanned, self.spanned)[here]
-        limit = np.where(front[here] > 0, (1 - self.settings.gap) / np.maximum(front[here], 1e-12), np.inf)
+        limit = np.where(front[here] > 0, (1 - SETTINGS.gap) / np.maximum(front[here], 1e-12), np.inf)
         normal = membrane(self.normal, own)[here]
         length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
         return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), normal / length

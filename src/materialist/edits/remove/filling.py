@@ -74,9 +74,11 @@ class BlendSettings:
     exact: float = 1.0  # the same where a symmetric plane gives the level, which the border knows less well
 
 
+SETTINGS = BlendSettings()
+
+
 def seamless(
-    radiance: Array, hole: Array, source: Array, label: Array, exact: Array | None = None,
-    settings: BlendSettings = BlendSettings(),
+    radiance: Array, hole: Array, source: Array, label: Array, exact: Array | None = None
 ) -> Array:  # fmt: skip
     """Radiance or albedo [H, W, C] with a hole filled by pieces, their levels as the hole's borders say; float32.
 
@@ -90,9 +92,9 @@ def seamless(
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import splu
 
-    values = np.log(np.maximum(np.asarray(radiance, np.float64), 0) + settings.floor)
+    values = np.log(np.maximum(np.asarray(radiance, np.float64), 0) + SETTINGS.floor)
     pieces = copied(values, source)[hole].astype(np.float64)
-    first, second, step = _steps(values, hole, source, label, settings.alike)
+    first, second, step = _steps(values, hole, source, label, SETTINGS.alike)
     # Differences of unknowns, `matrix` [N, P], are the steps less what is known of them.
     number = np.where(hole, np.cumsum(hole).reshape(hole.shape) - 1, -1).ravel()
     rows: list[Array] = []
@@ -106,14 +108,14 @@ def seamless(
     places = np.concatenate(rows), np.concatenate(columns)
     matrix = coo_matrix((np.concatenate(signs), places), (len(first), len(pieces))).tocsr()
     held = (
-        np.full(len(pieces), settings.held) if exact is None else np.where(exact[hole], settings.exact, settings.held)
+        np.full(len(pieces), SETTINGS.held) if exact is None else np.where(exact[hole], SETTINGS.exact, SETTINGS.held)
     )
     normal = (matrix.T @ matrix + diags(held, dtype=float)).tocsc()
     solver = splu(normal, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
     solved = solver.solve(matrix.T @ step + held[:, None] * pieces)
-    levels = np.clip(solved - pieces, -settings.most, settings.most)
+    levels = np.clip(solved - pieces, -SETTINGS.most, SETTINGS.most)
     out = np.asarray(radiance, np.float32).copy()
-    out[hole] = np.maximum(np.exp(pieces + levels) - settings.floor, 0)
+    out[hole] = np.maximum(np.exp(pieces + levels) - SETTINGS.floor, 0)
     return out
 
 

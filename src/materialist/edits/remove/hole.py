@@ -20,6 +20,9 @@ class HoleSettings:
     island: float = 0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
 
 
+SETTINGS = HoleSettings()
+
+
 @dataclass(frozen=True)
 class Hole:
     """What is taken away, at working size."""
@@ -33,8 +36,7 @@ class Hole:
 
 
 def make_hole(
-    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array | None = None,
-    settings: HoleSettings = HoleSettings(),
+    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array | None = None
 ) -> Hole:  # fmt: skip
     """The pixels that a removal concerns; `grow` and `shadow` as of `materialist.Removal`.
 
@@ -51,7 +53,7 @@ def make_hole(
     bodies = np.zeros_like(own) if bodies is None else bodies
     gone = _dilated(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
-    if (gone & surface).sum() > settings.most * surface.sum() or (gone | ~surface).all():
+    if (gone & surface).sum() > SETTINGS.most * surface.sum() or (gone | ~surface).all():
         if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
             raise InputError(
                 "Nearly everything around the mask is sky, so that no scene would be left without it; mark a thing "
@@ -63,9 +65,9 @@ def make_hole(
         )
     plane = scene.geometry.plane_label
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
-    share = settings.shadow if shadow is None else shadow
+    share = SETTINGS.shadow if shadow is None else shadow
     painted = gone | (ground & _dilated(gone, round(share * float(np.sqrt(own.sum())))))
-    return Hole(own, gone, remove_small_holes(painted, max_size=int(settings.island * own.sum())) & ~bodies)
+    return Hole(own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies)
 
 
 def _dilated(mask: Array, radius: int) -> Array:

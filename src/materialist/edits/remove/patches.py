@@ -29,9 +29,11 @@ class PatchSettings:
     mixed: float = 1e-4  # weight in a mean of what a patch shows of another surface
 
 
+SETTINGS = PatchSettings()
+
+
 def patch_sources(
-    features: Array, hole: Array, usable: Array, label: Array, *, known: Array | None = None, seed: int = 0,
-    settings: PatchSettings = PatchSettings(),
+    features: Array, hole: Array, usable: Array, label: Array, *, known: Array | None = None, seed: int = 0
 ) -> Array | None:  # fmt: skip
     """Find the pixels from which a hole takes its values.
 
@@ -51,7 +53,7 @@ def patch_sources(
     if rest.any():
         features = features.copy()
         features[given] = features.reshape(-1, features.shape[-1])[found[given]]
-        found = np.where(rest, _matched(features, rest, usable & ~hole, label, seed, settings), found)
+        found = np.where(rest, _matched(features, rest, usable & ~hole, label, seed), found)
     if not (found >= 0).any():
         return None
     # A piece may stick out of what may be copied: such pixels take the source of the nearest one.
@@ -63,21 +65,21 @@ def copied(maps: Array, source: Array) -> Array:
     return np.asarray(maps, np.float32).reshape(source.size, -1)[source]
 
 
-def _matched(features: Array, hole: Array, usable: Array, label: Array, seed: int, settings: PatchSettings) -> Array:
+def _matched(features: Array, hole: Array, usable: Array, label: Array, seed: int) -> Array:
     """[H, W] int sources of the hole's pixels; -1 elsewhere, and where none is found."""
     rng = np.random.default_rng(seed)
     factor = 1
-    while max(hole.shape) / factor > settings.finest:
+    while max(hole.shape) / factor > SETTINGS.finest:
         factor *= 2
     factors = [factor]
-    while min(hole.shape) / factors[0] >= 2 * settings.smallest and np.sqrt(hole.sum()) / factors[0] > 5:
+    while min(hole.shape) / factors[0] >= 2 * SETTINGS.smallest and np.sqrt(hole.sum()) / factors[0] > 5:
         factors.insert(0, 2 * factors[0])
     source, before = None, 1
     for number, factor in enumerate(factors):
-        level = _Level(features, hole, usable, label, factor, settings)
+        level = _Level(features, hole, usable, label, factor)
         if level.candidates.size and level.targets.size:  # a thin hole is none in a small picture
             start = None if source is None else _enlarged(source, level.hole.shape, before / factor)
-            source = level.match(start, settings.rounds[min(number, len(settings.rounds) - 1)], rng)
+            source = level.match(start, SETTINGS.rounds[min(number, len(SETTINGS.rounds) - 1)], rng)
             before = factor
     if source is None:
         return np.full(hole.shape, -1)
@@ -88,11 +90,11 @@ def _matched(features: Array, hole: Array, usable: Array, label: Array, seed: in
 class _Level:
     """The problem at one size."""
 
-    def __init__(self, features: Array, hole: Array, usable: Array, label: Array, factor: int, settings: PatchSettings):
+    def __init__(self, features: Array, hole: Array, usable: Array, label: Array, factor: int):
         import cv2
 
         known = _shrunk((~hole)[..., None], factor)[..., 0]
-        self.hole, self.settings = known < 0.5, settings
+        self.hole = known < 0.5
         height, width = self.hole.shape
         seen = _shrunk(np.where(hole[..., None], 0, features), factor) / np.maximum(known, 1e-6)[..., None]
         self.features = membrane(seen, ~self.hole).reshape(height * width, -1)
@@ -101,7 +103,7 @@ class _Level:
         )
         self.surface = label[rows[:, None], columns].ravel()
         # At the rim of the picture no patch fits around a pixel; those further in speak for it.
-        r = min(settings.radius, (min(height, width) - 1) // 4)
+        r = min(SETTINGS.radius, (min(height, width) - 1) // 4)
         inside = np.zeros(self.hole.shape, bool)
         inside[r : height - r, r : width - r] = True
         square = np.ones((2 * r + 1,) * 2, np.uint8)
@@ -137,7 +139,7 @@ class _Level:
         far = np.hypot(row - y, column - x).astype(np.float32) / max(self.hole.shape)
         strange = self.surface[here] != self.surface[there]
         other = strange.mean(-1, dtype=np.float32) + strange[:, strange.shape[1] // 2]
-        return square + self.settings.far * far + self.settings.other * other
+        return square + SETTINGS.far * far + SETTINGS.other * other
 
     def _searched(self, filled: Array, best: Array, rng: np.random.Generator) -> Array:
         """[P] sources after what neighbours found, moved along, and places near the best, ever nearer."""
@@ -167,7 +169,7 @@ class _Level:
         total, norm = np.zeros_like(self.features), np.zeros((len(self.features), 1), np.float32)
         for offset in self.around:  # no two patches have one middle, so that this sum meets no place twice
             here, there = self.targets + offset, best + offset
-            weight = np.where(self.surface[here] == self.surface[there], 1, self.settings.mixed)[:, None]
+            weight = np.where(self.surface[here] == self.surface[there], 1, SETTINGS.mixed)[:, None]
             total[here] += weight * self.features[there]
             norm[here] += weight
         return np.where(self.hole.reshape(-1, 1) & (norm > 0), total / np.maximum(norm, 1e-12), self.features)

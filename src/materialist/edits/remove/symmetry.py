@@ -30,9 +30,11 @@ class TranslationSettings:
     hidden: int = 16  # pixels of a plane that must be hidden; less: smaller holes follow a pattern
 
 
+SETTINGS = TranslationSettings()
+
+
 def repeated_sources(
-    albedo: Array, shown: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera,
-    settings: TranslationSettings = TranslationSettings(),
+    albedo: Array, shown: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera
 ) -> Array:  # fmt: skip
     """Where periodic planes say that each pixel of a hole takes its value from.
 
@@ -53,18 +55,18 @@ def repeated_sources(
         own = (label == k) & (depth > 0)
         whole = cv2.erode(own.astype(np.uint8), np.ones((5, 5), np.uint8), borderValue=1) > 0  # borders mix surfaces
         known, hidden = whole & source & ~hole, own & hole
-        if known.sum() < settings.fewest or hidden.sum() < settings.hidden:
+        if known.sum() < SETTINGS.fewest or hidden.sum() < SETTINGS.hidden:
             continue
         some = np.random.default_rng(0).permutation(np.flatnonzero(known))[:2000]
         wide = 2 * int(np.ceil(0.25 * np.sqrt(hidden.sum()))) + 1
         near = np.flatnonzero(known & (cv2.dilate(hidden.astype(np.uint8), np.ones((wide, wide), np.uint8)) > 0))
-        shifts = _shifts(albedo, points, known, hidden, camera, settings)
+        shifts = _shifts(albedo, points, known, hidden, camera)
         shifts = [
-            s for s in shifts if _error(albedo, some, _landings(points, some, [s], known, camera)) < settings.error
+            s for s in shifts if _error(albedo, some, _landings(points, some, [s], known, camera)) < SETTINGS.error
         ]
-        if shifts and not _error(albedo, near, _landings(points, near, shifts, known, camera)) >= settings.error:
+        if shifts and not _error(albedo, near, _landings(points, near, shifts, known, camera)) >= SETTINGS.error:
             at = np.flatnonzero(hidden)
-            found.ravel()[at] = _usual(shown, _landings(points, at, shifts, known, camera), settings.repeats)
+            found.ravel()[at] = _usual(shown, _landings(points, at, shifts, known, camera), SETTINGS.repeats)
     return found
 
 
@@ -110,9 +112,7 @@ def _usual(shown: Array, landings: Array, repeats: int) -> Array:
     return np.take_along_axis(landings, np.maximum(off, 0.06).argmin(0)[None], 0)[0]  # alike ones: the best shift
 
 
-def _shifts(
-    albedo: Array, points: Array, known: Array, hidden: Array, camera: Camera, settings: TranslationSettings
-) -> list[Array]:
+def _shifts(albedo: Array, points: Array, known: Array, hidden: Array, camera: Camera) -> list[Array]:
     """[3] each, scene units: shifts under which a plane looks like itself, best first."""
     import cv2
     from scipy.ndimage import minimum_filter
@@ -125,23 +125,23 @@ def _shifts(
     axes = np.stack([first, np.cross(axes[2], first)])  # [2, 3]
     middle = points[hidden].mean(0)
     inside, beside = ((points[mask] - middle) @ axes.T for mask in (hidden, known))
-    half = (0.5 + settings.around) * np.quantile(np.abs(inside), 0.98, axis=0).max()
+    half = (0.5 + SETTINGS.around) * np.quantile(np.abs(inside), 0.98, axis=0).max()
     low, high = np.maximum(beside.min(0), -half), np.minimum(beside.max(0), half)
-    cell = float((high - low).max() / settings.cells)
+    cell = float((high - low).max() / SETTINGS.cells)
     u, v = (low[k] + (np.arange(max(int((high[k] - low[k]) / cell), 8)) + 0.5) * cell for k in (0, 1))
     place, ahead = project(middle + u[None, :, None] * axes[0] + v[:, None, None] * axes[1], camera)
     x, y = (np.where(ahead > 0, place[..., k] - 0.5, -9).astype(np.float32) for k in (0, 1))
     read = lambda m: cv2.remap(np.ascontiguousarray(m, np.float32), x, y, cv2.INTER_LINEAR, borderValue=0)  # noqa: E731
     seen = read(known) > 0.99
     window = np.where(seen[..., None], read(np.where(known[..., None], albedo, 0)), 0)
-    if seen.sum() < settings.fewest:
+    if seen.sum() < SETTINGS.fewest:
         return []
     (y_v, y_u), (x_v, x_u) = np.gradient(y), np.gradient(x)
     weight = np.where(seen, np.clip(np.abs(y_v * x_u - y_u * x_v), 0, 1), 0)  # what is far away is blurred
     ramp = np.stack([np.ones_like(x), *np.mgrid[: seen.shape[0], : seen.shape[1]]], -1)  # light, no pattern
     trend = ramp @ np.linalg.lstsq(ramp[seen], window[seen], rcond=None)[0]
     detail = np.where(seen[..., None], window - trend, 0)
-    if detail[seen].std() < settings.contrast:
+    if detail[seen].std() < SETTINGS.contrast:
         return []
     height, width = seen.shape
     spectrum = lambda a: np.fft.rfft2(a, (2 * height, 2 * width))  # noqa: E731
@@ -149,9 +149,9 @@ def _shifts(
     there, energy = spectrum(weight), spectrum(weight * (detail**2).sum(-1))
     both = sum(correlate(s, s) for s in (spectrum(weight * part) for part in np.moveaxis(detail, -1, 0)))
     total, overlap = correlate(energy, there) + correlate(there, energy), correlate(there, there)
-    apart = np.where(overlap > settings.overlap * (weight**2).sum(), (total - 2 * both) / np.maximum(total, 1e-9), 2)
+    apart = np.where(overlap > SETTINGS.overlap * (weight**2).sum(), (total - 2 * both) / np.maximum(total, 1e-9), 2)
     apart = np.fft.fftshift(apart)  # 0: the same picture, 1: an unrelated one
-    peaks = np.argwhere((apart == minimum_filter(apart, 5, mode="wrap")) & (apart < settings.unlike))
+    peaks = np.argwhere((apart == minimum_filter(apart, 5, mode="wrap")) & (apart < SETTINGS.unlike))
     peaks = peaks[np.abs(peaks - (height, width)).max(1) > 3]  # every picture looks like itself nearly where it is
     order = np.argsort(apart[tuple(peaks.T)])[:200]
     return [((_vertex(apart, *peaks[k]) - (height, width))[::-1] * cell) @ axes for k in order]

@@ -56,33 +56,31 @@ class SelectSettings:
 DEFAULT = SelectSettings()
 
 
-def object_at(
-    scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True, settings: SelectSettings = DEFAULT
-) -> Array:
+def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on."""
     if network:
         likely = clicknet(scene, points)
-        if certainty(likely) >= settings.certain:
-            return refined(scene, tidy(likely > 0.5, points), points, likely, settings)
-    return tidy(grabcut(scene, _around(scene, points, settings), rounds=5), points)
+        if certainty(likely) >= DEFAULT.certain:
+            return refined(scene, tidy(likely > 0.5, points), points, likely)
+    return tidy(grabcut(scene, _around(scene, points), rounds=5), points)
 
 
-def object_in(scene: Scene, box: Box, *, network: bool = True, settings: SelectSettings = DEFAULT) -> Array:
+def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     """[H, W] bool of the object in a box, by ClickNet where it is certain of one that fills the box, else by GrabCut.
 
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
-    likely = _in_box(scene, box, settings) if network else np.zeros(scene.depth.shape, np.float32)
+    likely = _in_box(scene, box) if network else np.zeros(scene.depth.shape, np.float32)
     known = tidy(likely > 0.5, ())
-    if box_overlap(known, box) >= settings.fills and certainty(likely) >= settings.certain:
+    if box_overlap(known, box) >= DEFAULT.fills and certainty(likely) >= DEFAULT.certain:
         return known
     best = known
-    for share in settings.growth:
+    for share in DEFAULT.growth:
         more = round(share * min(box[2] - box[0], box[3] - box[1]))
         label = np.zeros(scene.depth.shape, np.uint8)
         label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = PROBABLE
         best = max(tidy(grabcut(scene, label, rounds=5), ()), best, key=lambda mask: box_overlap(mask, box))
-        if box_overlap(best, box) >= settings.fills:
+        if box_overlap(best, box) >= DEFAULT.fills:
             break
     return best
 
@@ -112,36 +110,34 @@ def certainty(likely: Array) -> float:
     return float(np.minimum(half, likely).sum() / max(float(np.maximum(half, likely).sum()), 1e-6))
 
 
-def _around(scene: Scene, points: Sequence[tuple[int, int]], settings: SelectSettings) -> Array:
+def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
     import cv2
 
     label = np.zeros(scene.depth.shape, np.uint8)
-    shares = (settings.possible, settings.probable, settings.core)
+    shares = (DEFAULT.possible, DEFAULT.probable, DEFAULT.core)
     for share, value in zip(shares, (POSSIBLE, PROBABLE, CERTAIN), strict=True):
         for x, y in points:
             cv2.circle(label, (int(x), int(y)), max(2, round(share * max(label.shape))), value, -1)
     return label
 
 
-def _in_box(scene: Scene, box: Box, settings: SelectSettings) -> Array:
+def _in_box(scene: Scene, box: Box) -> Array:
     """[H, W] in [0, 1], 0 outside of the box: ClickNet's likelihood that a pixel is of an object in the box."""
     x0, y0, x1, y1 = box
     inside = np.zeros(scene.depth.shape, bool)
     inside[y0:y1, x0:x1] = True
     found = np.zeros(scene.depth.shape, np.float32)
-    for across, down in settings.places:
+    for across, down in DEFAULT.places:
         x, y = int(x0 + across * (x1 - x0)), int(y0 + down * (y1 - y0))
         if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of an object that was found already
             likely = clicknet(scene, [(x, y)])
-            if (likely * inside).sum() > settings.within * likely.sum():
+            if (likely * inside).sum() > DEFAULT.within * likely.sum():
                 found = np.maximum(found, likely * inside)
     return found
 
 
-def refined(
-    scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array, settings: SelectSettings = DEFAULT
-) -> Array:
+def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array) -> Array:
     """[H, W] bool: the rough mask with its outline moved to the photo's edges, a band at a time.
 
     `likely` [H, W] in [0, 1]: the outline stays out of what is clearly none of the object. `points` (column, row) lie
@@ -153,18 +149,18 @@ def refined(
         radius = max(2, round(share * max(rough.shape)))
         return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
 
-    possible = cv2.dilate((likely > settings.unlikely).astype(np.uint8), disc(settings.near_likely)) > 0
+    possible = cv2.dilate((likely > DEFAULT.unlikely).astype(np.uint8), disc(DEFAULT.near_likely)) > 0
     mask = rough
-    for _ in range(settings.passes):
-        inner = cv2.erode(mask.astype(np.uint8), disc(settings.inwards), borderValue=1) > 0
+    for _ in range(DEFAULT.passes):
+        inner = cv2.erode(mask.astype(np.uint8), disc(DEFAULT.inwards), borderValue=1) > 0
         if not inner.any():
             inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1) > 0
-        outer = (cv2.dilate(mask.astype(np.uint8), disc(settings.outwards)) > 0) & (possible | mask)
+        outer = (cv2.dilate(mask.astype(np.uint8), disc(DEFAULT.outwards)) > 0) & (possible | mask)
         label = np.where(inner, CERTAIN, np.where(mask, PROBABLE, np.where(outer, POSSIBLE, 0))).astype(np.uint8)
         for x, y in points:
             label[y, x] = CERTAIN
         found = tidy(grabcut(scene, label), points)
-        if overlap(found, mask) <= settings.kept:
+        if overlap(found, mask) <= DEFAULT.kept:
             return tidy(mask, points)
         if np.array_equal(found, mask):
             break
@@ -190,7 +186,7 @@ def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
     return (labels == CERTAIN) | (labels == PROBABLE)
 
 
-def tidy(mask: Array, points: Sequence[tuple[int, int]], settings: SelectSettings = DEFAULT) -> Array:
+def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] bool: the parts of a mask that hold a point (column, row), with holes below 2 % filled.
 
     Without points, or where no part holds one, all parts are kept that are not crumbs.
@@ -198,7 +194,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]], settings: SelectSetting
     import cv2
     from scipy import ndimage
 
-    radius = max(2, round(settings.gap * max(mask.shape)))
+    radius = max(2, round(DEFAULT.gap * max(mask.shape)))
     kernel, disc = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * r + 1,) * 2) for r in (1, radius))
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
