@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist.bench.edits import true_scene
 from materialist.bench.report import Column, Report
 from materialist.edits.select.objects import Box
+from materialist.errors import InputError
 from materialist.option_kinds import option
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import make_sample
@@ -63,16 +65,14 @@ class SelectBench(Benchmark):
 
     def _selected(self, scene: Scene, things: Sequence[Array], number: int) -> Iterator[Row]:
         """A row a click, and a box, by every method."""
-        from materialist.edits.select.select import select
-
         for method, (j, mask) in product(METHODS, enumerate(things)):
             if mask.sum() < self.smallest:
                 continue
             for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
-                found = _scores(select(scene, click=click, method=method), mask)
+                found = _scores(scene, mask, click=click, method=method)
                 yield {"method": method, "sample": f"object {j} click {k}", **found}
             for what, box in boxes(mask, self.loose).items():
-                found = _scores(select(scene, box=box, method=method), mask)
+                found = _scores(scene, mask, box=box, method=method)
                 yield {"method": f"{method}, {what}", "sample": f"object {j}", **found}
 
 
@@ -87,7 +87,13 @@ def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float =
     return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
 
 
-def _scores(found: Array, mask: Array) -> dict[str, float]:
+def _scores(scene: Scene, mask: Array, **how: Any) -> dict[str, float]:
+    from materialist.edits.select.select import select
+
+    try:
+        found = select(scene, **how)
+    except InputError:  # nothing was found there
+        found = np.zeros_like(mask)
     iou = float((found & mask).sum() / (found | mask).sum())
     return {"iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
 

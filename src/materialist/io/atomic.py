@@ -26,7 +26,7 @@ from materialist.errors import OutputError
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
 _MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
-_SCENE_FILES = re.compile(
+SCENE_FILES = re.compile(
     r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
     rf"|(prior|maps)/{_MAPS}|bodies/\d+(\.ply|\.{_MAPS}))"
 )
@@ -47,7 +47,7 @@ class FolderKind:
 
 
 def _is_scene_file(folder: Path, name: str) -> bool:
-    return _SCENE_FILES.fullmatch(name) is not None or name == _original(folder)
+    return SCENE_FILES.fullmatch(name) is not None or name == _original(folder)
 
 
 def _original(folder: Path) -> str:

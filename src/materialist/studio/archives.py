@@ -16,14 +16,11 @@ from pathlib import Path
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
+from materialist.io.atomic import SCENE_FILES
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.workspace import read_list, store, with_plain_files
 
-_MEMBER = re.compile(
-    r"(scene|report)\.json|(photo|rerender|overview|plane_label)\.png|(photo|rerender|envmap)\.exr|mesh\.ply|"
-    r"original\.[a-z0-9]{1,5}|(prior|maps)/(albedo|roughness|metallic|normal|depth)\.exr|"
-    r"bodies/\d{1,4}\.(ply|(albedo|roughness|metallic)\.exr)"
-)
+_MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
 
 
