@@ -12,6 +12,7 @@ import pytest
 from made_pipeline import install
 from PIL import Image
 
+from materialist import __version__
 from materialist.cli import app
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.exr import read_exr
@@ -132,17 +133,11 @@ def test_bench_dispatches_with_extra_options(run, tmp_path, monkeypatch):
 )
 def test_help_names_a_flag_for_every_option(run, command, kind):
     code, out, _ = run(command, "--help")
-    assert code == 0 and "Usage: materialist" in out
+    assert code == 0 and "Usage: materialist" in out and run("--version")[1].strip() == __version__
     flags = {
         flag for name, (told, _) in declarations(kind).items() if told.flag is not None for flag in told.spells(name)
     }
     assert all(flag in out for flag in flags | {"--seed", "--device", "--json", "--force"})
-
-
-def test_version(run):
-    import materialist
-
-    assert run("--version")[1].strip() == materialist.__version__
 
 
 def test_starting_loads_nothing_heavy():
@@ -155,8 +150,18 @@ def test_starting_loads_nothing_heavy():
     assert child.returncode == 0, f"importing the command line loads {child.stderr.strip()}"
 
 
+def told_to_end(script, word, number):
+    """(exit code, stderr) of a real process that gets a real signal when it has said `word`."""
+    child = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
+    while word not in child.stderr.readline():
+        assert child.poll() is None
+    child.send_signal(number)
+    err = child.communicate(timeout=20)[1]
+    return child.returncode, err
+
+
 def test_an_interrupt_from_the_keyboard_is_130_and_leaves_nothing(photo, tmp_path):
-    """A real process, a real signal, in the middle of the fit."""
+    """In the middle of the fit."""
     script = (
         # A background job starts with the interrupt ignored.
         "import signal, sys, time, types\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -167,35 +172,26 @@ def test_an_interrupt_from_the_keyboard_is_130_and_leaves_nothing(photo, tmp_pat
         "pipeline.invert = invert\nsys.modules['materialist.pipeline'] = pipeline\nmaterialist.pipeline = pipeline\n"
         f"sys.exit(run_to_exit_code(app, ['invert', {str(photo)!r}, '-o', {str(tmp_path / 'a.scene')!r}]))"
     )
-    child = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
-    while "fitting" not in child.stderr.readline():
-        assert child.poll() is None
-    child.send_signal(2)
-    _, err = child.communicate(timeout=20)
-    assert child.returncode == 130 and "Interrupted" in err and "Traceback" not in err
+    code, err = told_to_end(script, "fitting", signal.SIGINT)
+    assert code == 130 and "Interrupted" in err and "Traceback" not in err
     assert os.listdir(tmp_path) == ["photo.png"]
 
 
 def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
-    """A real process that is told to end while it writes frames."""
+    """While it writes frames."""
     script = (
-        "import sys, time\nimport numpy as np\nimport typer\n"
+        "import os, sys, time\nimport numpy as np\nimport typer\n"
         "from materialist.cli.outcome import run_to_exit_code\n"
         "from materialist.io.video import write_frames\n"
         "app = typer.Typer()\n"
         "def pictures():\n    yield np.full((16, 16, 3), 0.5, np.float32)\n"
+        f"    assert os.listdir({str(tmp_path)!r})\n"
         "    sys.stderr.write('writing\\n'); sys.stderr.flush(); time.sleep(30)\n"
         f"@app.command()\ndef go():\n    write_frames({str(tmp_path / 'frames')!r}, pictures())\n"
         "sys.exit(run_to_exit_code(app, []))"
     )
-    child = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)
-    while "writing" not in child.stderr.readline():
-        assert child.poll() is None
-    assert os.listdir(tmp_path)
-    child.terminate()
-    _, err = child.communicate(timeout=20)
-    assert child.returncode == -signal.SIGTERM and "Traceback" not in err
-    assert os.listdir(tmp_path) == []
+    code, err = told_to_end(script, "writing", signal.SIGTERM)
+    assert code == -signal.SIGTERM and "Traceback" not in err and os.listdir(tmp_path) == []
 
 
 def test_every_command_takes_seed_device_and_json():

@@ -80,16 +80,6 @@ def test_one_part_alone_and_what_is_wrong(folder, tmp_path):
         InteriorVerse(folder).read(0)
 
 
-def test_what_is_lost_is_told(folder):
-    (folder / "dataset_85" / "L3D1" / "001_albedo.exr").unlink()
-    source = InteriorVerse(folder)
-    assert source.bare == 1 and len(source) == 3
-    first, second = source.notes()
-    assert first.startswith("2 scenes of the split 'train' are not there (dataset_85/LOST") and second.startswith(
-        "1 pic"
-    )
-
-
 def test_scores_are_taken_on_the_validation_split(folder):
     from materialist.train.maps import held_out
 

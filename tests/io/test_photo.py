@@ -327,14 +327,3 @@ def test_turned_tiffs_are_upright(tmp_path, mode):
     plain, turned = (decode_photo(tmp_path / name).linear for name in ("a.tif", "b.tif"))
     assert turned.shape == (30, 20, 3)
     np.testing.assert_array_equal(turned, plain.swapaxes(0, 1)[:, ::-1])
-
-
-@pytest.mark.parametrize("channels", [1, 3])
-def test_portable_pixmaps_of_8_bits_alone(tmp_path, channels):
-    pixels = picture()[..., :channels]
-    kind = b"P5" if channels == 1 else b"P6"
-    (tmp_path / "a.ppm").write_bytes(kind + b"\n# 65535\n30 20 255\n" + pixels.tobytes())
-    np.testing.assert_allclose(read_photo(tmp_path / "a.ppm").linear, linear8(pixels) * np.ones(3), atol=1e-6)
-    (tmp_path / "b.ppm").write_bytes(kind + b"\n30 20\n65535\n" + pixels.astype(">u2").tobytes())
-    with pytest.raises(InputError, match="more than 8 bits a channel, which is read from PNG and TIFF alone"):
-        read_photo(tmp_path / "b.ppm")

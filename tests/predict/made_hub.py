@@ -20,19 +20,7 @@ def save_marigold(folder: Path, kind: str, *, half: bool = False, **settings) ->
     import diffusers
 
     targets = 2 if kind == "MarigoldIntrinsicsPipeline" else 1
-    with torch.random.fork_rng():
-        torch.manual_seed(7)
-        unet = diffusers.UNet2DConditionModel(
-            block_out_channels=(8, 16), layers_per_block=1, sample_size=8, in_channels=4 * (targets + 1),
-            out_channels=4 * targets, down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"),
-            up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"), cross_attention_dim=8, norm_num_groups=4,
-            attention_head_dim=4,
-        )  # fmt: skip
-        vae = diffusers.AutoencoderKL(
-            block_out_channels=(8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
-            down_block_types=("DownEncoderBlock2D",) * 2, up_block_types=("UpDecoderBlock2D",) * 2,
-        )  # fmt: skip
-        text, tokenizer = _text_encoder(folder)
+    unet, vae, text, tokenizer = _networks(folder, 4 * (targets + 1), 4 * targets, levels=2)
     pipeline = getattr(diffusers, kind)(
         unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(prediction_type="v_prediction"), text_encoder=text,
         tokenizer=tokenizer, default_denoising_steps=1, default_processing_resolution=32,
@@ -60,6 +48,24 @@ def save_depth_anything(folder: Path, **settings) -> Path:
     return folder
 
 
+def _networks(folder: Path, channels: int, out: int, *, levels: int):
+    """A denoiser, an autoencoder of so many levels, a text encoder and its tokenizer."""
+    import diffusers
+
+    with torch.random.fork_rng():
+        torch.manual_seed(7)
+        unet = diffusers.UNet2DConditionModel(
+            block_out_channels=(8, 16), layers_per_block=1, sample_size=8, in_channels=channels, out_channels=out,
+            down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"), norm_num_groups=4, attention_head_dim=4,
+            up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"), cross_attention_dim=8,
+        )  # fmt: skip
+        vae = diffusers.AutoencoderKL(
+            block_out_channels=(8,) * levels, layers_per_block=1, latent_channels=4, norm_num_groups=4,
+            down_block_types=("DownEncoderBlock2D",) * levels, up_block_types=("UpDecoderBlock2D",) * levels,
+        )  # fmt: skip
+        return unet, vae, *_text_encoder(folder)
+
+
 def _text_encoder(folder: Path):
     """A text encoder, and a vocabulary of a few letters."""
     from transformers import CLIPTextConfig, CLIPTextModel, CLIPTokenizer
@@ -81,18 +87,7 @@ def save_inpainting(folder: Path) -> Path:
     """A Stable Diffusion inpainting pipeline."""
     import diffusers
 
-    with torch.random.fork_rng():
-        torch.manual_seed(5)
-        unet = diffusers.UNet2DConditionModel(
-            block_out_channels=(8, 16), layers_per_block=1, sample_size=8, in_channels=9, out_channels=4,
-            down_block_types=("DownBlock2D", "CrossAttnDownBlock2D"), norm_num_groups=4, attention_head_dim=4,
-            up_block_types=("CrossAttnUpBlock2D", "UpBlock2D"), cross_attention_dim=8,
-        )  # fmt: skip
-        vae = diffusers.AutoencoderKL(
-            block_out_channels=(8, 8, 8, 8), layers_per_block=1, latent_channels=4, norm_num_groups=4,
-            down_block_types=("DownEncoderBlock2D",) * 4, up_block_types=("UpDecoderBlock2D",) * 4,
-        )  # fmt: skip
-        text, tokenizer = _text_encoder(folder)
+    unet, vae, text, tokenizer = _networks(folder, 9, 4, levels=4)
     diffusers.StableDiffusionInpaintPipeline(
         unet=unet, vae=vae, scheduler=diffusers.DDIMScheduler(steps_offset=1), text_encoder=text,
         tokenizer=tokenizer, safety_checker=None, feature_extractor=None,

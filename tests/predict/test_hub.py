@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from made_matnet import made_photo
 
-from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.color import linear_to_srgb
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.marigold import appearance
 from materialist.predict.protocol import MAPS
 
 pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("one_thread")]
@@ -146,18 +145,3 @@ def test_absent_libraries_say_how_to_get_them(models, monkeypatch):
     monkeypatch.setitem(sys.modules, "diffusers", None)
     with pytest.raises(SetupError, match=r"needs diffusers.*materialist\[hub\]"):
         get_predictor("constant", normal="marigold")
-
-
-def test_appearance_reads_the_order_and_the_colour_space_of_the_targets():
-    output = np.random.default_rng(1).random((2, 3, 4, 3)).astype(np.float32)
-    about = {
-        "target_names": ["material", "albedo"],
-        "material": {"sub_target_names": ["metallicity", None, "roughness"]},
-        "albedo": {"prediction_space": "linear"},
-    }
-    maps = appearance(output, about)
-    assert np.array_equal(maps["albedo"], output[1]) and np.array_equal(maps["roughness"], output[0, ..., 2])
-    assert np.array_equal(maps["metallic"], output[0, ..., 0])
-    about["albedo"] = {"prediction_space": "srgb"}
-    assert np.allclose(appearance(output, about)["albedo"], srgb_to_linear(output[1]))
-    assert list(appearance(output, {"target_names": ["albedo", "shading"], "shading": {}})) == ["albedo"]

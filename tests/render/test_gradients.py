@@ -4,11 +4,11 @@ import disney_reference as brdf
 import numpy as np
 import pytest
 import torch
-from render_scenes import uniform, wall, with_floor
+from render_scenes import random_maps, uniform, wall, with_floor
 
 from materialist.camera import pixel_rays
 from materialist.render.scene import RenderScene
-from materialist.types import Camera, Materials
+from materialist.types import Camera
 
 CAMERA = Camera(5, 3, 50.0)
 SIZE = (3, 5)
@@ -26,11 +26,6 @@ def corner():
 def leaves(maps, envmap):
     arrays = (maps.albedo, maps.roughness, maps.metallic, envmap)
     return [torch.from_numpy(np.array(a, np.float32)).requires_grad_() for a in arrays]
-
-
-def random_maps(seed):
-    draw = np.random.default_rng(seed).uniform
-    return Materials(*(draw(0.3, 0.8, (*SIZE, *c)).astype(np.float32) for c in ((3,), (), ())))
 
 
 def random_light(seed, height=6):
@@ -65,7 +60,7 @@ def test_gradients_under_constant_light_are_the_derivatives_of_the_formula():
 
 def test_the_gradient_of_the_light_adds_up_to_the_picture(corner):
     """Radiance is linear in the light: <dL/dE, E> = L, and dL/dE of a texel is the picture that it alone makes."""
-    maps, envmap = random_maps(8), random_light(9)
+    maps, envmap = random_maps(8, SIZE), random_light(9)
     inputs = leaves(maps, envmap)
     corner.render_torch(*inputs, spp=16384, seed=1).sum().backward()
     gradient = inputs[3].grad.numpy()
@@ -81,7 +76,7 @@ def test_the_gradient_of_the_light_adds_up_to_the_picture(corner):
 
 
 def test_equal_seeds_give_equal_values(corner):
-    maps, envmap = random_maps(1), random_light(2)
+    maps, envmap = random_maps(1, SIZE), random_light(2)
     images = [corner.render_torch(*leaves(maps, envmap), spp=16, seed=s).detach().numpy() for s in (4, 4, 5)]
     np.testing.assert_array_equal(images[0], images[1])
     assert np.abs(images[0] - images[2]).max() > 1e-4

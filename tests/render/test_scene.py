@@ -3,13 +3,13 @@
 import disney_reference as brdf
 import numpy as np
 import pytest
-from render_scenes import empty, uniform, wall, with_floor
+from render_scenes import empty, random_maps, uniform, wall, with_floor
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
-from materialist.types import Camera, Materials
+from materialist.types import Camera
 
 CAMERA = Camera(13, 7, 50.0)
 SIZE = (7, 13)
@@ -37,12 +37,6 @@ def inside_pixels(camera, seed=0):
     return col + rng.uniform(0.05, 0.95, row.size), row + rng.uniform(0.05, 0.95, row.size)
 
 
-def random_maps(seed=0, size=SIZE):
-    rng = np.random.default_rng(seed)
-    draw = lambda *shape: rng.uniform(0.05, 0.95, shape).astype(np.float32)  # noqa: E731
-    return Materials(draw(*size, 3), draw(*size), draw(*size))
-
-
 def bilinear(envmap, direction):
     """Slow twin of the light's lookup: [N, 3] radiance of an [h, 2h, 3] map from directions [N, 3]."""
     h, w = envmap.shape[:2]
@@ -65,7 +59,7 @@ def test_rays_go_through_the_pixels_of_the_camera_model(camera):
 
 def test_every_pixel_shows_its_own_material():
     """A map that is neither square nor symmetric, read where the camera's rays land."""
-    maps = random_maps()
+    maps = random_maps(0, SIZE)
     scene = scene_of(wall(CAMERA), maps)
     for seed in range(3):
         si = scene.mi_scene.ray_intersect(camera_rays(scene, *inside_pixels(CAMERA, seed)))
@@ -123,7 +117,7 @@ def test_sky_pixels_see_the_light():
 def test_a_continued_plane_carries_the_mean_of_its_pixels():
     label = np.full(SIZE, -1)
     label[5:, 2:9] = 0
-    maps = random_maps(4)
+    maps = random_maps(4, SIZE)
     scene = scene_of(with_floor(wall(CAMERA), label), maps)
     si = scene.mi_scene.ray_intersect(scene.mi.Ray3f([0.3, 0, -1], [0.1, -1, 0.2]))
     bsdf = si.shape.bsdf()[0] if isinstance(si.shape.bsdf(), list) else si.bsdf()
@@ -135,12 +129,12 @@ def test_a_continued_plane_carries_the_mean_of_its_pixels():
 
 
 def test_updates_give_the_picture_of_a_fresh_scene():
-    maps, envmap = random_maps(5), np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
+    maps, envmap = random_maps(5, SIZE), np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
     label = np.full(SIZE, -1)
     label[4:] = 0
     geometry = with_floor(wall(CAMERA), label)
     fresh = scene_of(geometry, maps, envmap).render(spp=16, seed=9)
-    used = scene_of(geometry, random_maps(7), np.ones((5, 10, 3), np.float32))
+    used = scene_of(geometry, random_maps(7, SIZE), np.ones((5, 10, 3), np.float32))
     used.render(spp=4)
     used.set_envmap(envmap)
     used.set_materials(maps)
@@ -156,7 +150,7 @@ def test_bad_light_maps_and_options_are_refused():
         with pytest.raises(InputError, match=says):
             scene.set_envmap(envmap)
     with pytest.raises(InputError, match=r"\(7, 12, 3\)"):
-        scene.set_materials(random_maps(size=(7, 12)))
+        scene.set_materials(random_maps(0, (7, 12)))
     with pytest.raises(InputError, match="max_depth is 0"):
         scene.render(spp=1, max_depth=0)
 

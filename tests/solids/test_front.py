@@ -14,16 +14,6 @@ DEPTH[~SEEN] = 3.0
 INSIDE = THICK > 0.64
 
 
-def test_exact_depth_and_normals_stay():
-    depth, normal, inside = DEPTH, NORMAL, INSIDE
-    front = smooth_front(depth, normal, inside, RAYS, smooth=0.0)
-    assert np.abs(front / depth - 1)[inside].max() < 4e-4  # the ball is a sixth as deep as it is far
-    np.testing.assert_array_equal(front[~inside], depth[~inside])
-    few = np.zeros((64, 64), bool)
-    few[30:32, 30:34] = True
-    np.testing.assert_array_equal(smooth_front(depth, normal, few, RAYS), depth)
-
-
 def test_an_edge_stays_where_it_is():
     """A roof: neither side is moved by the mean of the two slopes at its ridge."""
     roof = [np.array([0.6, 0, 0.8]), np.array([-0.8, 0, 0.6])]

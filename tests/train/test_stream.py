@@ -3,7 +3,6 @@
 import made_runs
 import made_samples
 import pytest
-import torch
 
 from materialist.errors import InputError
 from materialist.io.samples import SampleFolder
@@ -17,14 +16,6 @@ def spoil(folder, *names):
     for path in (folder / "samples").iterdir():
         if not names or path.name in names:
             path.write_bytes(b"no sample")
-
-
-def test_passes_may_be_entered_in_the_middle(tmp_path):
-    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
-    first, second = epoch(examples, batch=2, **ARGS)
-    (rest,) = epoch(examples, batch=2, skip=1, **ARGS)
-    torch.testing.assert_close(rest["image"], second["image"])
-    assert not torch.equal(first["image"], second["image"])
 
 
 def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):

@@ -7,7 +7,6 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
 from materialist.predict.bundled import inference
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
@@ -47,24 +46,6 @@ def test_any_size(file, size):
     known = prediction.depth > 0
     assert known.any() and np.isfinite(prediction.depth).all()
     assert np.median(prediction.depth[known]) == pytest.approx(inference.SETTINGS.median_depth, rel=0.05)
-
-
-def test_rays_go_on_into_the_padding(network):
-    """A picture of 40 columns is padded to 64, where the rays must be those of a wider camera."""
-    captured = {}
-
-    class Spy(torch.nn.Module):
-        def forward(self, image, rays):
-            captured["rays"] = rays
-            return network(image, rays)
-
-    camera = Camera(40, 40, 50.0)
-    inference.infer(Spy(), np.zeros((40, 40, 3), np.float32), pixel_rays(camera)[..., :2].copy())
-    rays = captured["rays"][0].permute(1, 2, 0).numpy()
-    assert rays.shape == (64, 64, 2)
-    np.testing.assert_allclose(rays[:40, :40], pixel_rays(camera)[..., :2], atol=1e-6)
-    np.testing.assert_allclose(np.diff(rays[0, :, 0]), 1 / camera.focal, rtol=1e-3)
-    np.testing.assert_allclose(np.diff(rays[:, 0, 1]), -1 / camera.focal, rtol=1e-3)
 
 
 def test_bad_weights_are_refused(file, tmp_path):

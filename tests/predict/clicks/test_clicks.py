@@ -5,7 +5,6 @@ import pytest
 import torch
 
 from materialist.camera import pixel_rays
-from materialist.errors import InputError, WeightsError
 from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.clicks.segment import ClickMaps, object_at
@@ -72,18 +71,6 @@ def test_photos_of_any_shape(untrained, size):
     rng = np.random.default_rng(0)
     photo = ClickMaps(*(rng.random((*size, *more), np.float32) for more in ((3,), (3,), ())))
     assert object_at(photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
-
-
-def test_bad_input(untrained, tmp_path):
-    photo, _ = scene()
-    for clicks in ([], [(160, 5)], [(5, -1)]):
-        with pytest.raises(InputError, match="give at least one inside 160 x 120"):
-            object_at(photo, clicks, weights=untrained)
-    with pytest.raises(WeightsError, match="materialist train clicks"):
-        object_at(photo, [(5, 5)], weights=tmp_path / "none.safetensors")
-    (tmp_path / "bad.safetensors").write_bytes(b"not weights")
-    with pytest.raises(WeightsError):
-        object_at(photo, [(5, 5)], weights=tmp_path / "bad.safetensors")
 
 
 @pytest.mark.parametrize("click", [(80, 66), (92, 80)])

@@ -1,4 +1,4 @@
-"""From maps of a photo to thickness: the window around the object, what the network sees, what comes back."""
+"""From maps of a photo to thickness."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ from geometry_scenes import ball
 from materialist.camera import pixel_rays
 from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction import WEIGHTS, best_thickness, thickness
-from materialist.predict.refraction.crop import SIDE, Window
 from materialist.predict.refraction.network import LEAST, RefractionNet
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
@@ -56,25 +55,6 @@ def test_thickness_is_in_scene_units(plain):
     photo, mask, normal, depth, _ = seen(camera)
     one, ten = (thickness(photo, mask, normal, s * depth, camera, weights=plain).solid for s in (1, 10))
     np.testing.assert_allclose(ten, 10 * one, rtol=1e-3, atol=1e-4)
-
-
-def test_windows_reach_over_the_border_and_come_back():
-    inside = np.zeros((60, 40), bool)
-    inside[30:60, 0:12] = True
-    window = Window.around(inside)
-    assert window.left < 0 and window.top + window.side > 60
-    values = np.add.outer(np.arange(60.0), 0.1 * np.arange(40.0)).astype(np.float32) + 5
-    maps = np.repeat(values[..., None], 3, -1)
-    view = window.cut(maps, inside, maps, values, pixel_rays(Camera(40, 60, 40)))
-    back = window.put_back(view.depth, view.inside, inside)
-    np.testing.assert_allclose(back[32:58, 1:11], values[32:58, 1:11], rtol=0.02)
-    assert (back[~inside] == 0).all()
-    # The rays of the window are those of the camera, also beyond its border.
-    rays = pixel_rays(Camera(40, 60, 40))
-    step = rays[0, 1, 0] - rays[0, 0, 0]
-    assert view.rays[0, 0, 0] == pytest.approx(
-        rays[0, 0, 0] + step * (window.left - 0.5 + window.side / SIDE / 2), abs=1e-5
-    )
 
 
 @pytest.mark.skipif(not WEIGHTS.is_file(), reason="this checkout has no weights of RefractionNet")
