@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import block_mask, rendered_scene
 
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.preview import Preview
-from materialist.errors import InputError
 from materialist.metrics import psnr
 
 MASK = block_mask(36, 48)
@@ -44,8 +43,3 @@ def test_nothing_changed_is_the_photo(preview):
     far = np.s_[:8]
     np.testing.assert_array_equal(changed[far], preview.scene.photo.linear[far])
     assert (changed[MASK] != preview.scene.photo.linear[MASK]).any(-1).all()
-
-
-def test_another_geometry_is_refused(preview):
-    with pytest.raises(InputError, match="another geometry"):
-        preview.render(flat_scene())

@@ -39,14 +39,6 @@ def test_a_sphere_is_close_to_its_normals():
     assert error.mean() < 1.0 and error.max() < 6.0
 
 
-def test_a_wide_window_calms_quantised_depth():
-    n = np.array([0, 0.8, 0.6])
-    depth = np.round(plane_depth(CAMERA, n, -3.0) * 256) / 256
-    rough = angle(normals_from_depth(depth, CAMERA), n).mean()
-    calm = angle(normals_from_depth(depth, CAMERA, radius=2), n).mean()
-    assert calm < 0.75 * rough
-
-
 def test_holes_face_the_viewer_and_do_not_spread():
     depth = plane_depth(CAMERA, np.array([0.6, 0, 0.8]), -3.0)
     depth[:, 40:] = 0

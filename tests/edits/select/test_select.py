@@ -5,7 +5,6 @@ import pytest
 from PIL import Image
 from table_top import overlap, table_top
 
-from materialist.edits.select import objects
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 
@@ -75,9 +74,3 @@ def around(mask, more):
 def test_boxes_need_not_be_exact(table, which, more):
     scene, *things = table
     assert overlap(select(scene, box=around(things[which], more)), things[which]) > 0.85
-
-
-def test_a_box_on_nothing_says_what_to_do(table, monkeypatch):
-    monkeypatch.setattr(objects, "grabcut", lambda scene, label, rounds: np.zeros(label.shape, bool))
-    with pytest.raises(InputError, match="draw the box a little larger"):
-        select(table[0], box=(50, 50, 60, 60), method="grabcut")
