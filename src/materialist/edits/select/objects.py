@@ -193,6 +193,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     """
     import cv2
     from scipy import ndimage
+    from skimage.morphology import remove_small_holes
 
     radius = max(2, round(DEFAULT.gap * max(mask.shape)))
     kernel, disc = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * r + 1,) * 2) for r in (1, radius))
@@ -206,9 +207,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     keep = {int(parts[y, x]) for x, y in points if parts[y, x]}
     keep = keep or set((np.flatnonzero(sizes >= 0.1 * sizes.max()) + 1).tolist())
     kept = np.isin(parts, list(keep))
-    holes, count = ndimage.label(~kept)
-    sizes = np.bincount(holes.ravel())[1:]
-    return kept | np.isin(holes, np.flatnonzero(sizes < 0.02 * kept.sum()) + 1)
+    return remove_small_holes(kept, max_size=int(0.02 * kept.sum()))
 
 
 def overlap(a: Array, b: Array) -> float:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
+from scipy.ndimage import binary_propagation
+from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
@@ -41,8 +42,8 @@ SETTINGS = InferenceSettings()
 def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu") -> Prediction:
     """Maps of a photo at its own size.
 
-    The network sees the photo and its mirror image at two sizes; its answers are averaged, and brought to the
-    photo's size with the photo as the guide.
+    The network sees the photo and its mirror image at two sizes; its answers are averaged and enlarged, geometry with
+    the photo's edges.
 
     Args:
         network: in evaluation mode, on `device`.
@@ -54,18 +55,13 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    small = _network_size(size, max(SETTINGS.sides))
-    photo = resample.values(linear, small)
     maps = _mean_answer(network, linear, rays, device)
     surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
     depth = _scaled(maps["depth"], surface)
-    albedo, roughness, metallic, normal = (maps[n] for n in ("albedo", "roughness", "metallic", "normal"))
-    if small != size:
-        guide, fine = linear_to_srgb(photo), linear_to_srgb(linear)
-        albedo, roughness, metallic = (guided(m, guide, fine) for m in (albedo, roughness, metallic))
-    depth, normal = with_edges(depth, normal, linear, rays)
+    albedo, roughness, metallic = (resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic"))
+    depth, normal = with_edges(depth, maps["normal"], linear, rays)
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
@@ -89,35 +85,11 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     sharp = weighted_median(coarse, guide, known=known)
     planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
     normal = _unit(np.stack(planes, -1))
-    logarithm = with_relief(np.where(known, coarse, np.nan), sharp, normal, seen, reach=reach)
+    logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
         depth, normal = resample.depth(depth, size), resample.normals(normal, size)
     return depth, normal
-
-
-def guided(values: Array, guide: Array, fine: Array, radius: int = 3, eps: float = 1e-3) -> Array:
-    """Values [h, w] or [h, w, c] in [0, 1] brought to the size of `fine`, with edges where the photo has them.
-
-    Fast guided filter (He and Sun 2015) with a grey guide: in every window the map is a line over the photo's
-    brightness; its two coefficients are smooth and are enlarged instead of the map.
-    """
-    grey, grey_fine = guide.mean(-1), fine.mean(-1)  # [h, w], [H, W]
-    box = lambda x: cv2.blur(x, (2 * radius + 1, 2 * radius + 1), borderType=cv2.BORDER_REFLECT)  # noqa: E731
-    mean_grey = box(grey)
-    variance = box(grey * grey) - mean_grey**2
-    planes = values[..., None] if values.ndim == 2 else values
-    result = []
-    for k in range(planes.shape[-1]):
-        plane = np.ascontiguousarray(planes[..., k])
-        slope = (box(grey * plane) - mean_grey * box(plane)) / (variance + eps)
-        offset = box(box(plane) - slope * mean_grey)
-        slope = box(slope)
-        # What the window's line leaves over is kept, so that the enlarged map is the map where nothing is finer.
-        rest = plane - (slope * grey + offset)
-        enlarged = [resample.values(np.ascontiguousarray(x), fine.shape[:2]) for x in (slope, offset, rest)]
-        result.append(enlarged[0] * grey_fine + enlarged[1] + enlarged[2])
-    return np.clip(result[0] if values.ndim == 2 else np.stack(result, -1), 0, 1).astype(np.float32)
 
 
 def _mean_answer(network: BundledNetwork, linear: Array, rays: Array, device: Any) -> dict[str, Array]:
@@ -176,20 +148,13 @@ def _surface(logit: Array) -> Array:
 
     White walls and windows look like sky, and a hole in a room costs more than a sky that is a far surface.
     """
-    likely, sure = logit < SETTINGS.likely_sky, logit < SETTINGS.sure_sky
-    _, labels = cv2.connectedComponents(likely.astype(np.uint8), connectivity=4)
-    return ~(likely & np.isin(labels, np.unique(labels[sure & likely])))
+    return ~binary_propagation(logit < SETTINGS.sure_sky, mask=logit < SETTINGS.likely_sky)
 
 
 def _without_specks(surface: Array) -> Array:
     """The surface [h, w] bool without tiny islands of either kind."""
-    least = max(4, int(SETTINGS.least_island * surface.size))
-    for wanted in (True, False):
-        count, labels, stats, _ = cv2.connectedComponentsWithStats((surface == wanted).astype(np.uint8), connectivity=4)
-        small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] < least]
-        if small:
-            surface = np.where(np.isin(labels, small), not wanted, surface)
-    return surface
+    most = max(4, int(SETTINGS.least_island * surface.size)) - 1
+    return remove_small_holes(remove_small_objects(surface, max_size=most), max_size=most)
 
 
 def _unit(normal: Array) -> Array:
