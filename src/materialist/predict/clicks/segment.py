@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from materialist.errors import InputError, WeightsError
-from materialist.predict.clicks.features import NORMAL_X, features
+from materialist.predict.clicks.features import features
 from materialist.types import Array
-
-if TYPE_CHECKING:
-    from materialist.predict.clicks.network import ClickNet
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
 """The weights that ship with the package; docs/training.md says how they were made."""
@@ -48,21 +45,15 @@ def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: s
     Raises:
         InputError: no click, or one outside. WeightsError: weights that are missing, damaged, or of another network.
     """
-    height, width = photo.depth.shape
-    if not clicks or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
-        raise InputError(f"The clicks are {list(clicks)}; give at least one inside {width} x {height} pixels.")
-    network = _loaded(Path(weights) if str(weights) else WEIGHTS)
-    return _seen(network, photo, clicks)
-
-
-def _seen(network: ClickNet, photo: ClickMaps, clicks: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] float32 in [0, 1]: the mean of what the network says of the photo and of its mirror image."""
     import cv2
     import torch
 
     from materialist.predict.network import STRIDE
 
     height, width = photo.depth.shape
+    if not clicks or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
+        raise InputError(f"The clicks are {list(clicks)}; give at least one inside {width} x {height} pixels.")
+    network = _loaded(Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
     way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
@@ -74,11 +65,8 @@ def _seen(network: ClickNet, photo: ClickMaps, clicks: Sequence[tuple[int, int]]
     maps = features(rgb, normal, depth, places)
     below, beside = -maps.shape[1] % STRIDE, -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
-    mirrored = padded.flip(-1)
-    mirrored[:, NORMAL_X] *= -1
     with torch.inference_mode():
-        both = (network(padded) + network(mirrored).flip(-1)) / 2
-    share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
+        share = network(padded)[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
     return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
 
 

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from materialist.predict.network import UNet, UNetArchitecture
-from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MASK, MIRROR, NORMAL_X
+from materialist.predict.refraction.crop import ANSWERS, CHANNELS, MASK, MIRROR, NORMAL_X
 
 LEAST = 0.05
 """Added to the mirrored thickness, in units of the object's size, so that a factor can change where that is 0."""
@@ -42,16 +42,6 @@ class RefractionNet(UNet):
         normal = maps[:, NORMAL_X : NORMAL_X + 3]
         mirrored = torch.cat([normal[:, :2], -normal[:, 2:]], 1)
         return torch.cat([solid, solid * raw[:, 1:2].sigmoid(), unit(mirrored + raw[:, 2:])], 1) * inside
-
-
-def both_ways(network: RefractionNet, maps: Tensor) -> Tensor:
-    """The mean [B, 5, S, S] of what the network says of maps [B, CHANNELS, S, S] and of their mirror image."""
-    mirrored = maps.flip(-1)
-    mirrored[:, NORMAL_X] = -mirrored[:, NORMAL_X]
-    other = network(mirrored).flip(-1)
-    other[:, BACK_X] = -other[:, BACK_X]
-    mean = (network(maps) + other) / 2
-    return torch.cat([mean[:, :BACK_X], unit(mean[:, BACK_X:])], 1)
 
 
 def unit(vectors: Tensor) -> Tensor:

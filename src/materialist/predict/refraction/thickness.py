@@ -110,21 +110,14 @@ def _answer(
     network: RefractionNet, window: Window, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array
 ) -> Array:
     """[H, W, 5] float32 of one window, 0 outside the mask: both thicknesses in scene units, and the back's normal."""
+    import torch
+
     view = window.cut(photo, inside, normal, depth, rays)
-    found = run(network, features(view))  # [5, S, S], lengths in units of the object's size
+    with torch.inference_mode():  # [5, S, S], lengths in units of the object's size
+        found = network(torch.from_numpy(features(view))[None])[0].numpy()
     turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
     channels = [*(found[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
     return np.stack([window.put_back(channel, view.inside, inside) for channel in channels], -1)
-
-
-def run(network: RefractionNet, maps: Array) -> Array:
-    """[5, S, S] float32 of features [C, S, S], see `RefractionNet.forward`: the mean over both ways to see them."""
-    import torch
-
-    from materialist.predict.refraction.network import both_ways
-
-    with torch.inference_mode():
-        return both_ways(network, torch.from_numpy(maps)[None])[0].numpy()
 
 
 @lru_cache(maxsize=2)

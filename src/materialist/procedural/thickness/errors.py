@@ -41,11 +41,9 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     """
     import torch
 
-    from materialist.predict.refraction.network import both_ways
-
     maps, target = views["maps"].astype(np.float32), views["target"].astype(np.float32)
     with torch.inference_mode():
-        parts = [both_ways(network, torch.from_numpy(maps[k : k + batch])).numpy() for k in range(0, len(maps), batch)]
+        parts = [network(torch.from_numpy(maps[k : k + batch])).numpy() for k in range(0, len(maps), batch)]
     found = np.concatenate(parts)
     # Where the mask that the network got is wider than the object, there is nothing to compare with.
     inside = (maps[:, MASK] > 0.5) & (target[:, 0] > 0)
