@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from materialist.errors import InputError, WeightsError
-from materialist.predict.clicks.features import features
+from materialist.predict.clicks.features import NORMAL_X, features
 from materialist.types import Array
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
@@ -33,7 +33,7 @@ class ClickMaps(NamedTuple):
 
 
 def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: str | Path = "") -> Array:
-    """How likely each pixel belongs to the object that all clicks lie on.
+    """How likely each pixel belongs to the object that all clicks lie on: the mean over the photo and its mirror image.
 
     Args:
         clicks: (column, row), at least one, inside the photo.
@@ -65,8 +65,11 @@ def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: s
     maps = features(rgb, normal, depth, places)
     below, beside = -maps.shape[1] % STRIDE, -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
+    mirrored = padded.flip(-1)
+    mirrored[:, NORMAL_X] *= -1
     with torch.inference_mode():
-        share = network(padded)[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
+        both = (network(padded) + network(mirrored).flip(-1)) / 2
+    share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
     return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
 
 
