@@ -5,13 +5,12 @@ import re
 import shlex
 from dataclasses import fields
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 from typer.main import get_command
 
-from materialist.bench import BENCHMARKS
+from materialist.bench import BENCHMARKS, benchmark_class
 from materialist.cli import app
 from materialist.cli.bench import parse_extra
 
@@ -76,7 +75,7 @@ def _parsed(words, whole):
 
 
 def _bench_options(name):
-    return [field.name for field in fields(getattr(import_module(f"materialist.bench.{name}"), BENCHMARKS[name]))]
+    return [field.name for field in fields(benchmark_class(name))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_page_id)

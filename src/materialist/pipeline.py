@@ -68,10 +68,6 @@ def invert(
     from materialist.geometry.build import SYNONYMS
 
     settings = wanted.settings or named(preset, hdr=picture.hdr)
-    if wanted.engine == "path" and (settings.corrections or settings.materials.second_metallic is not None):
-        raise InputError(
-            "The path engine fits as the paper does; give it settings with corrections=0 and second_metallic=None."
-        )
     completion = SYNONYMS.get(wanted.completion, wanted.completion)
     fit_setup = FitSetup(
         picture, prior, settings, FULL if completion == AUTO and preset == "paper" else completion, wanted.engine,
@@ -141,12 +137,7 @@ def _report(
         )
     if clipped > 0.01:
         notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
-    if found.prior_confidence == 1.0:
-        notes.append(
-            "No light explains the photo with the predicted materials; they were changed to match it, and shadows or "
-            "shading may be baked into the albedo."
-        )
-    elif is_peaked(found.envmap):
+    if is_peaked(found.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
     poor = float((residual > 0.1).mean())
     if poor > 0.05:

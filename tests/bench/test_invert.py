@@ -14,7 +14,7 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.io.photo import read_photo
 
-STAGES = {"geometry": 1.0, "engine": 0.75, "trace": 1.25, "prior light": 0.5, "light": 2.0, "materials": 3.0,
+STAGES = {"geometry": 1.0, "engine": 0.75, "trace": 1.25, "light": 2.5, "albedo": 3.0,
           "roughness+metallic": 0.25, "rerender": 4.0}  # fmt: skip
 REPORT = {
     "rerender_psnr_path": 33.0, "rerender_ssim_path": 0.95, "prior_l1_albedo": 0.1, "prior_l1_roughness": 0.2,

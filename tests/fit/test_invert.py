@@ -28,8 +28,8 @@ def setup():
     depth = np.full(linear.shape[:2], 3, np.float32)
     normal = np.broadcast_to(np.array([0, 0, 1], np.float32), linear.shape).copy()
     stages = tuple(replace(s, schedule=Schedule(max_steps=3)) for s in PAPER.materials.stages)
-    light = replace(PAPER.light, schedule=Schedule(max_steps=3), strict_steps=3)
-    settings = replace(PAPER, light=light, materials=replace(PAPER.materials, stages=stages), explained=0.08)
+    light = replace(PAPER.light, schedule=Schedule(max_steps=3))
+    settings = replace(PAPER, light=light, materials=replace(PAPER.materials, stages=stages))
     prior = Prediction(truth, normal, depth)
     return FitSetup(Photo(linear, camera, linear), prior, settings, envmap_height=16, device="cpu", spp=4)
 
@@ -55,4 +55,4 @@ def test_a_result_has_two_independent_halves(setup):
     assert told["light"] is result.envmap and told["materials"] is result.materials
     names = [stage["name"] for stage in result.stages]
     assert names[:4] == ["geometry", "scene", "engine", "trace"] and names[-1] == "rerender"
-    assert isinstance(result, FitResult) and result.prior_confidence >= 1
+    assert isinstance(result, FitResult)

@@ -7,14 +7,7 @@ import pytest
 import torch
 
 from materialist.color import linear_to_srgb
-from materialist.fit.losses import (
-    CLIPPED,
-    consistency,
-    encode,
-    log_total_variation,
-    loss_weights,
-    residual,
-)
+from materialist.fit.losses import CLIPPED, consistency, encode, log_total_variation, rendering_loss, residual
 from materialist.fit.settings import DEFAULT, PAPER
 
 
@@ -31,28 +24,27 @@ def test_clipped_channels_are_wrong_on_one_side_only():
     torch.testing.assert_close(residual(brighter, photo, "linear", clipped=False), torch.full((1, 3), 0.4))
 
 
-def maps_of(metallic):
-    """[P, 5], all else 0.4."""
-    maps = torch.full((len(metallic), 5), 0.4)
-    maps[:, 4] = torch.tensor(metallic)
-    return maps
-
-
 def test_consistency_is_the_papers_weighted_sum():
     """delta times the sum of mean L1 distances of albedo, roughness and metallic."""
-    prior = maps_of([0.5] * 4)
+    prior = torch.full((4, 5), 0.4)
     maps = prior + torch.tensor([0.3, 0.3, 0.3, 0.5, 0.2])
-    assert float(consistency(maps, prior, loss_weights(prior, PAPER.materials))) == pytest.approx(0.5 * 1.0)
+    assert float(consistency(maps, prior, PAPER.materials)) == pytest.approx(0.5 * 1.0)
     weighed = replace(PAPER.materials, delta=1.0, weights=(2.0, 0.0, 10.0))
-    assert float(consistency(maps, prior, loss_weights(prior, weighed))) == pytest.approx(0.6 + 2.0)
+    assert float(consistency(maps, prior, weighed)) == pytest.approx(0.6 + 2.0)
 
 
-def test_metallic_weighs_more_where_the_prior_is_sure_of_a_dielectric():
-    settings = DEFAULT.materials
-    found = loss_weights(maps_of([0.0, settings.surely_below / 2, settings.surely_below, 0.7]), settings)
-    most, metal = settings.metal_factor, settings.weights[2]
-    assert found[:, 4].tolist() == pytest.approx([metal * most, metal * (1 + most) / 2, metal, metal])
-    assert found[:, 3].tolist() == pytest.approx([settings.weights[1]] * 4)
+def test_consistency_of_the_default_preset_is_the_square_of_encoded_changes():
+    prior = torch.full((4, 5), 0.4)
+    maps = prior + torch.tensor([0.3, 0.3, 0.3, 0.5, 0.2])
+    settings = replace(DEFAULT.materials, delta=1.0, weights=(2.0, 1.0, 10.0))
+    albedo = (linear_to_srgb(np.float64(0.7)) - linear_to_srgb(np.float64(0.4))) ** 2
+    assert float(consistency(maps, prior, settings)) == pytest.approx(2 * albedo + 0.25 + 0.4, rel=1e-5)
+
+
+def test_losses_of_the_rendering():
+    error = torch.tensor([0.05, -0.3])
+    assert float(rendering_loss(error, "l1+l2")) == pytest.approx((0.05 + 0.3 + 0.05**2 + 0.3**2) / 2)
+    assert float(rendering_loss(error, "l2")) == pytest.approx((0.05**2 + 0.3**2) / 2)
 
 
 def test_log_total_variation_equals_a_loop():

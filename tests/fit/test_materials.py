@@ -1,54 +1,48 @@
-"""The second start for metallic."""
+"""The material fit against minima found another way."""
 
 from dataclasses import replace
 
+import numpy as np
 import torch
+from scipy.optimize import minimize_scalar
 
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.materials import better_start
-from materialist.fit.settings import DEFAULT
+from materialist.fit.fields import MaterialMaps
+from materialist.fit.losses import encode
+from materialist.fit.materials import fit_materials
+from materialist.fit.settings import DEFAULT, MaterialStage, Schedule
 
-SETTINGS = replace(DEFAULT.materials, clipped=False, second_steps=1)
-
-
-def priors(metallic):
-    maps = torch.full((len(metallic), 5), 0.4)
-    maps[:, 4] = torch.tensor(metallic)
-    return maps
+WEIGHT = 0.7
 
 
-def start_of(metallic, gain, **changes):
-    """What pixels of this predicted metallic start from, where a metal renders closer to the photo by `gain`."""
-    prior = priors([metallic] * 4)
-    photo = torch.full((4, 3), 0.5)
-    # Rendering errs by `gain` for a dielectric, and not at all for a metal; nothing else matters.
-    problem = MaterialProblem(lambda m: photo + gain * (m[:, 4:].detach() < 0.5) + 0 * m[:, :3], None)
-    settings = replace(SETTINGS, encoding="linear", **changes)
-    return better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost)[:, 4].mean().item()
-
-
-def test_a_surface_becomes_a_metal_only_where_it_gains_more_than_its_price():
-    cheap, dear = (SETTINGS.weights[2] * factor for factor in (1, SETTINGS.metal_factor))
-    assert start_of(0.3, 1.5 * cheap) > 0.9  # the prior is not sure
-    assert start_of(0.0, 1.5 * cheap) < 0.1
-    assert start_of(0.0, 2.5 * dear) > 0.9
-    assert start_of(0.0, 1.5 * cheap, metal_factor=1.0) > 0.9
-
-
-def test_a_region_of_one_metallic_decides_as_one():
-    """Two pixels gain more than the other two lose: alone they part, under one mask all of them start as metal."""
-    gain = torch.tensor([0.6, 0.6, -0.2, -0.2])[:, None]
-    photo, prior = torch.full((4, 3), 0.5), priors([0.3] * 4)
-    metal = lambda m: (m[:, 4:].detach() > 0.5).float()  # noqa: E731
-    problem = MaterialProblem(
-        lambda m: photo + gain.clamp(min=0) * (1 - metal(m)) - gain.clamp(max=0) * metal(m) + 0 * m[:, :3], None
+def fitted(light, photo, prior, clipped=False):
+    """[P, 5] maps where a pixel's radiance is light [P, 3] times albedo."""
+    schedule = Schedule(learning_rate=0.02, max_steps=400, decay_every=100, decay=0.3, patience=0)
+    settings = replace(
+        DEFAULT.materials, weights=(WEIGHT, 1.0, 1.0), clipped=clipped, stages=(MaterialStage(("albedo",), schedule),)
     )
-    settings = replace(SETTINGS, encoding="linear")
+    field = MaterialMaps(prior)
+    fit_materials(MaterialProblem(lambda maps: maps[:, :3] * light), photo, field, prior, settings)
+    return field().detach()
 
-    def found(inside):
-        start = better_start(problem, photo, prior.clone(), prior, settings, lambda cost: cost, inside=inside)
-        return (start[:, 4] > 0.5).tolist()
 
-    assert found(None) == [True, True, False, False]
-    assert found(torch.ones(4, dtype=torch.bool)) == [True] * 4
-    assert found(torch.tensor([False, False, True, True])) == [True, True, False, False]
+def test_albedo_lies_between_the_prior_and_what_the_photo_asks_for():
+    """argmin (s(render A) - s(photo))^2 + w (s(A) - s(A0))^2, s the sRGB curve, for every channel by itself."""
+    rng = np.random.default_rng(0)
+    light, photo = rng.uniform(0.5, 2, (6, 3)), rng.uniform(0.05, 0.9, (6, 3))
+    prior = np.concatenate([rng.uniform(0.1, 0.9, (6, 3)), np.full((6, 2), 0.5)], 1)
+    found = fitted(*(torch.from_numpy(x.astype(np.float32)) for x in (light, photo, prior)))
+    s = lambda x: encode(torch.tensor(x), "srgb").item()  # noqa: E731
+    for place in np.ndindex(6, 3):
+        cost = lambda a, k=place: (  # noqa: E731
+            (s(a * light[k]) - s(photo[k])) ** 2 + WEIGHT * (s(a) - s(prior[k])) ** 2
+        )
+        best = minimize_scalar(cost, bounds=(0, 1), method="bounded").x
+        assert abs(found[place].item() - best) < 0.01
+    torch.testing.assert_close(found[:, 3:], torch.full((6, 2), 0.5))
+
+
+def test_a_clipped_photo_asks_for_nothing_darker():
+    light, prior = torch.full((1, 3), 2.0), torch.full((1, 5), 0.6)
+    torch.testing.assert_close(fitted(light, torch.ones(1, 3), prior, clipped=True), prior)
+    assert (fitted(light, torch.ones(1, 3), prior)[:, :3] < 0.57).all()

@@ -10,7 +10,7 @@ from transport_scenes import away_from_edges, furnished_room, windowed_sky
 from materialist.camera import project
 from materialist.color import linear_to_srgb
 from materialist.fit.engine import TransportEngine
-from materialist.fit.losses import l1_l2
+from materialist.fit.losses import rendering_loss
 from materialist.render.scene import RenderScene
 from materialist.transport.shading import shade
 from materialist.types import Materials
@@ -34,7 +34,7 @@ class Comparison:
         maps = [m.reshape(self.surface.size, -1)[self.engine.pixels] for m in maps]
         image = None
         for _ in range(bounces):
-            self.engine.set_radiance(None if image is None else image.detach().numpy())
+            self.engine.radiance = None if image is None else image.detach().numpy()
             values = shade(self.engine.tables(self.envmap), maps[0], maps[1][:, 0], maps[2][:, 0])
             image = torch.zeros(self.surface.size, 3).index_copy(0, self.engine.pixels, values)
             image = image.view(*self.surface.shape, 3)
@@ -95,7 +95,7 @@ def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int 
     )  # fmt: skip
     c.path.set_materials(start)
     image = torch.from_numpy(c.path.render(spp=image_spp, seed=9, max_depth=max_depth)).requires_grad_()
-    weight = torch.autograd.grad(l1_l2(image - target), image)[0]
+    weight = torch.autograd.grad(rendering_loss(image - target, "l1+l2"), image)[0]
     leaves = [t.requires_grad_() for t in _tensors(start)]
     light = torch.from_numpy(c.envmap)
     first, second = (
@@ -105,7 +105,7 @@ def gradient_cosines(c: Comparison, max_depth: int, *, spp: int, image_spp: int 
         for s in (11, 21)
     )
     c.path.set_materials(c.materials)
-    cached = torch.autograd.grad(l1_l2(c.shaded(leaves, max_depth - 1) - target), leaves)
+    cached = torch.autograd.grad(rendering_loss(c.shaded(leaves, max_depth - 1) - target, "l1+l2"), leaves)
     return [
         # The reference's own noise has mean zero in first . second, so this is the cosine with its expectation.
         float((g * (a + b)).sum() / 2 / (g.norm() * (a * b).sum().sqrt()))

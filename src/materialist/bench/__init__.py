@@ -9,6 +9,7 @@ from typing import Any
 from materialist.errors import InputError
 
 BENCHMARKS = {
+    "photo-alone": "PhotoAloneBench",
     "invert": "InvertBench",
     "beside": "BesideBench",
     "batch": "BatchBench",
@@ -36,7 +37,12 @@ def run(name: str, *, output: str | Path, data: str | Path | None = None, force:
 
     if name not in BENCHMARKS:
         raise InputError(f"There is no benchmark '{name}'; choose one of {', '.join(BENCHMARKS)}.")
-    benchmark = getattr(import_module(f"materialist.bench.{name}"), BENCHMARKS[name]).given(**options)
+    benchmark = benchmark_class(name).given(**options)
     folder = claim(Path(output), force=force)
     benchmark.run(None if data is None else Path(data), folder)
     return folder
+
+
+def benchmark_class(name: str) -> Any:
+    """The class of a benchmark, whose fields are its options."""
+    return getattr(import_module(f"materialist.bench.{name.replace('-', '_')}"), BENCHMARKS[name])

@@ -26,7 +26,7 @@ from materialist.bench.report import Column, Report
 from materialist.fit.engine import prepared_envmap
 from materialist.fit.invert import FULL, FitSetup, prepare
 from materialist.fit.light import envmap_field, fit_light
-from materialist.fit.losses import l1_l2, residual
+from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
 from materialist.option_kinds import option
@@ -129,19 +129,19 @@ class _Photo:
         def render(maps: torch.Tensor) -> torch.Tensor:
             radiance = problem.render(maps)
             with torch.no_grad():
-                seen.append(float(l1_l2(residual(radiance, photo, settings.encoding, clipped=settings.clipped))))
+                error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+                seen.append(float(rendering_loss(error, settings.loss)))
             return radiance
 
-        # What is given is remapped already.
-        model = material_field(held, replace(settings, remap=False), engine.pixels, self.camera, seed=seed)
-        results = fit_materials(replace(problem, render=render), photo, model, held, settings, None)
+        model = material_field(held, settings, engine.pixels, self.camera, seed=seed)
+        results = fit_materials(replace(problem, render=render), photo, model, held, settings)
         with torch.no_grad():
             maps = model()
             render(maps)
         image = _maps(self.prior.materials).index_copy(0, engine.pixels, maps).numpy()
         image = image.reshape(self.camera.height, self.camera.width, 5)
         found = Materials(np.ascontiguousarray(image[..., :3]), image[..., 3].copy(), image[..., 4].copy())
-        picture = prepared.fit.reference(found, envmap, self.bench.spp, self.bench.seed + 1)
+        picture = prepared.render(found, envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
 

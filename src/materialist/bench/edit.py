@@ -46,7 +46,7 @@ class EditBench(Benchmark):
 
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)
-    kinds: str = option(",".join(KINDS), "Edits, with commas.", kind="name")
+    kinds: str = option(",".join(KINDS[:4]), "Edits, with commas.", kind="name")
     predictor: str = option("", "Adds a row fitted with this predictor's maps.", kind="name")
     spp: int = option(256, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)

@@ -1,4 +1,4 @@
-"""The edits of `bench edit`: what is done to a fitted scene, and what the same is in the true one."""
+"""Edits of `bench edit` and `bench photo-alone`: what is done to a fitted scene, and the same in the true one."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from materialist.procedural.objects import shapes
 from materialist.procedural.synthetic import SyntheticSample, TrueScene
 from materialist.types import Array, Body, Prediction, Scene
 
-KINDS = ("hue", "metal", "relight", "insert")
+KINDS = ("hue", "metal", "relight", "insert", "glass", "remove")
 SHADOW = 0.02
 """Change of the sRGB value from which a pixel counts as part of an insertion's shadow or reflection."""
 COPPER = (0.85, 0.45, 0.3)
+LIFT = 0.002
+"""Metres of air under true glass: where two surfaces are one, either may be met first."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +46,10 @@ class Edit:
 
 def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[Edit]:
     """The edits of these KINDS that the scene has room for; `light` [h, 2h, 3] is that of the relit picture."""
+    from materialist.edits.glass.glass import glass
     from materialist.edits.light.relight import relight
     from materialist.edits.material.material import edit
+    from materialist.edits.remove.remove import remove
 
     stage = sample.scene
     things = stage.things
@@ -56,7 +60,19 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
             yield Edit(kind, partial(relight, envmap=light), stage, light, everything)
         elif kind == "insert":
             yield from _insertion(sample, stage)
-        elif largest is not None:
+        elif largest is None:
+            continue
+        elif kind == "remove":
+            mask = things[largest]
+            items = [one for k, one in enumerate(stage.items) if k != largest]
+            yield Edit(kind, partial(remove, mask=mask), _staged(stage, items), sample.envmap, mask)
+        elif kind == "glass":
+            mask, solid = things[largest], stage.items[largest].solid
+            lifted = replace(solid, vertices=solid.vertices + LIFT * stage.view.to_scene[1])
+            clear = replace(stage.items[largest], solid=lifted, transparent=True)
+            items = [clear if k == largest else one for k, one in enumerate(stage.items)]
+            yield Edit(kind, partial(glass, mask=mask), _staged(stage, items), sample.envmap, mask)
+        else:
             mask = things[largest]
             values, other = _material(kind, stage.items[largest])
             items = [other if k == largest else one for k, one in enumerate(stage.items)]

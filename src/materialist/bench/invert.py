@@ -3,8 +3,8 @@
 `materialist invert` as a user runs it, every size in a fresh process. Seconds are wall clock from the start of the
 process to its end, starting Python, reading and writing included; peak MB is its resident memory as report.json has it.
 PSNR and SSIM compare the path-traced re-rendering (no denoiser) with the photo, sRGB-encoded; L1 figures are mean
-distances of the fitted maps from the prior; `other` is the time that no stage claims: starting Python, tables and
-corrections between the stages, writing. Sizes beyond the photo's own enlarge it (bicubic); the maps of the prior are
+distances of the fitted maps from the prior; `other` is the time that no stage claims: starting Python, tables between
+the stages, writing. Sizes beyond the photo's own enlarge it (bicubic); the maps of the prior are
 brought to each size by the predictor. `one step` compares one step of the material fit (all maps, full resolution, with
 gradients; medians after a warm-up) in one process: with the cached transport, and with Mitsuba's PRB at 64 spp and
 depth 4, the paper's.
@@ -173,8 +173,8 @@ def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     """Seconds by stage, repeated stages added up; `other` is what no stage claims, start and writing among it."""
     spent: Counter[str] = Counter()
     for stage in told:
-        # Stages named by what they move, as the paper's, count as materials.
-        name = {"prior light": "light", "trace": "engine"}.get(stage["name"], stage["name"])
+        # Stages named by what they move, as albedo, count as materials.
+        name = {"trace": "engine"}.get(stage["name"], stage["name"])
         spent[name if name in STAGES else "materials"] += stage["seconds"]
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
 

@@ -201,15 +201,15 @@ def fit(
     steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
     import torch
 
-    from materialist.fit.alternation import paste_visible_sky
     from materialist.fit.engine import PathEngine, prepared_envmap
+    from materialist.fit.inversion import paste_visible_sky
     from materialist.fit.invert import FitSetup, prepare
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
 
     photo, truth = sample.photo, sample.truth
     named = preset(method.preset)
-    light = replace(named.light, albedo_relaxation=None) if method.given else named.light
+    light = named.light
     light = replace(light, field=method.field or light.field, height=method.height or light.height)
     height = sample.envmap.shape[0]
     surface = truth.depth > 0

@@ -25,8 +25,8 @@ def bench(
         str,
         typer.Argument(
             metavar="NAME",
-            help="invert, beside, batch, light, ablation, materials, whdr, predictor, thickness, select, glass, edit, "
-            "studio.",
+            help="photo-alone, invert, beside, batch, light, ablation, materials, whdr, predictor, thickness, select, "
+            "glass, edit, studio.",
         ),
     ],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],

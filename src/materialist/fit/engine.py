@@ -28,11 +28,10 @@ class LightProblem:
     """[Q] int64 row-major pixels that `render` answers for."""
     height: int
     """Rows of the environment map that `render` takes."""
-    render: Callable[..., torch.Tensor]
-    """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable; see also `matrix`."""
+    render: Callable[[torch.Tensor], torch.Tensor]
+    """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable."""
     matrix: LightMatrix | None = None
-    """The transport behind `render`, where the engine has one; `render(envmap, albedo)` then takes another albedo
-    for its rows, which are the first of `pixels`."""
+    """The transport behind `render`, where the engine has one."""
 
 
 @dataclass(frozen=True)
@@ -41,15 +40,13 @@ class MaterialProblem:
 
     render: Callable[[torch.Tensor], torch.Tensor]
     """[P, 5] (albedo, roughness, metallic) -> radiance [P, 3], differentiable."""
-    tables: Tables | None = None
-    """The transport behind `render`, where the engine has one."""
 
 
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
     Args:
-        radiance: [H, W, 3] what the surfaces send to each other, until `set_radiance` replaces it: the photograph.
+        radiance: [H, W, 3] what the surfaces send to each other: the photograph.
         light_height: rows of the environment map inside the light fit.
         light_pixels, least_pixels: size of the pixel subset of the light fit: the first is a share of the whole
             picture, so that a small surface before the sky would get few; it gets at least the second, where it can.
@@ -78,10 +75,6 @@ class TransportEngine:
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
 
-    def set_radiance(self, radiance: Array) -> None:
-        """Take [H, W, 3] as what the surfaces send to each other from now on."""
-        self.radiance = radiance
-
     def light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = self.light_pixels / (self.camera.width * self.camera.height)
@@ -94,10 +87,10 @@ class TransportEngine:
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
         index, weight = (torch.from_numpy(v) for v in bilinear(direction, matrix.shape))
 
-        def render(envmap: torch.Tensor, albedo: torch.Tensor | None = None) -> torch.Tensor:
+        def render(envmap: torch.Tensor) -> torch.Tensor:
             flat = envmap.reshape(-1, 3)
             seen = (flat[index] * weight[..., None].float()).sum(1)
-            return torch.cat([matrix.combine(matrix.direct(flat) + indirect, albedo), seen])
+            return torch.cat([matrix.combine(matrix.direct(flat) + indirect), seen])
 
         pixels = torch.cat([matrix.pixels, torch.from_numpy(sky.astype(np.int64))])
         return LightProblem(pixels, self.light_height, render, matrix)
@@ -108,7 +101,7 @@ class TransportEngine:
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
         tables = self.tables(envmap)
-        return MaterialProblem(lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4]), tables)
+        return MaterialProblem(lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4]))
 
 
 class PathEngine:

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from materialist.fit.alternation import Fit
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
+from materialist.fit.inversion import Fit
 from materialist.fit.optimise import Progress
 from materialist.fit.plane_extents import FoundExtents, find_extents
 from materialist.fit.settings import FitSettings
@@ -56,6 +56,12 @@ class PreparedFit:
     notes: tuple[str, ...] = ()
     """What a report should say."""
 
+    def render(self, materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
+        """[H, W, 3] linear, path traced."""
+        self.renderer.set_materials(materials)
+        self.renderer.set_envmap(envmap)
+        return self.renderer.render(spp=spp, seed=seed)
+
 
 @dataclass(frozen=True)
 class FitResult:
@@ -76,18 +82,13 @@ class FitResult:
         """[H, W, 3] linear: the mean of both halves."""
         return (self.halves[0] + self.halves[1]) / 2
 
-    @property
-    def prior_confidence(self) -> float | None:
-        """Factor on what leaving the prior cost; 1: the prior did not explain the photo. None: that was not asked."""
-        return next((s["prior_confidence"] for s in reversed(self.stages) if "prior_confidence" in s), None)
-
 
 def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
     tick, stages = progress or (lambda *_: None), list[dict]()
     photo, prior = setup.photo, setup.prior
     ends, notes = tuple[PlaneExtent, ...](), tuple[str, ...]()
-    if setup.completion == AUTO and setup.settings.explained is not None:
+    if setup.completion == AUTO:
         tick("walls", 0, 1)
         found = timed(stages, "walls", lambda: find_extents(
             photo.linear, prior, photo.camera, setup.settings, tau=setup.tau, seed=setup.seed
@@ -102,13 +103,8 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
 
-    def reference(materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
-        renderer.set_materials(materials)
-        renderer.set_envmap(envmap)
-        return renderer.render(spp=spp, seed=seed)
-
     fit = Fit(
-        photo, prior.materials, engine, setup.settings, reference, envmap_height=setup.envmap_height, mask=setup.mask,
+        photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height, mask=setup.mask,
         strategy=setup.strategy, seed=setup.seed, progress=progress,
     )  # fmt: skip
     return PreparedFit(completion, ends, geometry, renderer, fit, tuple(stages), notes)
@@ -136,7 +132,7 @@ def invert(
         progress("rerender", 0, 1)
     each = max(1, (setup.spp or setup.settings.rerender_spp) // 2)
     first, second = timed(stages, "rerender", lambda: [
-        fit.reference(materials, state.envmap, each, seed + k) for k in (1, 2)
+        prepared.render(materials, state.envmap, each, seed + k) for k in (1, 2)
     ])  # fmt: skip
     return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import torch
 from torch import nn
 
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
-from materialist.fit.losses import l1_l2, log_chroma, log_total_variation, residual
+from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import LightSettings
 from materialist.transport.light import LightMatrix
@@ -47,66 +45,28 @@ def fit_light(
     field: nn.Module,
     settings: LightSettings,
     *,
-    steps: int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> StageResult:
-    """Move `field` so that the rendering matches the photo: argmin_E L1 + L2.
-
-    With `settings.albedo_relaxation` every pixel of the light matrix may change its albedo within [0, 1] at that L1
-    weight: a wrong albedo does not colour the light then, and a light too dim to reach the photo with any albedo is an
-    error.
+    """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
     Args:
         photo: [H * W, 3] linear.
-        steps: at most this many, instead of the schedule's.
     """
     target = photo[problem.pixels]
     weight = None if problem.matrix is None else hidden_weights(problem.matrix, settings)
     jitter = torch.Generator().manual_seed(seed)
-    schedule = settings.schedule if steps is None else replace(settings.schedule, max_steps=steps)
-    parameters: list = [{"params": list(field.parameters())}]
-    albedo = given = None
-    if settings.albedo_relaxation is not None and problem.matrix is not None:
-        given = problem.matrix.albedo
-        albedo = nn.Parameter(given.clone())
-        parameters.append({"params": [albedo], "lr": settings.relaxation_rate})
 
     def loss(_: int) -> torch.Tensor:
         envmap = _at_height(field, settings, problem.height, jitter)
-        radiance = problem.render(envmap) if albedo is None else problem.render(envmap, albedo)
-        value = l1_l2(residual(radiance, target, settings.encoding, clipped=settings.clipped))
-        if albedo is not None and given is not None and settings.albedo_relaxation is not None:
-            value = value + settings.albedo_relaxation * (albedo - given).abs().mean()
+        error = residual(problem.render(envmap), target, settings.encoding, clipped=settings.clipped)
+        value = rendering_loss(error)
         if settings.smooth or settings.chroma:
             log = envmap.clamp_min(1e-6).log()
             value = value + settings.smooth * log_total_variation(log, weight) + settings.chroma * log_chroma(log)
         return value
 
-    def into_range() -> None:
-        if albedo is not None:
-            albedo.clamp_(0, 1)
-
-    return optimise("light", parameters, loss, schedule, after_step=into_range, progress=progress)
-
-
-def prior_light(
-    problem: LightProblem, photo: torch.Tensor, settings: LightSettings, *, steps: int | None = None, seed: int = 0,
-    progress: Progress | None = None,
-) -> tuple[StageResult, float]:  # fmt: skip
-    """Fit a light to the photo [H * W, 3] with the problem's materials as they are.
-
-    Returns:
-        The stage, and the mean absolute encoded error that remains.
-    """
-    strict = replace(settings, albedo_relaxation=None)
-    light = envmap_field(strict, seed=seed, start=start_radiance(photo, strict))
-    steps = steps or strict.strict_steps
-    result = fit_light(problem, photo, light, strict, steps=steps, seed=seed, progress=progress)
-    with torch.no_grad():
-        found = problem.render(light(problem.height))
-        error = residual(found, photo[problem.pixels], strict.encoding, clipped=strict.clipped)
-    return result, float(error.abs().mean())
+    return optimise("light", field.parameters(), loss, settings.schedule, progress=progress)
 
 
 def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:

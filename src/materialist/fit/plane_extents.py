@@ -13,7 +13,8 @@ import numpy as np
 import torch
 
 from materialist.fit.engine import TransportEngine
-from materialist.fit.light import prior_light
+from materialist.fit.light import envmap_field, fit_light, start_radiance
+from materialist.fit.losses import residual
 from materialist.fit.settings import FitSettings
 from materialist.geometry.boundary import depth_to_mesh
 from materialist.geometry.completion import ContinuedWall, complete, continued_walls
@@ -45,7 +46,7 @@ def find_extents(
     One side of one wall after the other moves to where a light fitted to a small version of the photo leaves the least
     error.
     """
-    chosen = settings.extents
+    chosen, searched = settings.extents, replace(settings.light, schedule=settings.extents.schedule)
     photo, prior, camera = reduced(photo, prior, camera, chosen.side)
     planes = find_planes(prior.depth, prior.normal, camera, seed=seed)
     walls = continued_walls(planes, prior.depth, camera)
@@ -59,7 +60,11 @@ def find_extents(
         )
         problem = engine.light_problem(prior.materials)
         flat = torch.from_numpy(photo.reshape(-1, 3))
-        return prior_light(problem, flat, settings.light, steps=chosen.steps, seed=seed)[1]
+        light = envmap_field(searched, seed=seed, start=start_radiance(flat, searched))
+        fit_light(problem, flat, light, searched, seed=seed)
+        with torch.no_grad():
+            found = problem.render(light(problem.height))
+            return float(residual(found, flat[problem.pixels], "srgb", clipped=True).abs().mean())
 
     def better(best: tuple[PlaneExtent, ...], others: list[tuple[PlaneExtent, ...]]) -> tuple[PlaneExtent, ...]:
         """The best of the others where that is clearly better: a little is gained by any wall."""

@@ -11,6 +11,7 @@ from materialist.errors import InputError
 from materialist.procedural import patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.options import HELD_OUT
 from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array
 
@@ -24,13 +25,18 @@ class Item:
     """[h, w, 3] float32 linear picture, repeated over the texture coordinates."""
     roughness: float
     metallic: float
+    transparent: bool = False
+    """Clear glass of IOR 1.5; the rest of the material does not count."""
 
 
-def arrangement(scene_index: int, *, seed: int, data: Path | None) -> list[Item]:
-    """The floor (with none, one or two walls) and 3 to 7 objects standing on it; the same numbers, the same scene."""
+def arrangement(scene_index: int, *, seed: int, data: Path | None, unseen: bool = False) -> list[Item]:
+    """The floor (with none, one or two walls) and 3 to 7 objects standing on it; the same numbers, the same scene.
+
+    unseen: natural colours, and of the meshes only those that no training set may use.
+    """
     rng = np.random.default_rng([seed, 1, scene_index])
-    meshes = _mesh_files(data)
-    items = _room(rng, walls=scene_index % 3)
+    meshes = _mesh_files(data, unseen)
+    items = _room(rng, walls=scene_index % 3, natural=unseen)
     taken: list[tuple[float, float, float]] = []
     for _ in range(int(rng.integers(3, 8))):
         solid = _object(rng, meshes)
@@ -39,7 +45,7 @@ def arrangement(scene_index: int, *, seed: int, data: Path | None) -> list[Item]
         at = _free_place(rng, radius, taken)
         if at is not None:
             taken.append((*at, radius))
-            items.append(_painted(rng, shapes.placed(turned, at=at)))
+            items.append(_painted(rng, shapes.placed(turned, at=at), natural=unseen))
     return items
 
 
@@ -63,30 +69,30 @@ def in_camera(item: Item, camera: Viewpoint) -> Item:
     return replace(item, solid=replace(solid, vertices=vertices, normals=solid.normals @ camera.to_scene))
 
 
-def _mesh_files(data: Path | None) -> list[Path]:
+def _mesh_files(data: Path | None, unseen: bool) -> list[Path]:
     """The PLY files below DATA/meshes; raises InputError when DATA is given and has none."""
     if data is None:
         return []
-    files = sorted((data / "meshes").rglob("*.ply"))
+    files = [p for p in sorted((data / "meshes").rglob("*.ply")) if not unseen or p.stem in HELD_OUT]
     if not files:
         raise InputError(f"{data / 'meshes'} holds no .ply meshes; give a folder that does, or leave out --data.")
     return files
 
 
-def _room(rng: np.random.Generator, walls: int) -> list[Item]:
+def _room(rng: np.random.Generator, walls: int, natural: bool) -> list[Item]:
     """Floor, back wall and left wall, as many as wanted; a floor alone is a table top under the open sky."""
     half = rng.uniform(1.5, 2.0) if walls == 0 else 4.0
     edge = 2 * half
     x, y, z = np.eye(3)
     floor = shapes.panel(np.array([-half, 0, half]), edge * x, -edge * z, (edge, edge))
-    panels = [_painted(rng, floor, kinds=("wood", "checker", "noise", "plain"), metals=0)]
+    panels = [_painted(rng, floor, kinds=("wood", "checker", "noise", "plain"), metals=0, natural=natural)]
     back, height = rng.uniform(1.3, 1.7), rng.uniform(1.0, 1.6)
     if walls >= 1:
         wall = shapes.panel(np.array([-half, 0, -back]), edge * x, height * y, (edge / 2, height / 2))
-        panels.append(_painted(rng, wall, kinds=("plain", "noise", "stripes"), metals=0))
+        panels.append(_painted(rng, wall, kinds=("plain", "noise", "stripes"), metals=0, natural=natural))
     if walls >= 2:
         wall = shapes.panel(np.array([-back, 0, half]), -edge * z, height * y, (edge / 2, height / 2))
-        panels.append(_painted(rng, wall, kinds=("plain", "noise"), metals=0))
+        panels.append(_painted(rng, wall, kinds=("plain", "noise"), metals=0, natural=natural))
     return panels
 
 
@@ -115,13 +121,14 @@ def _object(rng: np.random.Generator, meshes: list[Path]) -> Solid:
 
 
 def _painted(
-    rng: np.random.Generator, solid: Solid, kinds: tuple[str, ...] = patterns.KINDS, metals: float = 0.2
-) -> Item:
+    rng: np.random.Generator, solid: Solid, kinds: tuple[str, ...] = patterns.KINDS, metals: float = 0.2,
+    natural: bool = False,
+) -> Item:  # fmt: skip
     """The solid with a random material: a share `metals` of them is metal, the others dielectric."""
     metal = rng.random() < metals
     kind = "plain" if metal else str(rng.choice(kinds))
     roughness = rng.uniform(0.2, 0.5) if metal else rng.uniform(0.25, 0.9)
-    return Item(solid, patterns.pattern(rng, kind, metal=metal), float(roughness), float(metal))
+    return Item(solid, patterns.pattern(rng, kind, metal=metal, natural=natural), float(roughness), float(metal))
 
 
 def _free_place(

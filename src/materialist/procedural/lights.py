@@ -16,6 +16,7 @@ import numpy as np
 from materialist.color import luminance
 from materialist.errors import InputError
 from materialist.procedural.objects.shapes import turn_upright
+from materialist.procedural.options import HELD_OUT
 from materialist.types import Array
 
 HEIGHT = 256
@@ -34,15 +35,16 @@ def directions(height: int) -> Array:
     )
 
 
-def environment(light_index: int, *, seed: int, data: Path | None) -> Radiance:
+def environment(light_index: int, *, seed: int, data: Path | None, unseen: bool = False) -> Radiance:
     """The light of that number: a capture from DATA/envmaps/*.exr (turned at random) or a procedural one.
 
+    unseen: only captures that no training set may use.
     Raises InputError when DATA is given but holds no captures.
     """
     rng = np.random.default_rng([seed, 3, light_index])
     if data is None:
         return _KINDS[light_index % len(_KINDS)](rng)
-    files = sorted((data / "envmaps").glob("*.exr"))
+    files = [p for p in sorted((data / "envmaps").glob("*.exr")) if not unseen or p.stem in HELD_OUT]
     if not files:
         raise InputError(
             f"{data / 'envmaps'} holds no .exr environment maps; give a folder that does, or leave out --data."

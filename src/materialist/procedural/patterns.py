@@ -6,29 +6,35 @@ import colorsys
 
 import numpy as np
 
+from materialist.procedural.materials import ANY_COLOUR, shade
 from materialist.types import Array
 
 SIZE = 256
 """Pixels on a side of a pattern."""
+UNSATURATED = ANY_COLOUR[:3]
+"""The shades of `natural` patterns."""
 
 
-def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False) -> Array:
+def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False, natural: bool = False) -> Array:
     """A seamless picture [SIZE, SIZE, 3] float32 linear, albedo in [0.03, 0.9].
 
     `kind` is 'plain', 'checker', 'noise', 'stripes', 'wood' or 'spots'; metals are bright and weakly coloured.
+    `natural`: colours as often as things have them, greys and beiges most.
     """
-    first = _colour(rng, metal)
-    second = _colour(rng, metal) if rng.random() < 0.5 else first * rng.uniform(0.25, 0.6)
+    first = _colour(rng, metal, natural)
+    second = _colour(rng, metal, natural) if rng.random() < 0.5 else first * rng.uniform(0.25, 0.6)
     mix = _KINDS[kind](rng)[..., None]  # [SIZE, SIZE, 1] in [0, 1]
     grain = 1 + 0.05 * (_noise(rng, 1.0)[..., None] - 0.5)
     return np.clip((first * (1 - mix) + second * mix) * grain, 0.03, 0.9).astype(np.float32)
 
 
-def _colour(rng: np.random.Generator, metal: bool) -> Array:
+def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
     """[3] linear colour of a dielectric (any hue) or of a metal (silver, gold, copper)."""
     if metal:
         base = np.array([(0.9, 0.88, 0.86), (0.85, 0.64, 0.30), (0.82, 0.50, 0.36), (0.60, 0.60, 0.62)])
         return base[rng.integers(len(base))] * rng.uniform(0.85, 1)
+    if natural:
+        return np.array(shade(rng, UNSATURATED))
     value, saturation = rng.uniform(0.12, 0.8), rng.choice([rng.uniform(0, 0.15), rng.uniform(0.3, 0.85)])
     return np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value))
 

@@ -22,8 +22,8 @@ from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
 """Samples a pixel of a reference picture: two seeds then agree to about 40 dB. A square, for the stratified sampler."""
-MAX_DEPTH = 6
-"""Path length of the reference pictures: five bounces."""
+MAX_DEPTH, GLASS_DEPTH = 6, 24
+"""Path length of the reference pictures: five bounces; longer through glass."""
 WAVEFRONT = 2**24
 """Paths traced at a time."""
 EXPOSED = 0.85
@@ -56,17 +56,19 @@ def make_sample(
     data: str | Path | None = None,
     seed: int = 0,
     spp: int = PHOTO_SPP,
+    unseen: bool = False,
 ) -> SyntheticSample:
     """The sample of these three numbers; the same numbers and seed give the same sample.
 
     `size` is the side of a square photo or (height, width), in pixels. With `data`, objects also come from
-    DATA/meshes/**/*.ply and light from DATA/envmaps/*.exr; without, everything is procedural. Raises InputError when
-    DATA lacks them. Needs a Mitsuba variant to be set (render.variant.setup).
+    DATA/meshes/**/*.ply and light from DATA/envmaps/*.exr; without, everything is procedural. `unseen`: natural
+    colours, and only files that no training set may use. Raises InputError when DATA lacks files. Needs a Mitsuba
+    variant to be set (render.variant.setup).
     """
     height, width = (size, size) if isinstance(size, int) else size
     folder = None if data is None else Path(data)
-    truth_scene = _true_scene(scene_index, view_index, height, width, folder, seed)
-    radiance = lights.environment(light_index, seed=seed, data=folder)
+    truth_scene = _true_scene(scene_index, view_index, height, width, folder, seed, unseen)
+    radiance = lights.environment(light_index, seed=seed, data=folder, unseen=unseen)
     envmap = lights.envmap(radiance, truth_scene.view.to_scene)
     picture = truth_scene.render(envmap, spp=spp, seed=_photo_seed(scene_index, view_index, light_index))
     exposure = _exposure(picture, truth_scene.truth.depth > 0)
@@ -120,7 +122,8 @@ class TrueScene:
 
         self._params["light.data"] = tensor(mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self._params.update()
-        integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH})
+        depth = GLASS_DEPTH if any(item.transparent for item in self.items) else MAX_DEPTH
+        integrator = mi.load_dict({"type": "path", "max_depth": depth})
         # Whole squares suit the stratified sampler; batches bound the memory.
         total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
         for k, part in enumerate(batches):
@@ -189,10 +192,13 @@ def _bilinear(picture: Array, uv: Array) -> Array:
 
 
 @lru_cache(maxsize=1)
-def _true_scene(scene_index: int, view_index: int, height: int, width: int, data: Path | None, seed: int) -> TrueScene:
+def _true_scene(
+    scene_index: int, view_index: int, height: int, width: int, data: Path | None, seed: int, unseen: bool
+) -> TrueScene:
     """The scene of a view; the last one is kept, since all lights of a view share it."""
     view = scenes.view(scene_index, view_index, seed=seed)
-    items = [scenes.in_camera(item, view) for item in scenes.arrangement(scene_index, seed=seed, data=data)]
+    arrangement = scenes.arrangement(scene_index, seed=seed, data=data, unseen=unseen)
+    items = [scenes.in_camera(item, view) for item in arrangement]
     return TrueScene(items, view, height, width)
 
 
@@ -215,6 +221,8 @@ def _mesh(item: scenes.Item, number: int) -> Any:
         bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat"}
 
+    if item.transparent:
+        return mitsuba_mesh(item.solid, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}, f"item{number:02d}")
     maps = {"base_color": texture(item.albedo)}
     maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
     return mitsuba_mesh(item.solid, {"type": "materialist_disney", **maps}, f"item{number:02d}")

@@ -53,9 +53,9 @@ class LightMatrix:
             sums[part].index_add_(0, self.hit_index[0], light * self.hit_weight[:, part : part + 1])
         return sums
 
-    def combine(self, light: torch.Tensor, albedo: torch.Tensor | None = None) -> torch.Tensor:
-        """Radiance [Q, 3] from the light of the parts [2, Q, 3], with another albedo [Q, 3] if one is given."""
-        return (self.albedo if albedo is None else albedo) * light[0] + light[1]
+    def combine(self, light: torch.Tensor) -> torch.Tensor:
+        """Radiance [Q, 3] from the light of the parts [2, Q, 3]."""
+        return self.albedo * light[0] + light[1]
 
 
 class _Product(torch.autograd.Function):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import pixel_rays, unproject
+from materialist.camera import unproject
 from materialist.edits.core.region import checked_pixel
 from materialist.errors import InputError
 from materialist.types import Array, Scene
@@ -19,11 +19,9 @@ class SupportSettings:
     alike: float = 0.7
     """Cosine from which a neighbour's normal counts as that of the same surface (tuned by eye)."""
     fewest: int = 12
-    """Pixels that a plane is fitted to, at least; with fewer the predicted normal decides (derived)."""
+    """Pixels whose median counts, at least; with fewer the one pixel decides (derived)."""
     nearby: float = 1 / 24
     """Radius around the place, share of the picture's width, where no radius is given (tuned by eye)."""
-    spread: float = 1 / 6
-    """Standard deviation of the weight of a dominant plane's pixels, share of the longer side (tuned by eye)."""
 
 
 DEFAULT = SupportSettings()
@@ -44,9 +42,9 @@ class Support:
 def support_at(scene: Scene, at: tuple[float, float], radius: float | None = None) -> Support:
     """The plane through the surface around a point (x, y) of the working size.
 
-    On a dominant plane of the scene it is fitted to that plane's pixels, the near ones counting most, since predicted
-    depth bends planes; elsewhere to the pixels within `radius` (scene units) whose normals are alike. Its place along
-    the normal is the median of the surface within the radius.
+    Its normal is the median of the scene's normals over the dominant plane that the point lies on, elsewhere over the
+    pixels within `radius` (scene units) whose normals are alike: predicted depth bends planes more than predicted
+    normals do. Its place along the normal is the median of the surface within the radius.
 
     Raises InputError for a point outside the photo, or on the sky.
     """
@@ -65,8 +63,8 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
     members = (scene.geometry.plane_label == label) & (scene.depth > 0) if label >= 0 else near
     normal = scene.normal[row, column].astype(np.float64)
     if members.sum() >= DEFAULT.fewest:
-        spread = max(camera.width, camera.height) * DEFAULT.spread if label >= 0 else np.inf
-        normal = _fitted(scene, members, (row, column), spread)
+        normal = np.median(scene.normal[members].astype(np.float64), axis=0)
+        normal /= max(float(np.linalg.norm(normal)), 1e-12)
     if near.sum() >= DEFAULT.fewest:
         points = unproject(scene.depth, camera)[near].astype(np.float64)
         offset = np.median(points @ normal)
@@ -90,31 +88,3 @@ def _near(scene: Scene, point: Array, reach: float, row: int, column: int) -> Ar
     return (
         close & (scene.depth > 0) & (scene.normal @ facing > DEFAULT.alike * max(float(np.linalg.norm(facing)), 1e-6))
     )
-
-
-def _fitted(scene: Scene, members: Array, pixel: tuple[int, int], spread: float) -> Array:
-    """[3] unit normal of the plane through the members [H, W], by weighted least squares in inverse depth.
-
-    Inverse depth is linear in the picture on a plane. `spread` is the standard deviation, in pixels, of the weight by
-    nearness; three rounds leave out what lies off the plane.
-    """
-    rows, columns = np.nonzero(members)
-    step = max(1, len(rows) // 20_000)
-    rows, columns = rows[::step], columns[::step]
-    rays = pixel_rays(scene.camera)[rows, columns].astype(np.float64)
-    depth = scene.depth[rows, columns].astype(np.float64)
-    weight = np.ones(len(rows))
-    if np.isfinite(spread):
-        away = ((rows - pixel[0]) ** 2 + (columns - pixel[1]) ** 2) / spread**2
-        weight = np.exp(-0.5 * away) + 1e-3
-    keep = weight.copy()
-    coefficients = np.array([0.0, 0.0, -1.0])
-    for _ in range(3):
-        side = np.sqrt(keep)[:, None]
-        # The relative depth error depth * (ray . c) - 1 is what is made small.
-        coefficients = np.linalg.lstsq(rays * depth[:, None] * side, side[:, 0], rcond=None)[0]
-        error = np.abs((rays @ coefficients) * depth - 1)
-        scale = max(float(np.median(error)), 1e-5)
-        keep = weight / (1 + (error / (3 * scale)) ** 2)
-    normal = -coefficients / max(float(np.linalg.norm(coefficients)), 1e-12)
-    return -normal if normal @ rays.mean(0) > 0 else normal

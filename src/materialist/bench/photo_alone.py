@@ -1,0 +1,174 @@
+"""`bench photo-alone`: what a user gets who has a photo and nothing else, on synthetic photographs never trained on.
+
+Every second photo shows procedural objects under procedural light; the others (with `--data`) show captured meshes
+under captured light, of those that no training set may use. Colours are as often as things have them. The photo and its
+field of view are given. Rows: `untouched` is the photo as it was; `fitted` is the inversion with the predictor;
+`+ light`, `+ albedo`, `+ geometry` and `+ albedo, geometry` are the same with that much of the truth in place of what
+was predicted (the true light replaces the fitted one); `ceiling` is the edit with the true maps, light and depth.
+
+`maps` rows compare `prior` and `fitted` maps with the truth: albedo after one factor (sRGB PSNR), roughness, normals
+(degrees), log depth (RMSE), and the light's spherical harmonics after one factor (relative error, 1 is as bad as
+darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` and `metal` (copper) after one factor on
+the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also in the true `shadow`
+and reflection alone; `glass` is the largest object turned to glass, `remove` the picture without it. sheet.png: photo,
+truth, and the pictures of the rows after `untouched`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist import metrics
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
+from materialist.bench.edits import KINDS, Edit, edits, true_scene
+from materialist.bench.report import CEILING, Column, Report, strip
+from materialist.errors import InputError
+from materialist.metrics.maps import best_scale, score
+from materialist.option_kinds import option
+from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.types import Array, Prediction, Scene
+
+SCENE_SEED = 38_000
+"""Of the arrangements, apart from the seeds of all other benchmarks."""
+SCALED = ("relight", "metal")
+"""Edits whose picture is compared after one factor."""
+GIVEN = ("light", "albedo", "geometry", "albedo, geometry")
+"""What of the truth a row may be given."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhotoAloneBench(Benchmark):
+    """Invert and edit photos with nothing but the photo given."""
+
+    columns = (
+        Column("inside", "PSNR inside", "higher", 2),
+        Column("shadow", "PSNR in shadow", "higher", 2),
+        Column("albedo", "albedo PSNR", "higher", 2),
+        Column("roughness", "roughness PSNR", "higher", 2),
+        Column("normal", "normals, degrees", "lower", 1),
+        Column("depth", "log depth RMSE", "lower"),
+        Column("light", "SH error, relative", "lower"),
+        Column("rerender", "re-rendering PSNR", "higher", 2),
+        Column("seconds", "fit s", "lower", 1),
+    )
+    plotted = ("inside", "albedo", "light")
+
+    scenes: int = option(24, "Photos.", **COUNT)
+    size: int = option(256, "Their width and height.", **SIZE)
+    kinds: str = option(",".join(KINDS), "Edits, with commas.", kind="name")
+    predictor: str = option("bundled", "Where the maps come from.", kind="name")
+    decompose: bool = option(False, "Adds the rows that are given a part of the truth.", kind="switch")
+    spp: int = option(128, "Paths a pixel of composites.", **COUNT)
+    truth_spp: int = option(256, "Paths a pixel of the truth.", **COUNT)
+
+    def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        from materialist.render.variant import setup
+
+        kinds = names("kinds", self.kinds, KINDS)
+        setup(self.device)
+        for scene in range(self.scenes):
+            sample, light = unseen_sample(scene, data, self.size)
+            scenes = {}
+            for name, fitted, seconds in self._fitted(sample):
+                scenes[name] = fitted
+                if name == "fitted":
+                    yield {"method": "maps: prior", "sample": sample.name, **map_figures(fitted.prior, sample)}
+                yield {
+                    "method": f"maps: {name}", "sample": sample.name, **map_figures(maps_of(fitted), sample),
+                    "light": light_error(fitted.envmap, sample.envmap), "seconds": seconds,
+                    "rerender": metrics.psnr(fitted.rerender, sample.photo.linear),
+                }  # fmt: skip
+            for edit in edits(sample, light, kinds):
+                for row in self._compared(edit, sample, scenes, report):
+                    yield {**row, "sample": sample.name}
+
+    def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, float]]:
+        """Names of rows, their scenes and seconds."""
+        from materialist import pipeline
+
+        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
+        scene, cost = timed(pipeline.invert, sample.photo, predictor=self.predictor, **shared)
+        yield "fitted", scene, cost["seconds"]
+        if not self.decompose:
+            return
+        for given in GIVEN:
+            if given == "light":
+                scale = best_scale(sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0)
+                yield "+ light", replace(scene, envmap=(sample.envmap / max(scale, 1e-3)).astype(np.float32)), 0.0
+            else:
+                prior = with_truth(scene.prior, sample.truth, given)
+                other, cost = timed(pipeline.invert, sample.photo, prior=prior, **shared)
+                yield f"+ {given}", other, cost["seconds"]
+        yield CEILING, true_scene(sample), 0.0
+
+    def _compared(self, edit: Edit, sample: SyntheticSample, scenes: dict[str, Scene], report: Report) -> Iterator[Row]:
+        """Rows of one edit, and its strip of the sheet."""
+        from materialist.edits.composite.composite import composite
+
+        before = sample.render(sample.envmap, spp=self.truth_spp, seed=5)
+        after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
+        inside = edit.region(before, after)
+        shown = [sample.photo.linear, after]
+        yield {"method": f"{edit.kind}: untouched", **self._scores(edit, sample.photo.linear, after, inside)}
+        for name, scene in scenes.items():
+            try:
+                edited = edit.change(scene)
+            except InputError:
+                continue
+            picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
+            shown.append(picture)
+            method = f"{CEILING} {edit.kind}" if name == CEILING else f"{edit.kind}: {name}"
+            yield {"method": method, **self._scores(edit, picture, after, inside)}
+        report.sheet.append(strip(*shown))
+
+    def _scores(self, edit: Edit, picture: Array, truth: Array, inside: Array) -> dict[str, float]:
+        if edit.kind in SCALED:
+            picture = picture * np.float32(best_scale(np.minimum(picture, 1), np.minimum(truth, 1), inside))
+        found = {"inside": metrics.psnr(picture, truth, mask=inside)}
+        shadow = inside & ~edit.mask
+        if edit.kind == "insert" and shadow.any():
+            found["shadow"] = metrics.psnr(picture, truth, mask=shadow)
+        return found
+
+
+def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSample, Array]:
+    """Photo `scene` of the benchmark, and the other light that it is shown under; captures for odd numbers."""
+    source = data if scene % 2 else None
+    photo, other = (
+        make_sample(scene, 0, k, size=size, data=source, seed=SCENE_SEED, unseen=True) for k in (scene, scene + 1)
+    )
+    return photo, other.envmap
+
+
+def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:
+    """The prior with the true albedo, the true depth and normals, or both."""
+    if "albedo" in given:
+        prior = replace(prior, materials=replace(prior.materials, albedo=truth.materials.albedo))
+    if "geometry" in given:
+        prior = replace(prior, depth=truth.depth, normal=truth.normal)
+    return prior
+
+
+def maps_of(scene: Scene) -> Prediction:
+    """The fitted maps of a scene."""
+    return replace(scene.prior, materials=scene.materials, normal=scene.normal, depth=scene.depth)
+
+
+def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
+    """Maps against the truth."""
+    keys = {
+        "albedo_psnr": "albedo", "roughness_psnr": "roughness", "normal_angle": "normal", "depth_si_log_rmse": "depth",
+    }  # fmt: skip
+    figures = score(maps, sample.truth)
+    return {key: figures[name] for name, key in keys.items() if name in figures}
+
+
+def light_error(estimate: Array, truth: Array) -> float:
+    """Relative error of the spherical harmonics of a light [h, 2h, 3], after the factor that makes it least."""
+    a, b = metrics.sh_coefficients(estimate), metrics.sh_coefficients(truth)
+    return metrics.sh_error_relative(estimate * (np.sum(a * b) / max(np.sum(a * a), 1e-12)), truth)
