@@ -5,11 +5,11 @@ sRGB-encoded, clipped pictures. `hue` turns the largest object's albedo by 120 d
 (roughness 0.3), `relight` shows the photo under another light, `insert` puts a cup on the floor. Inside is the edited
 object; for `insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all.
 `ceiling` is the same edit path-traced with the true maps and the true light on the mesh of the true depth, no photo in
-it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited;
-`edit, predicted` with the predictor that is named. `untouched` is the photo as it was. `preview` rows: seconds of one
-preview by cached transport, `final` those of the composite at 256 paths, both at the latency size, and of bringing it
-into a photo of 24 megapixels (without the paths); CPU seconds hardly depend on what else the computer does. sheet.png,
-from the left: photo, truth, ceiling, edits.
+it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited
+(`bench photo-alone` has predicted ones). `untouched` is the photo as it was. `preview` rows: seconds of one preview by
+cached transport, `final` those of the composite at 256 paths, both at the latency size, and of bringing it into a photo
+of 24 megapixels (without the paths); CPU seconds hardly depend on what else the computer does. sheet.png, from the
+left: photo, truth, ceiling, edit.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ class EditBench(Benchmark):
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)
     kinds: str = option(",".join(KINDS[:4]), "Edits, with commas.", kind="name")
-    predictor: str = option("", "Adds a row fitted with this predictor's maps.", kind="name")
     spp: int = option(256, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)
     latency: int = option(512, "Size of the timed previews and final edit; 0: none.", **COUNT_OR_0)
     large: int = option(4900, "Side of the large photo that an edit is brought into.", **SIZE)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        from materialist import pipeline
         from materialist.render.variant import setup
 
         kinds = names("kinds", self.kinds, KINDS)
@@ -62,29 +62,18 @@ class EditBench(Benchmark):
             sample, other = (
                 make_sample(scene, 0, k, size=self.size, data=data, seed=self.seed) for k in (scene, scene + 1)
             )
-            fitted, perfect = self._fitted(sample), true_scene(sample)
+            fitted, cost = timed(pipeline.invert, sample.photo, prior=sample.truth, seed=self.seed, device=self.device)
+            perfect = true_scene(sample)
             for edit in edits(sample, other.envmap, kinds):
-                for row in self._compared(edit, sample, perfect, fitted, report):
+                for row in self._compared(edit, sample, perfect, (fitted, cost["seconds"]), report):
                     yield {**row, "sample": sample.name}
         if self.latency:
             yield from self._latencies(data)
 
-    def _fitted(self, sample: SyntheticSample) -> dict[str, tuple[Scene, float]]:
-        """Fits by the names of their rows, and their seconds."""
-        from materialist import pipeline
-
-        ways: dict[str, dict[str, Any]] = {"edit": {"prior": sample.truth}}
-        if self.predictor:
-            ways["edit, predicted"] = {"predictor": self.predictor}
-        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        found = {name: timed(pipeline.invert, sample.photo, **shared, **o) for name, o in ways.items()}
-        return {name: (scene, cost["seconds"]) for name, (scene, cost) in found.items()}
-
     def _compared(
-        self, edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: dict[str, tuple[Scene, float]],
-        report: Report,
-    ) -> Iterator[Row]:  # fmt: skip
-        """Rows of one edit: untouched, the ceilings, and each fit; and its strip of the sheet."""
+        self, edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: tuple[Scene, float], report: Report
+    ) -> Iterator[Row]:
+        """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet."""
         from materialist.edits.composite.composite import composite
 
         before = sample.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
@@ -97,13 +86,10 @@ class EditBench(Benchmark):
         yield {"method": f"{CEILING} {edit.kind}", **scores(best, after, inside)}
         brought = composite(perfect, truly, **shared)
         yield {"method": f"{CEILING} {edit.kind}, composite", **scores(brought, after, inside)}
-        shown = [photo, after, best]
-        for name, (scene, seconds) in fitted.items():
-            picture, cost = timed(composite, scene, edit.change(scene), **shared)
-            shown.append(picture)
-            method = f"{edit.kind}: {name}"
-            yield {"method": method, **scores(picture, after, inside), "fit_seconds": seconds, **cost}
-        report.sheet.append(strip(*shown))
+        scene, seconds = fitted
+        picture, cost = timed(composite, scene, edit.change(scene), **shared)
+        yield {"method": f"{edit.kind}: edit", **scores(picture, after, inside), "fit_seconds": seconds, **cost}
+        report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
         """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
