@@ -12,8 +12,8 @@ import numpy as np
 
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
-from materialist.edits.drop.convex import convex_pieces
-from materialist.edits.drop.ground import Field, depth_in, ground_field
+from materialist.edits.drop.convex import convex_pieces, hull
+from materialist.edits.drop.ground import blocks, depth_in, ground_field
 from materialist.edits.drop.physics import Pose, RigidBody, fall, load
 from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
@@ -113,8 +113,8 @@ class Falling:
 
     scene: Scene
     things: list[RigidBody]
-    ground: Field
-    """Metres, z up."""
+    ground: list[Array]
+    """Convex blocks [n, 3], metres, z up."""
     starts: list[tuple[tuple[Body, ...], Array]]
     """For each thing its bodies as they would stand, camera frame, and the shift [3] (metres, z up) that lifts it."""
     to_up: Array
@@ -170,13 +170,14 @@ def prepared(
         )
     starts = [(bodies, np.array([0, 0, lift + clear])) for (bodies, *_), lift in zip(stood, lifts)]
     things = _things(starts, to_up, factor, wanted)
+    ground = [hull(block) for block in blocks(field, metres=wanted.metres)]
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
         **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
         "gravity": [round(float(v), 6) for v in direction],
     }  # fmt: skip
     notes = tuple(note for model in models for note in model.warnings)
-    return Falling(scene, things, field, starts, to_up, factor, notes, what)
+    return Falling(scene, things, ground, starts, to_up, factor, notes, what)
 
 
 def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | None) -> Array:
@@ -270,12 +271,13 @@ def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
 
 def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     """(the last poses, numbers of the things that fell out of the scene, whether the rest lies still)."""
+    bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
     recent: deque[list[Pose]] = deque(maxlen=DEFAULT.still + 1)
     gone: frozenset[int] = frozenset()
     for poses in fall(
         falling.things, falling.ground, frames=round(DEFAULT.longest * DEFAULT.looks) + 1, fps=DEFAULT.looks
     ):
-        gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < falling.ground.bottom)
+        gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
         if not recent[-1] or (len(recent) > DEFAULT.still and _still(list(recent), falling.what["metres"])):

@@ -1,4 +1,4 @@
-"""What things fall onto: the scene as a height field along gravity.
+"""What things fall onto: the scene as a height field along gravity, cut into convex blocks.
 
 Coordinates are those of the simulation: metres, z up. `to_up` [3, 3] and `factor` lead there from the camera frame.
 """
@@ -17,10 +17,12 @@ from materialist.types import Array, Scene
 class GroundSettings:
     """Extent and precision of the ground; lengths are in longest sides of the falling things; tuned by eye."""
 
-    cells: int = 128  # along each side of the field
+    cells: int = 128  # along each side of the field; a power of two
     reach: float = 6.0  # half of the field's side
     steep: float = 0.15  # height over the floor from which upright surfaces count
-    deep: float = 2.0  # how far below the field a thing has left it
+    flat: float = 0.004  # how plane a block must be
+    deep: float = 2.0  # how far a block reaches below the field
+    blocks: int = 1500  # most blocks; `flat` is relaxed until there are no more
     behind: float = 0.05  # least cosine of a face's normal with a ray for the ray to come from behind
 
 
@@ -37,13 +39,6 @@ class Field:
     """Distance of grid points."""
     height: Array
     """[n + 1, n + 1] z of the surface at (x, y) = corner + cell * (column, row); NaN where there is none."""
-    deep: float
-    """How far below all of it a thing has left it."""
-
-    @property
-    def bottom(self) -> float:
-        """z below which a thing has left the ground."""
-        return float(np.nanmin(self.height)) - self.deep if np.isfinite(self.height).any() else -np.inf
 
 
 def ground_field(
@@ -80,7 +75,7 @@ def ground_field(
     column, row, z = column[inside], row[inside], points[inside, 2]
     upright = z > np.nan_to_num(height[row, column], nan=low - metres) + DEFAULT.steep * metres
     np.fmax.at(height, (row[upright], column[upright]), z[upright])
-    return Field(np.array([x[0, 0], y[0, 0]]), cell, height, DEFAULT.deep * metres)
+    return Field(np.array([x[0, 0], y[0, 0]]), cell, height)
 
 
 def _met(target, points: Array, to_up: Array, factor: float) -> Array:
@@ -96,6 +91,44 @@ def _met(target, points: Array, to_up: Array, factor: float) -> Array:
     distance = np.where(np.array(hit.is_valid()), np.array(hit.t, np.float64) * factor, np.nan)
     distance[np.array(hit.n, np.float64).T @ to_up[2] < -DEFAULT.behind] = 0
     return points[:, 2] - distance
+
+
+def blocks(ground: Field, *, metres: float) -> list[Array]:
+    """Corners [8, 3] of convex blocks whose tops are the field, for things whose longest side is `metres`.
+
+    Large where the ground is plane: a square is halved in both directions until its grid points lie on a plane.
+    """
+    for relaxed in range(8):
+        found: list[Array] = []
+        flat = DEFAULT.flat * metres * 2**relaxed
+        _split(ground, (0, 0, ground.height.shape[0] - 1), flat, DEFAULT.deep * metres, found)
+        if len(found) <= DEFAULT.blocks:
+            break
+    return found
+
+
+def _split(ground: Field, square: tuple[int, int, int], flat: float, depth: float, found: list[Array]) -> None:
+    """Add the blocks of a square (row, column, cells along a side) to those that were found."""
+    row, column, n = square
+    part = ground.height[row : row + n + 1, column : column + n + 1]
+    known = np.isfinite(part)
+    if known.sum() < (4 if n == 1 else 1):
+        return
+    tops = part[[0, 0, -1, -1], [0, -1, 0, -1]]
+    if n > 1:
+        y, x = np.mgrid[: n + 1, : n + 1]
+        system = np.stack([np.ones(x.size), x.ravel(), y.ravel()], -1)
+        plane = np.linalg.lstsq(system, part.ravel(), rcond=None)[0] if known.all() else np.zeros(3)
+        if not known.all() or np.abs(system @ plane - part.ravel()).max() > flat:
+            half = n // 2
+            for r in (row, row + half):
+                for c in (column, column + half):
+                    _split(ground, (r, c, half), flat, depth, found)
+            return
+        tops = np.array([[1, 0, 0], [1, n, 0], [1, 0, n], [1, n, n]]) @ plane
+    x = ground.corner[0] + ground.cell * (column + n * np.array([0, 1, 0, 1]))
+    y = ground.corner[1] + ground.cell * (row + n * np.array([0, 0, 1, 1]))
+    found.append(np.concatenate([np.stack([x, y, z], -1) for z in (tops, np.full(4, tops.min() - depth))]))
 
 
 def depth_in(ground: Field, points: Array) -> float:

@@ -1,25 +1,22 @@
-"""Rigid bodies falling onto a height field (MuJoCo): metres, seconds, z up."""
+"""Rigid bodies falling onto blocks that stay (MuJoCo): metres, seconds, z up."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from materialist.edits.drop.ground import Field
 from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 STEP = 1e-3
-"""Seconds; at 10 m/s a thing moves by a hundredth of a metre, and the ground is deeper than that."""
+"""Seconds; at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper than that."""
 GRAVITY = 9.81
-CONTACT: dict[str, Any] = {
-    "friction": [0.6, 0.01, 0.0005], "condim": 4, "solref": [4e-3, 1.0], "solimp": [0.95, 0.99, 1e-4, 0.5, 2],
-    "margin": 0.0,
-}  # fmt: skip
-"""Sliding, torsional (m) and rolling (m) friction; contacts as stiff as the step allows, without bouncing."""
+STIFF = (4e-3, 1.0)
+"""Time constant and damping ratio of contacts: as stiff as the step allows, and no bouncing."""
+FRICTION = (0.6, 0.01, 0.0005)
+"""Sliding, torsional (m) and rolling (m)."""
 DENSITY = 600.0
 """kg / m^3; wood. Things of one density fall alike."""
 
@@ -48,7 +45,7 @@ class Pose:
     """Kinetic and potential energy of all things, joule; heights count from z = 0."""
 
 
-def fall(things: list[RigidBody], ground: Field | None, *, frames: int, fps: float) -> Iterator[list[Pose]]:
+def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
     """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
 
     Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
@@ -97,7 +94,7 @@ def _diverged(mujoco) -> tuple[int, ...]:
     return int(kinds.mjWARN_BADQPOS), int(kinds.mjWARN_BADQVEL), int(kinds.mjWARN_BADQACC)
 
 
-def _world(mujoco, things: list[RigidBody], ground: Field | None):
+def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.gravity = [0, 0, -GRAVITY]
@@ -106,8 +103,8 @@ def _world(mujoco, things: list[RigidBody], ground: Field | None):
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
         spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    if ground is not None and np.isfinite(ground.height).any():
-        _lay(mujoco, spec, ground)
+    for number, corners in enumerate(ground):
+        _piece(mujoco, spec, spec.worldbody, f"ground{number}", corners)
     for k, thing in enumerate(things):
         body = spec.worldbody.add_body(name=f"thing{k}", pos=[float(v) for v in thing.centre])
         body.add_freejoint()
@@ -116,19 +113,9 @@ def _world(mujoco, things: list[RigidBody], ground: Field | None):
     return spec.compile()
 
 
-def _lay(mujoco, spec, ground: Field) -> None:
-    """The ground; where it is unknown there is a pit, whose floor lies below its bottom."""
-    height = np.where(np.isfinite(ground.height), ground.height, ground.bottom - ground.deep)
-    half = ground.cell * (np.array(height.shape[::-1]) - 1) / 2
-    low, rise = float(height.min()), max(float(np.ptp(height)), 1e-6)
-    spec.add_hfield(
-        name="ground", nrow=height.shape[0], ncol=height.shape[1], size=[*half, rise, ground.deep],
-        userdata=height.ravel().tolist(),
-    )  # fmt: skip
-    place = [*(ground.corner + half), low]
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=place, **CONTACT)
-
-
 def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
     spec.add_mesh(name=name, uservert=np.ascontiguousarray(corners, np.float64).ravel().tolist())
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, density=DENSITY, **CONTACT)
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, friction=list(FRICTION), condim=4, density=DENSITY,
+        solref=list(STIFF), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
+    )  # fmt: skip
