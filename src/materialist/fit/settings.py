@@ -112,7 +112,7 @@ DEFAULT = FitSettings(
         clipped=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
-        chroma=0.2,
+        chroma=0.05,
     ),
     materials=MaterialSettings(
         field="maps",
