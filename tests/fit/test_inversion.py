@@ -114,6 +114,8 @@ def test_mask_unifies_roughness_and_metallic(room):
         assert float(np.ptp(values[mask])) < 1e-6
         assert float(np.ptp(values[~mask])) > 0.05
     assert float(materials.albedo[mask].std(0).max()) > 1e-3
+    first = room.fit(short(DEFAULT, 2), mask=mask, strategy="white-light-first").run()
+    assert [s["name"] for s in first.stages] == ["roughness+metallic", "light", "albedo"]
 
 
 @pytest.mark.parametrize("settings", [PAPER, DEFAULT], ids=["paper", "default"])
@@ -164,7 +166,7 @@ def test_papers_engine_runs_the_same_fit(room):
     )
     fit = Fit(room.photo, room.prior, engine, settings, envmap_height=ENVMAP_HEIGHT)
     state = fit.run()
-    assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "albedo+roughness+metallic"]
+    assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "materials"]
     assert state.stages[0]["loss_last"] < state.stages[0]["loss_first"]
     assert state.envmap.shape == (ENVMAP_HEIGHT, 2 * ENVMAP_HEIGHT, 3)
     assert torch.isfinite(state.maps).all()

@@ -62,21 +62,19 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
             yield from _insertion(sample, stage)
         elif largest is None:
             continue
-        elif kind == "remove":
-            mask = things[largest]
-            items = [one for k, one in enumerate(stage.items) if k != largest]
-            yield Edit(kind, partial(remove, mask=mask), _staged(stage, items), sample.envmap, mask)
-        elif kind == "glass":
-            mask, solid = things[largest], stage.items[largest].solid
-            lifted = replace(solid, vertices=solid.vertices + LIFT * stage.view.to_scene[1])
-            clear = replace(stage.items[largest], solid=lifted, transparent=True)
-            items = [clear if k == largest else one for k, one in enumerate(stage.items)]
-            yield Edit(kind, partial(glass, mask=mask), _staged(stage, items), sample.envmap, mask)
         else:
-            mask = things[largest]
-            values, other = _material(kind, stage.items[largest])
-            items = [other if k == largest else one for k, one in enumerate(stage.items)]
-            yield Edit(kind, partial(edit, mask=mask, **values), _staged(stage, items), sample.envmap, mask)
+            mask, item = things[largest], stage.items[largest]
+            if kind == "remove":
+                change, others = partial(remove, mask=mask), []
+            elif kind == "glass":
+                up = LIFT * stage.view.to_scene[1]
+                lifted = replace(item.solid, vertices=item.solid.vertices + up)
+                change, others = partial(glass, mask=mask), [replace(item, solid=lifted, transparent=True)]
+            else:
+                values, other = _material(kind, item)
+                change, others = partial(edit, mask=mask, **values), [other]
+            items = [*stage.items[:largest], *others, *stage.items[largest + 1 :]]
+            yield Edit(kind, change, _staged(stage, items), sample.envmap, mask)
 
 
 def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:

@@ -209,8 +209,7 @@ def fit(
 
     photo, truth = sample.photo, sample.truth
     named = preset(method.preset)
-    light = named.light
-    light = replace(light, field=method.field or light.field, height=method.height or light.height)
+    light = replace(named.light, field=method.field or named.light.field, height=method.height or named.light.height)
     height = sample.envmap.shape[0]
     surface = truth.depth > 0
     given = truth if method.given else replace(truth, materials=_neutral(truth.materials))

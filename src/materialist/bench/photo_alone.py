@@ -11,7 +11,7 @@ was predicted (the true light replaces the fitted one); `ceiling` is the edit wi
 darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` and `metal` (copper) after one factor on
 the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also in the true `shadow`
 and reflection alone; `glass` is the largest object turned to glass, `remove` the picture without it. sheet.png: photo,
-truth, and the pictures of the rows after `untouched`.
+truth, and the pictures of the rows after `untouched`. An edit that the program refuses has no row.
 """
 
 from __future__ import annotations
@@ -74,43 +74,47 @@ class PhotoAloneBench(Benchmark):
         for scene in range(self.scenes):
             sample, light = unseen_sample(scene, data, self.size)
             scenes = {}
-            for name, fitted, seconds in self._fitted(sample):
+            for name, fitted, cost in self._fitted(sample):
                 scenes[name] = fitted
                 if name == "fitted":
                     yield {"method": "maps: prior", "sample": sample.name, **map_figures(fitted.prior, sample)}
                 yield {
                     "method": f"maps: {name}", "sample": sample.name, **map_figures(maps_of(fitted), sample),
-                    "light": light_error(fitted.envmap, sample.envmap), "seconds": seconds,
-                    "rerender": metrics.psnr(fitted.rerender, sample.photo.linear),
+                    "light": light_error(fitted.envmap, sample.envmap), **cost,
                 }  # fmt: skip
+            before = sample.render(sample.envmap, spp=self.truth_spp, seed=5)
             for edit in edits(sample, light, kinds):
-                for row in self._compared(edit, sample, scenes, report):
+                for row in self._compared(edit, sample, before, scenes, report):
                     yield {**row, "sample": sample.name}
 
-    def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, float]]:
-        """Names of rows, their scenes and seconds."""
+    def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, dict[str, float]]]:
+        """Names of rows, their scenes, and figures of those that are inversions."""
         from materialist import pipeline
 
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        scene, cost = timed(pipeline.invert, sample.photo, predictor=self.predictor, **shared)
-        yield "fitted", scene, cost["seconds"]
+
+        def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
+            found, cost = timed(pipeline.invert, sample.photo, **shared, **how)
+            return found, {**cost, "rerender": metrics.psnr(found.rerender, sample.photo.linear)}
+
+        scene, cost = inverted(predictor=self.predictor)
+        yield "fitted", scene, cost
         if not self.decompose:
             return
         for given in GIVEN:
             if given == "light":
                 scale = best_scale(sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0)
-                yield "+ light", replace(scene, envmap=(sample.envmap / max(scale, 1e-3)).astype(np.float32)), 0.0
+                yield "+ light", replace(scene, envmap=(sample.envmap / max(scale, 1e-3)).astype(np.float32)), {}
             else:
-                prior = with_truth(scene.prior, sample.truth, given)
-                other, cost = timed(pipeline.invert, sample.photo, prior=prior, **shared)
-                yield f"+ {given}", other, cost["seconds"]
-        yield CEILING, true_scene(sample), 0.0
+                yield f"+ {given}", *inverted(prior=with_truth(scene.prior, sample.truth, given))
+        yield CEILING, true_scene(sample), {}
 
-    def _compared(self, edit: Edit, sample: SyntheticSample, scenes: dict[str, Scene], report: Report) -> Iterator[Row]:
-        """Rows of one edit, and its strip of the sheet."""
+    def _compared(
+        self, edit: Edit, sample: SyntheticSample, before: Array, scenes: dict[str, Scene], report: Report
+    ) -> Iterator[Row]:
+        """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
         from materialist.edits.composite.composite import composite
 
-        before = sample.render(sample.envmap, spp=self.truth_spp, seed=5)
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
         inside = edit.region(before, after)
         shown = [sample.photo.linear, after]

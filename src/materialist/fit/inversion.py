@@ -12,13 +12,11 @@ from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, prepared_envmap
 from materialist.fit.light import envmap_field, fit_light, start_radiance
 from materialist.fit.losses import CLIPPED
-from materialist.fit.materials import fit_materials, material_field, remapped
+from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.io.photo import HDR_CLIP
 from materialist.types import Array, Camera, Materials, Photo
-
-MATERIALS = ("albedo", "roughness", "metallic")
 
 
 @dataclass
@@ -54,8 +52,12 @@ class Fit:
         state = FitState(self.prior_maps(), np.ones((self.envmap_height, 2 * self.envmap_height, 3), np.float32))
         if self.strategy == "white-light-first":
             return self._white_light_first(state)
+        settings = self.settings.materials
+        if self.mask is not None:  # what the mask makes one value moves, too
+            last = replace(settings.stages[-1], targets=tuple(COLUMNS))
+            settings = replace(settings, stages=(*settings.stages[:-1], last))
         self._fit_light(state, self.prior)
-        self._fit_materials(state, self.settings.materials)
+        self._fit_materials(state, settings)
         return state
 
     # -- stages --------------------------------------------------------------------------------------------------------
@@ -75,8 +77,6 @@ class Fit:
         problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if self.mask is None else torch.from_numpy(self.mask.reshape(-1)[pixels.numpy()])
-        if inside is not None and len(settings.stages) == 1:  # what the mask makes one value moves, too
-            settings = replace(settings, stages=(replace(settings.stages[0], targets=MATERIALS),))
         model = material_field(held, settings, pixels, self.photo.camera, inside=inside, seed=self.seed)
         results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
         state.stages += [r.summary() for r in results]
@@ -96,17 +96,14 @@ class Fit:
 
     def materials(self, state: FitState) -> Materials:
         """Full-size maps of the state; the prior's values where there is no surface."""
-        return self._as_materials(state.maps)
+        out = _stacked(self.prior)
+        out[self.engine.pixels.numpy()] = state.maps.numpy()
+        out = out.reshape(*self.prior.roughness.shape, 5)
+        return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
 
     def prior_maps(self) -> torch.Tensor:
         """[P, 5] the prior's albedo, roughness and metallic of the surface pixels."""
         return torch.from_numpy(_stacked(self.prior))[self.engine.pixels]
-
-    def _as_materials(self, maps: torch.Tensor) -> Materials:
-        out = _stacked(self.prior)
-        out[self.engine.pixels.numpy()] = maps.numpy()
-        out = out.reshape(*self.prior.roughness.shape, 5)
-        return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
 
     def _photo(self) -> torch.Tensor:
         return torch.from_numpy(np.ascontiguousarray(self.photo.linear.reshape(-1, 3)))

@@ -13,7 +13,7 @@ from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera
 
-_COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
+COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 
 
 def remapped(prior: torch.Tensor) -> torch.Tensor:
@@ -56,11 +56,11 @@ def fit_materials(
     """
     results = []
     for stage in settings.stages:
-        held = {name: field().detach()[:, c] for name, c in _COLUMNS.items() if name not in stage.targets}
+        held = {name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets}
 
         def loss(_: int, held=held) -> torch.Tensor:
             values = field()
-            values = torch.cat([held.get(name, values[:, c]) for name, c in _COLUMNS.items()], 1)
+            values = torch.cat([held.get(name, values[:, c]) for name, c in COLUMNS.items()], 1)
             error = residual(problem.render(values), photo, settings.encoding, clipped=settings.clipped)
             return rendering_loss(error, settings.loss) + consistency(values, prior, settings)
 
@@ -69,9 +69,10 @@ def fit_materials(
             if isinstance(base, MaterialMaps):
                 base.maps.clamp_(0, 1)
 
+        name = "+".join(stage.targets) if held else "materials"
         results.append(
             optimise(
-                "+".join(stage.targets), field.parameters(), loss, stage.schedule, after_step=into_range,
+                name, field.parameters(), loss, stage.schedule, after_step=into_range,
                 progress=progress,
             )
         )  # fmt: skip

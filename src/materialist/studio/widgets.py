@@ -36,7 +36,8 @@ LONG: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "a
 _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
     "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
-    "materials": "Finding the materials", "rerender": "Rendering the result", "save": "Saving", "load": "Loading",
+    "albedo": "Finding the materials", "materials": "Finding the materials", "rerender": "Rendering the result",
+    "save": "Saving", "load": "Loading",
     "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
 }  # fmt: skip
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
