@@ -21,7 +21,7 @@ from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
 
 FORMAT = 1
-CONTENT = 6
+CONTENT = 7
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")

@@ -71,10 +71,10 @@ def uniform(colour: Colour, roughness: float, metallic: float = 0.0, grain: floa
 
 ALL: Range = (0, 1)
 ANY_COLOUR: tuple[Shade, ...] = (
-    (0.3, (0.05, 0.15), (0, 0.12), (0.15, 0.95)), (0.25, (0.03, 0.13), (0.12, 0.6), (0.2, 0.9)),
-    (0.25, ALL, (0.1, 0.5), (0.2, 0.9)), (0.2, ALL, (0.5, 0.97), (0.25, 0.95)),
+    (0.4, (0.05, 0.15), (0, 0.12), (0.1, 0.95)), (0.3, (0.03, 0.13), (0.12, 0.6), (0.15, 0.9)),
+    (0.2, ALL, (0.05, 0.4), (0.15, 0.9)), (0.1, ALL, (0.4, 0.97), (0.2, 0.95)),
 )  # fmt: skip
-"""Greys and beiges often, saturated colours often enough, dark to light."""
+"""Greys and browns mostly, as in photographs; saturated colours often enough, dark to light."""
 PALE: Shade = (0.8, (0.05, 0.15), (0, 0.15), (0.5, 0.97))
 
 
@@ -147,19 +147,20 @@ MORTAR: tuple[Shade, ...] = ((1, (0.1, 0.1), (0, 0.15), (0.25, 0.85)),)
 
 wall_paint = Finish(
     "plain plain plain cloudy",
-    ((0.4, (0.05, 0.17), (0, 0.18), (0.7, 0.97)), (0.4, ALL, (0, 0.18), (0.7, 0.97)),
-     (0.2, ALL, (0.15, 0.65), (0.25, 0.85))),
+    ((0.5, (0.05, 0.17), (0, 0.18), (0.6, 0.97)), (0.35, ALL, (0, 0.18), (0.6, 0.97)),
+     (0.15, ALL, (0.1, 0.5), (0.25, 0.85))),
     (1, 0.85, 1.05), (1, 0.6, 0.95), (0, 0.12), ((1, 0.45, 0.95),), (0.1, 0.1), (0.8, 3),
 )  # fmt: skip
 wallpaper = Finish(
-    "ornament ornament ornament stripes stripes spots plaid", ((1, ALL, (0.02, 0.5), (0.4, 0.95)),), (0.7, 0.5, 0.95),
+    "ornament ornament ornament stripes stripes spots plaid",
+    ((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))), (0.7, 0.5, 0.95),
     rougher=(0.2, 0.2), repeat=(0.4, 1.5),
 )  # fmt: skip
 lacquer = Finish("plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),))
 """Of any colour, dull or shiny."""
 skin = replace(lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),))
 white_paint = replace(lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),))
-plastic = replace(lacquer, base=(*ANY_COLOUR, (1, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT)
+plastic = replace(lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT)
 raw_wood = Finish(
     "wood", TIMBER, (1, 0.35, 0.75), (1, 0.15, 0.4), (0.1, 0.5), ((1, 0.4, 0.8),), (0.2, 0.2), (0.5, 1.4), (1, 2)
 )
