@@ -100,7 +100,7 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
     ("options", "said"),
     [
         ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "seed is -1"),
-        ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "at least 1"),
+        ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "workers is 0; it must lie"),
         ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
     ],
 )  # fmt: skip

@@ -14,10 +14,11 @@ from typing import Any
 from materialist import __version__, errors
 from materialist.batches.edits import missing_files
 from materialist.batches.ledger import Ledger, open_ledger
+from materialist.batches.options import BatchOptions
 from materialist.batches.outcome import Outcome, Row, Status, write_page, write_summary
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
-from materialist.batches.task import INVERSION, SINGLE_THREAD, PhotoTask, process
+from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
 from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
 from materialist.jobs.pool import LocalPool, RayPool
@@ -36,38 +37,6 @@ class BatchSettings:
 
 
 SETTINGS = BatchSettings()
-
-
-@dataclass(frozen=True, kw_only=True)
-class BatchOptions:
-    """How a batch runs, beside the options of its inversions."""
-
-    apply: str | Path | None = None
-    """A list of edits (docs/editing.md); `{name}` in its file names stands for the photo's name."""
-    spp: int | None = None
-    """Paths per pixel of the edit's renderings; None: those of `composite`."""
-    workers: int | None = None
-    """Worker processes; None: one a GPU, else one a processor as far as memory reaches."""
-    ray: str | None = None
-    """Address of a Ray cluster instead, or `local`."""
-    resume: bool = False
-    """Go on with the batch in RUNS: finished photos are kept, all others redone."""
-    force: bool = False
-    """Replace an earlier batch in RUNS, or with `resume` go on although the options are others."""
-    function: str = INVERSION
-    """The inversion, as module:function."""
-
-    def __post_init__(self) -> None:
-        """Raises InputError."""
-        if self.apply is not None and self.spp is not None and not 2 <= self.spp <= 1_000_000:
-            raise InputError(f"spp is a number of paths from 2 to 1000000, not {self.spp}.")
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"The number of workers is {self.workers}; give at least 1.")
-
-    @property
-    def recipe(self) -> Path | None:
-        """The list of edits as a path."""
-        return None if self.apply is None else Path(self.apply).resolve()
 
 
 def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Any) -> Outcome:

@@ -16,6 +16,7 @@ import numpy as np
 
 from materialist.batches import results
 from materialist.batches.edits import edits_for, edits_key
+from materialist.batches.options import INVERSION
 from materialist.batches.remote import fingerprint, is_url, local_copy
 from materialist.batches.results import file_hash, package_hash, package_size
 from materialist.color import srgb_levels
@@ -24,8 +25,6 @@ from materialist.io.atomic import ensure_writable
 from materialist.io.display import encoded
 from materialist.types import Array, Scene
 
-INVERSION = "materialist.pipeline:invert"
-"""The function that a worker calls on a photo, as module:function."""
 SINGLE_THREAD = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OIDN_NUM_THREADS"), "1"),
     "OIDN_SET_AFFINITY": "0",

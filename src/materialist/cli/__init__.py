@@ -7,18 +7,26 @@ import sys
 import typer
 
 from materialist.cli import batch, bench, edits, films, scenes, setup, studio, train
+from materialist.cli.generate import add_command, group
 from materialist.cli.outcome import run_to_exit_code
 
-app = typer.Typer(
-    name="materialist",
-    help="Physically based editing of a single photograph, by inverse rendering.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-for module in (scenes, setup, bench, train, edits, films, batch, studio):
-    module.register(app)
+ABOUT = "Physically based editing of a single photograph, by inverse rendering."
+MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
+FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
+app = group("materialist", ABOUT)
+for command in (scenes.invert, scenes.render, scenes.export, setup.doctor):
+    add_command(app, command)
+models = group("models", MODELS, app)
+for name, command in (("list", setup.list_models), ("download", setup.download_model), ("verify", setup.verify_model)):
+    add_command(models, command, name)
+add_command(app, bench.bench, context_settings=FREE)
+trainers = group("train", "Make training data, and train the networks that predict materials.", app)
+for command in (train.data, train.matnet, train.refraction, train.clicks):
+    add_command(trainers, command)
+for command in (edits.select, edits.edit, edits.glass, edits.remove, edits.insert, edits.apply):
+    add_command(app, command)
+for command in (films.relight, films.drop, batch.batch, studio.studio):
+    add_command(app, command)
 
 
 def _show_version(wanted: bool) -> None:
@@ -29,11 +37,10 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(help=ABOUT)
 def _root(
     version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
-) -> None:
-    """Physically based editing of a single photograph, by inverse rendering."""
+) -> None: ...
 
 
 def main() -> None:

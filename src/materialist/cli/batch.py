@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from materialist.cli.generate import add_command
+from materialist.batches.options import BatchOptions
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
@@ -17,36 +17,17 @@ if TYPE_CHECKING:
     from materialist.batches.outcome import Outcome, Status
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    add_command(app, batch)
-
-
 def batch(
     source: Annotated[
         str,
         typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
     ],
     output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
+    how: BatchOptions,
     computing: Computing,
-    apply: Annotated[
-        Path | None,
-        typer.Option(metavar="EDITS", help="Edits for every photo; {name} in a mask's file name is the photo's."),
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option(help="Worker processes; else one a GPU, or one a processor as far as memory reaches.")
-    ] = None,
-    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster, or local.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the batch in RUNS.")] = False,
     predictor: Annotated[str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")] = "auto",
     fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
     size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
-    spp: Annotated[
-        int | None, typer.Option(help="Paths per pixel of the edits; else 256 for glass and other light, 128.")
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Begin an earlier batch in RUNS anew; with --resume, under other options.")
-    ] = False,
 ) -> None:
     """Invert many photos, and apply a list of edits to each. Exit code 0: all done; 2: some failed, with reasons."""
     from materialist.batches.run import batch as run
@@ -54,9 +35,8 @@ def batch(
     try:
         with StageProgress(quiet=computing.as_json) as bars:
             outcome = run(
-                source, output, apply=apply, workers=workers, ray=ray, resume=resume, force=force,
-                predictor=predictor, size=size, fov=fov, seed=computing.seed, device=computing.device, spp=spp,
-                progress=lambda status: _told(bars, status, computing.as_json),
+                source, output, **vars(how), predictor=predictor, size=size, fov=fov, seed=computing.seed,
+                device=computing.device, progress=lambda status: _told(bars, status, computing.as_json),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None

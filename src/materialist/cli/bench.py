@@ -7,16 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.generate import add_command
 from materialist.cli.options import Run, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    settings = {"allow_extra_args": True, "ignore_unknown_options": True}
-    add_command(app, bench, context_settings=settings)
 
 
 def bench(

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.generate import add_command
 from materialist.cli.options import PictureOutput, Region, Rendering, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.picture import check_before, chosen_region, flag_numbers, opened, write_result
@@ -15,12 +14,6 @@ from materialist.errors import InputError
 from materialist.options import Glass, Insertion, MaterialEdit, Removal
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    for command in (select, edit, glass, remove, insert, apply):
-        add_command(app, command)
 
 
 def select(

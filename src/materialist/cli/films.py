@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from materialist.cli.edits import MESH_FILES
-from materialist.cli.generate import add_command
 from materialist.cli.options import FramesPerSecond, Place, Rendering, Run, SceneArgument, output_option
-from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_before, chosen_region, flag_numbers, write_result
-from materialist.cli.progress import StageProgress
+from materialist.cli.picture import check_before, chosen_region, flag_numbers, write_film, write_result
 from materialist.errors import InputError
 from materialist.options import Drop, Relight
 
 FPS = 24
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    add_command(app, relight)
-    add_command(app, drop)
 
 
 def relight(
@@ -73,7 +62,7 @@ def relight(
         from materialist.edits.light.relight import moving_light
 
         film = moving_light(loaded, frames, wanted, suns=tuple(suns))
-        _write_film("relight", loaded, film, output, rendering, run, frames=frames, fps=fps)
+        write_film("relight", loaded, film, output, rendering, run, frames=frames, fps=fps)
         return
     from materialist.edits.light.relight import relight as change
 
@@ -104,45 +93,4 @@ def drop(
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = load_scene(scene)
     film = simulate(loaded, models, places, options, frames=frames, fps=fps)
-    _write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)
-
-
-def _write_film(
-    command: str, loaded: Any, film: Iterable[Any], output: Path, rendering: Rendering, run: Run, *, frames: int,
-    fps: int,
-) -> None:  # fmt: skip
-    """Render and write a film, one scene in memory at a time; save the last scene where asked; report."""
-    from materialist.edits.composite.composite import developed, pictures
-    from materialist.edits.core.notes import warnings_since
-    from materialist.io.package import save_scene
-    from materialist.io.video import write_frames
-
-    start, save, last = time.monotonic(), rendering.save, loaded
-    picture: Any = None
-
-    def scenes() -> Iterator[Any]:
-        nonlocal last
-        for frame in film:
-            last = frame
-            yield frame
-
-    def taken(progress: Any) -> Iterator[Any]:
-        nonlocal picture
-        for made in pictures(
-            loaded, scenes(), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
-            full_render=rendering.full_render, progress=progress, count=frames,
-        ):  # fmt: skip
-            picture = made
-            yield made
-
-    with StageProgress(quiet=run.as_json) as progress:
-        write_frames(output, taken(progress), fps=fps, force=run.force)
-    if save is not None:
-        save_scene(developed(loaded, last, picture, seed=run.seed, device=run.device), save, force=run.force)
-    warnings = warnings_since(loaded, last)
-    lines = [*(f"Note: {note}" for note in warnings), f"Look at {output}"]
-    lines += [f"The edited scene is {save}"] if save is not None else []
-    report_success(
-        command, run.as_json, lines, video=str(output), warnings=warnings, frames=frames, fps=fps,
-        scene=str(save) if save else None, edits=last.provenance.get("edits", []), seconds=time.monotonic() - start,
-    )  # fmt: skip
+    write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)

@@ -17,6 +17,17 @@ TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": 
 """Kind of an option -> type of its flag; texts for the others."""
 
 
+def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
+    """A group of commands, of `app` where one is given."""
+    made = typer.Typer(
+        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )  # fmt: skip
+    if app is not None:
+        app.add_typer(made)
+    return made
+
+
 def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", **settings: Any) -> None:
     """Register a function as the command of its name, its parameters of options classes spelled out as flags.
 

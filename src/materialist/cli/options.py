@@ -96,9 +96,18 @@ class Training(Computing):
 
 @dataclass(frozen=True, kw_only=True)
 class Learning(OperationOptions):
-    """How a network learns."""
+    """How a network learns, where that differs from its recipe."""
 
-    batch: int = option(16, "Samples a step.", kind="whole")
-    rate: float = option(1.5e-3, "Peak learning rate.")
-    bfloat16: bool = option(False, "Half as long on processors that have it.", kind="switch")
-    init: Path | None = option(None, "Weights of an earlier run to begin from.", kind="file")
+    batch: int | None = option(None, "Samples a step; default: the recipe's.", kind="whole")
+    side: int | None = option(
+        None, "Side of all crops, pixels; default: the recipe's, small ones first.", kind="whole", flag="--size")
+    rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
+    bfloat16: bool | None = option(
+        None, "Half as long on processors that have it; default: the recipe's.", kind="switch",
+        flag="--bfloat16/--no-bfloat16")
+    init: Path | None = option(
+        None, "Weights to begin from: those of a run; matnet --config paper: Depth Anything or DINOv2.", kind="file")
+
+    def recipe(self, usual: Any) -> Any:
+        """The recipe `usual` with what was given."""
+        return usual.changed(batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,27 +77,59 @@ def write_result(
     command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
     """Render, composite, write, report."""
-    from materialist.edits.composite.composite import composite, developed
+    from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
-    from materialist.edits.core.notes import warnings_since
     from materialist.edits.core.renderer import paths_for
-    from materialist.io.package import save_scene
 
-    start, save = time.monotonic(), rendering.save
-    spp = rendering.spp or paths_for(scene, edited)
+    start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)
     with StageProgress(quiet=run.as_json) as progress:
         picture = composite(
             scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
             denoise=rendering.denoise, device=run.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=run.force)
+    told = {"image": str(output), "spp": spp, "seconds": time.monotonic() - start}
+    finish(command, scene, edited, picture, rendering, run, [*lines, f"Look at {output}"], told)
+
+
+def write_film(
+    command: str, scene: Any, film: Iterable[Any], output: Path, rendering: Rendering, run: Run, *, frames: int,
+    fps: int,
+) -> None:  # fmt: skip
+    """Render and write a film, one scene in memory at a time; report."""
+    from materialist.edits.composite.composite import pictures
+    from materialist.io.video import write_frames
+
+    start, last = time.monotonic(), {"scene": scene}
+
+    def kept(name: str, items: Iterable[Any]) -> Iterator[Any]:
+        for item in items:
+            last[name] = item
+            yield item
+
+    with StageProgress(quiet=run.as_json) as progress:
+        made = pictures(
+            scene, kept("scene", film), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
+            full_render=rendering.full_render, progress=progress, count=frames,
+        )  # fmt: skip
+        write_frames(output, kept("picture", made), fps=fps, force=run.force)
+    told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}
+    finish(command, scene, last["scene"], last["picture"], rendering, run, [f"Look at {output}"], told)
+
+
+def finish(
+    command: str, scene: Any, edited: Any, picture: Any, rendering: Rendering, run: Run, lines: list[str],
+    told: dict[str, Any],
+) -> None:  # fmt: skip
+    """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
+    from materialist.edits.composite.composite import developed
+    from materialist.edits.core.notes import warnings_since
+    from materialist.io.package import save_scene
+
+    save, warnings = rendering.save, warnings_since(scene, edited)
+    lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
-    warnings = warnings_since(scene, edited)
-    shown = [*lines, *(f"Note: {note}" for note in warnings), f"Look at {output}"]
-    if save is not None:
-        shown.append(f"The edited scene is {save}")
-    report_success(
-        command, run.as_json, shown, image=str(output), scene=str(save) if save else None, spp=spp,
-        seconds=time.monotonic() - start, edits=edited.provenance.get("edits", []), warnings=warnings,
-    )  # fmt: skip
+        lines.append(f"The edited scene is {save}")
+    told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
+    report_success(command, run.as_json, lines, **told)

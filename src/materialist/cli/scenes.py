@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.generate import add_command
 from materialist.cli.options import Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
@@ -25,12 +24,6 @@ class Format(StrEnum):
     usd = "usd"
     mitsuba = "mitsuba"
     html = "html"
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    for command in (invert, render, export):
-        add_command(app, command)
 
 
 def invert(

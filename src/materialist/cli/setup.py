@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from materialist.cli.generate import add_command
 from materialist.cli.options import Computing, Json
 from materialist.cli.outcome import BAD_INPUT, report_success
 from materialist.errors import InputError, WeightsError
@@ -17,19 +15,6 @@ if TYPE_CHECKING:
     from materialist.doctor import Finding
 
 _MARK = {"ok": ("ok", "green"), "missing": ("--", "yellow"), "broken": ("NO", "red")}
-models = typer.Typer(
-    name="models",
-    help="List, download and verify networks from a model hub; no other command ever downloads.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    add_command(app, doctor)
-    app.add_typer(models)
 
 
 def doctor(computing: Computing) -> None:
@@ -43,11 +28,8 @@ def doctor(computing: Computing) -> None:
     verdict = (
         "The main job cannot run yet; run the commands above." if broken else "Ready: materialist invert PHOTO -o SCENE"
     )
-    if as_json and broken:
-        content = {"ok": False, "command": "doctor", "findings": [vars(f) for f in findings], "exit_code": BAD_INPUT}
-        typer.echo(json.dumps(content))
-    else:
-        report_success("doctor", as_json, [verdict], findings=[vars(finding) for finding in findings])
+    found = [vars(finding) for finding in findings]
+    report_success("doctor", as_json, [verdict], ok=not broken, findings=found, exit_code=BAD_INPUT if broken else 0)
     if broken:
         raise typer.Exit(BAD_INPUT)
 
@@ -65,16 +47,11 @@ def _show(findings: list[Finding]) -> None:
             console.print(Text.assemble(" " * 26, ("mend with: ", "dim"), (finding.remedy, "bold")))
 
 
-@models.command("list")
 def list_models(as_json: Json = False) -> None:
     """Say which models there are, what they are for, and which are on this machine."""
     from materialist.predict.models import KNOWN, folder_of, is_complete, models_folder
 
-    found = [
-        {"name": m.name, "repo": m.repo, "purpose": m.purpose, "licence": m.licence, "megabytes": m.megabytes,
-         "here": is_complete(m), "folder": str(folder_of(m))}
-        for m in KNOWN
-    ]  # fmt: skip
+    found = [{**vars(m), "here": is_complete(m), "folder": str(folder_of(m))} for m in KNOWN]
     lines = [
         f"{'here' if m['here'] else '-':<5}{m['name']:<21}{m['megabytes']:>5} MB  {m['purpose']} "
         f"({m['repo']}; licence: {m['licence']})"
@@ -83,7 +60,6 @@ def list_models(as_json: Json = False) -> None:
     report_success("models list", as_json, [*lines, f"Folder: {models_folder()}"], models=found)
 
 
-@models.command("download")
 def download_model(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A name of the list, or a hub id as owner/name.")],
     force: Annotated[bool, typer.Option("--force", help="Fetch every file again.")] = False,
@@ -106,7 +82,6 @@ def download_model(
     )
 
 
-@models.command("verify")
 def verify_model(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Models; all that are here when none is named.")

@@ -7,14 +7,8 @@ from typing import Annotated
 
 import typer
 
-from materialist.cli.generate import add_command
 from materialist.cli.options import Computing
 from materialist.cli.outcome import report_success
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    add_command(app, studio)
 
 
 def studio(

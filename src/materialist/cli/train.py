@@ -9,41 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from materialist.cli import train_data
-from materialist.cli.generate import add_command
-from materialist.cli.options import Learning, Training, output_option
+from materialist.cli.options import Computing, Learning, Training, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import StageProgress
 from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
+from materialist.procedural.options import DataSetOptions
 
 if TYPE_CHECKING:
     from materialist.train.trainer import Progress
-
-train = typer.Typer(
-    name="train",
-    help="Make training data, and train the networks that predict materials.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
 
 
 # fmt: off
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecipeChanges(OperationOptions):
-    """What differs from the recipe of the network."""
+class MapsLearning(Learning):
+    """How a network of all maps learns."""
 
     config: str = option(
         "bundled", "The network that ships, or the paper's.", kind="word", choices=("bundled", "paper"))
-    batch: int | None = option(None, "Pictures a step; default: the recipe's.", kind="whole")
-    size: int | None = option(
-        None, "Side of all crops, pixels; default: the recipe's, small ones first.", kind="whole")
-    rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
-    init: Path | None = option(
-        None, "Weights to begin from; bundled: those of a run, paper: Depth Anything or DINOv2.", kind="file")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,13 +45,36 @@ class Views(OperationOptions):
 # fmt: on
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command group."""
-    train_data.register(train)
-    add_command(train, matnet)
-    add_command(train, refraction)
-    add_command(train, clicks)
-    app.add_typer(train)
+def data(
+    output: Annotated[Path, output_option("DIR", "Folder of the data set.")],
+    wanted: DataSetOptions,
+    computing: Computing,
+    count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
+    workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False,
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="With --sheet: replace PNG when it exists.")] = False,
+) -> None:
+    """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
+    if sheet is not None:
+        from materialist.io.image import ensure_image_writable
+        from materialist.procedural.dataset import write_data_sheet
+
+        ensure_image_writable(sheet, force=force)
+        shown = write_data_sheet(output, sheet, seed=computing.seed)
+        report_success("train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
+        return
+    from materialist.procedural.dataset import produce
+
+    with StageProgress(quiet=computing.as_json) as progress:
+        made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
+    lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
+    report_success(
+        "train data", computing.as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,
+        seconds=made.seconds,
+    )  # fmt: skip
 
 
 def matnet(
@@ -77,7 +85,7 @@ def matnet(
         ),
     ],
     output: Annotated[Path, output_option("RUN", "Folder of the run.")],
-    recipe: RecipeChanges,
+    learning: MapsLearning,
     training: Training = Training(every=300),  # noqa: B008
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
     workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
@@ -90,17 +98,17 @@ def matnet(
     make: Any
     make, base = {
         "bundled": (bundled.BundledTask, bundled.RECIPE), "paper": (paper.PaperTask, paper.RECIPE)
-    }[recipe.config]  # fmt: skip
-    chosen = base.changed(batch=recipe.batch, side=recipe.size, rate=recipe.rate)
-    task = lambda begin, _: make(open_sources(data), chosen, init=begin, score_samples=score_samples)  # noqa: E731
-    _train("matnet", task, output, training, init=recipe.init, workers=workers)
+    }[learning.config]  # fmt: skip
+    recipe = learning.recipe(base)
+    task = lambda begin, _: make(open_sources(data), recipe, init=begin, score_samples=score_samples)  # noqa: E731
+    _train("matnet", task, output, training, init=learning.init, workers=workers)
 
 
 def refraction(
     output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
     views: Views,
     training: Training,
-    learning: Learning = Learning(batch=32, rate=2e-3),  # noqa: B008
+    learning: Learning,
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
     from materialist.predict.refraction.network import RefractionNet
@@ -113,7 +121,7 @@ def refraction(
         aside: ViewPlan(views.heldout, min(views.views, 8), "heldout", training.seed),
         lessons: ViewPlan(views.shapes, views.views, "train", training.seed),
     }
-    recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
+    recipe = learning.recipe(RECIPE)
 
     def task(begin: Path | None, progress: Progress) -> Any:
         if begin is not None:
@@ -134,7 +142,7 @@ def clicks(
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
     from materialist.train.clicks import RECIPE, ClickTask, produce_views
 
-    recipe = RECIPE.changed(batch=learning.batch, rate=learning.rate, bfloat16=learning.bfloat16)
+    recipe = learning.recipe(RECIPE)
 
     def task(begin: Path | None, progress: Progress) -> Any:
         produce_views(data, output / "views", progress)

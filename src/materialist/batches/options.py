@@ -1,0 +1,41 @@
+"""How a batch runs: options of `materialist batch`; nothing slow is imported here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from materialist.option_kinds import OperationOptions, option
+
+INVERSION = "materialist.pipeline:invert"
+"""The function that a worker calls on a photo, as module:function."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchOptions(OperationOptions):
+    """How a batch runs, beside the options of its inversions."""
+
+    operation = "The batch"
+
+    apply: str | Path | None = option(
+        None, "Edits for every photo; {name} in a mask's file name is the photo's.", kind="file", metavar="EDITS"
+    )
+    spp: int | None = option(
+        None, "Paths per pixel of the edits; else 256 for glass and other light, 128.", kind="whole", low=2,
+        high=1_000_000, called="number of paths (spp)",
+    )  # fmt: skip
+    workers: int | None = option(
+        None, "Worker processes; else one a GPU, or one a processor as far as memory reaches.", kind="whole", low=1, high=1024,
+        called="number of workers",
+    )  # fmt: skip
+    ray: str | None = option(None, "A Ray cluster instead, or local.", kind="name", metavar="ADDRESS")
+    resume: bool = option(False, "Go on with the batch in RUNS: finished photos are kept.", kind="switch")
+    force: bool = option(
+        False, "Begin an earlier batch in RUNS anew; with --resume, under other options.", kind="switch"
+    )
+    function: str = option(INVERSION, "The inversion, as module:function.", kind="name", flag=None)
+
+    @property
+    def recipe(self) -> Path | None:
+        """The list of edits as a path."""
+        return None if self.apply is None else Path(self.apply).resolve()
