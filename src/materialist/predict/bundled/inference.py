@@ -26,7 +26,7 @@ _MIRROR = np.array([-1, 1, 1], np.float32)
 class InferenceSettings:
     """How the network sees a photo and how its answers become a prior."""
 
-    sides: tuple[int, ...] = (192, 384)  # longest sides, pixels: the whole, and details; tuned on 2 photos
+    sides: tuple[int, ...] = (192, 384)  # longest sides, pixels, of large photos and small: whole, details; 16 pictures
     edge_side: int = 768  # longest side at which edges are sought in the photo, pixels; by eye
     edge_reach: float = 0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
     median_depth: float = 3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
@@ -74,7 +74,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     rays: [H, W, 2] x and y of the photo's rays at z = -1.
     """
     size = linear.shape[:2]
-    middle = _network_size(size, SETTINGS.edge_side)
+    middle = _network_size(size, min(SETTINGS.edge_side, max(size)))
     photo = linear_to_srgb(resample.values(linear, middle))
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = GuidedFilter(photo, radius=reach)
@@ -131,8 +131,8 @@ def _linear(values: Array, more: int) -> Array:
 
 
 def _network_size(size: tuple[int, int], side: int) -> tuple[int, int]:
-    """The size (height, width) that the network sees of a photo of this size."""
-    factor = min(1.0, side / max(size))
+    """A photo's size (height, width) with that longest side."""
+    factor = side / max(size)
     return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
 
 
