@@ -21,11 +21,13 @@ def running(tmp_path_factory):
 
 @pytest.fixture
 def page(browser):
-    """A fresh page (a new person's browser) that notes its requests and the errors in it."""
+    """A fresh page (a new person's browser) that notes its requests and the errors in it, refused content too."""
     context = browser.new_context(viewport={"width": 1280, "height": 1000}, accept_downloads=True)
     made = context.new_page()
     made.requested, made.errors = [], []
     made.on("request", lambda request: made.requested.append(request.url))
+    refused = lambda words: made.errors.append(words) if "Content Security Policy" in words else None  # noqa: E731
+    made.on("console", lambda message: refused(message.text))
     made.on("pageerror", lambda error: made.errors.append(str(error)))
     made.set_default_timeout(40_000)
     yield made

@@ -1,13 +1,15 @@
 """Who a page belongs to, and what the server refuses."""
 
+import os
 import socket
+import time
 
 import pytest
 
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import widgets
+from materialist.studio import SETTINGS, widgets
 from materialist.studio.server import check_host, new_studio
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
@@ -21,7 +23,7 @@ def shared(tmp_path):
 
 
 def test_people_are_kept_apart(shared):
-    anna, bert = "a" * 16, "b" * 16
+    anna, bert = "a" * 32, "b" * 32
     project = shared.work.new("Anna's", anna)
     (project.scene).mkdir()
     session = shared.session("page", shared.person(bert))
@@ -30,18 +32,16 @@ def test_people_are_kept_apart(shared):
     assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
     with pytest.raises(InputError, match="no longer"):
         shared.open(session, project.name)
-    with pytest.raises(InputError, match="reload"):
-        shared.session("unknown page")
-    with pytest.raises(InputError, match="reload"):
-        shared.session(None)
-    assert shared.session("page") is session
+    for page, person in ((None, bert), ("page", anna)):
+        with pytest.raises(InputError, match="reload"):
+            shared.session(page, person)
+    assert shared.session("page", bert) is session
     shared.leave("page")
     shared.leave("page")
-    with pytest.raises(InputError, match="reload"):
-        shared.session("page")
+    assert shared.session("page", bert) is not session
 
 
-@pytest.mark.parametrize("token", [None, "", "../../x", "A" * 20, "a" * 40, 5])
+@pytest.mark.parametrize("token", [None, "", "../../x", "A" * 32, "a" * 40, 5])
 def test_tokens_are_checked(shared, token):
     with pytest.raises(InputError):
         shared.person(token)
@@ -85,7 +85,7 @@ def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
 
 
 def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
-    session = shared.session("page", shared.person("a" * 16))
+    session = shared.session("page", shared.person("a" * 32))
     jobs = {kind: Job(kind, session.person, tmp_path, print) for kind in ("final", "take", "invert", "mesh")}
     for job in jobs.values():
         session.note_job(job)
@@ -100,3 +100,31 @@ def test_the_end_of_a_job_is_said_and_cannot_carry_html(tmp_path):
     assert "<script>" not in widgets.shown(queue, job) and 'role="alert"' in widgets.shown(queue, job)
     assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
     queue.close()
+
+
+def test_one_person_cannot_fill_the_queue(shared, tmp_path):
+    session = shared.session("page", "a" * 32)
+    slow = lambda: shared.submit(session, time.sleep, tmp_path)  # noqa: E731
+    for _ in range(SETTINGS.jobs_a_person):
+        slow()
+    with pytest.raises(InputError, match="6 jobs waiting or running"):
+        slow()
+    assert shared.submit(shared.session("other", "b" * 32), time.sleep, tmp_path)
+
+
+def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
+    folders = {}
+    for name in ("old", "fresh", "busy", "elsewhere", "ready", "edited"):
+        place = shared.work.root / "x.scene" if name == "elsewhere" else None
+        project = shared.work.new(name, "a" * 32, scene=place)
+        folders[name] = project.folder
+        if name == "ready":
+            project.scene.mkdir()
+            (project.scene / "scene.json").touch()
+        if name == "edited":
+            project.workspace("me")
+        if name != "fresh":
+            os.utime(project.folder, (0, 0))
+    shared.jobs._jobs = [Job("invert", "a" * 32, folders["busy"], print)]
+    shared.sweep()
+    assert [name for name, folder in folders.items() if not folder.exists()] == ["old"]

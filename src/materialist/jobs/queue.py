@@ -81,10 +81,10 @@ class JobQueue:
             waiting = [j for j in self._jobs if not j.over]
         return waiting.index(job) if job.state == QUEUED and job in waiting else 0
 
-    def unfinished(self, owner: str, kind: str) -> list[Job]:
-        """The jobs of a person and a kind that wait or run."""
+    def unfinished(self, owner: str | None = None, kind: str | None = None) -> list[Job]:
+        """The jobs that wait or run: all, or those of a person, or of a kind."""
         with self._lock:
-            return [j for j in self._jobs if j.owner == owner and j.kind == kind and not j.over]
+            return [j for j in self._jobs if owner in (None, j.owner) and kind in (None, j.kind) and not j.over]
 
     def stop(self, job: Job) -> None:
         """End a job, in the queue or in the middle; nothing half-written stays."""

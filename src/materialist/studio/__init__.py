@@ -7,6 +7,8 @@ A page (`page`, `tab_*`) turns clicks into calls of a `session.Session`; what ta
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
 
 @dataclass(frozen=True)
@@ -15,7 +17,16 @@ class StudioSettings:
 
     upload_megabytes: float = 60  # largest upload
     upload_pixels: int = 60_000_000  # largest picture, from its header
+    upload_quota: int = 1_000_000_000  # bytes that a person may upload in an hour
+    disk_left: int = 2_000_000_000  # bytes that uploads leave free
     unpacked_bytes: int = 1_500_000_000  # largest zip once unpacked
+    decoded_bytes: int = 1_000_000_000  # largest zipped scene in memory, from the headers of its files
+    jobs_a_person: int = 6  # that wait or run
+    jobs: int = 60  # of all
+    wrong_passwords: int = 20  # a minute, of all who try
+    person_seconds: int = 31_536_000  # a browser stays the same person: a year
+    page_seconds: float = 60.0  # a page that never showed that it is open is forgotten after its last request
+    unfinished_seconds: float = 86_400.0  # the folder of a photo that was not taken apart to the end goes
     free_for_scene: float = 1.2e9  # bytes of memory that must be free before another scene is opened
     free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced
     glass_idle: float = 900.0  # seconds without a request after which the glass process ends
@@ -35,3 +46,9 @@ class StudioSettings:
 
 
 SETTINGS = StudioSettings()
+
+
+@cache
+def asset(name: str) -> str:
+    """The text of a file in assets."""
+    return (files("materialist.studio") / "assets" / name).read_text("utf-8")

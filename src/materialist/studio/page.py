@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import gradio as gr
@@ -12,6 +10,7 @@ import gradio as gr
 from materialist.errors import InputError
 from materialist.studio import (
     SETTINGS,
+    asset,
     objects,
     tab_light,
     tab_look,
@@ -37,7 +36,6 @@ def build(studio: Studio) -> Any:
     context = PageContext(studio)
     parts = context.parts
     with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
-        parts["token"] = gr.BrowserState("", storage_key="materialist-person", secret="page")
         # A new studio has another key, so what it was started on is shown first.
         key = f"materialist-last-{secrets.token_hex(4)}"
         parts["last"] = gr.BrowserState("", storage_key=key, secret="page")
@@ -57,18 +55,7 @@ def build(studio: Studio) -> Any:
         for tab in (tab_material, tab_light, tab_object, tab_look, tab_take):
             tab.wire(context)
         tab_open.wire(context, page)
-
-        def leave(request: gr.Request) -> None:
-            studio.leave(request.session_hash)
-
-        page.unload(leave)
     return page
-
-
-@cache
-def asset(name: str) -> str:
-    """The text of a file in assets."""
-    return (files("materialist.studio") / "assets" / name).read_text("utf-8")
 
 
 def _left(parts: dict[str, Any]) -> None:

@@ -1,43 +1,57 @@
-"""Start and stop of the studio, and the requests that it refuses."""
+"""Start and stop of the studio."""
 
 from __future__ import annotations
 
-import hmac
 import ipaddress
 import os
+import re
 import shutil
 import socket
 import sys
 import threading
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from materialist.errors import InputError, SetupError
 from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
-from materialist.studio import SETTINGS, uploads
+from materialist.studio import SETTINGS, asset, uploads
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import Project, WorkFolder
 
-LOCAL = ("localhost", "127.0.0.1", "::1")
-"""Names of this machine."""
-Application = Callable[[Any, Any, Any], Awaitable[None]]
 
-
-def check_host(host: str, password: str | None, everyone: bool) -> bool:
+def check_host(host: str, password: str | None, everyone: bool, proxy: str | None = None) -> bool:
     """Whether `host` means this machine only. Raises InputError where others could come in unasked."""
+    if proxy is not None and not re.fullmatch(r"([\w.-]+|\[[\da-fA-F:]+\])(:\d+)?", proxy):
+        raise InputError(f"--behind-proxy takes the HOST or HOST:PORT that people ask for, not {proxy!r}.")
     try:
-        local = host == "localhost" or ipaddress.ip_address(host).is_loopback
+        local = proxy is None and (host == "localhost" or ipaddress.ip_address(host).is_loopback)
     except ValueError:
         local = False
     if not local and not password and not everyone:
+        reached = f"--behind-proxy {proxy}" if proxy else f"--host {host}"
         raise InputError(
-            f"With --host {host} others can reach the studio: give --password WORD, or --open to let everybody in."
+            f"With {reached} others can reach the studio: give --password-file FILE, or --open to let everybody in."
         )
     return local
+
+
+def password_of(word: str | None, file: Path | None) -> str | None:
+    """The password: the word that was given, or the first line of a file. Raises InputError."""
+    if file is None:
+        return word
+    if word:
+        raise InputError("Give --password or --password-file, not both.")
+    try:
+        with file.open(encoding="utf-8") as lines:
+            found = lines.readline().strip()
+    except (OSError, ValueError) as error:
+        raise InputError(f"The password file {file} cannot be read: {error}.") from error
+    if not found:
+        raise InputError(f"The password file {file} has an empty first line; write the password there.")
+    return found
 
 
 def check_port(host: str, port: int) -> None:
@@ -72,8 +86,8 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
 
 
 def serve(
-    studio: Studio, *, host: str, port: int, password: str | None = None, on_ready: Callable[[str], None] | None = None,
-    stop: threading.Event | None = None,
+    studio: Studio, *, host: str, port: int, password: str | None = None, proxy: str | None = None,
+    on_ready: Callable[[str], None] | None = None, stop: threading.Event | None = None,
 ) -> None:  # fmt: skip
     """Show the studio until Ctrl-C, or until `stop` is set. `on_ready` gets the address once the page answers."""
     # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
@@ -84,28 +98,42 @@ def serve(
         raise SetupError(
             f"The studio needs one more package: {sys.executable} -m pip install 'gradio==6.31.*'"
         ) from error
-    from materialist.studio.page import asset, build
+    import uvicorn
+    from fastapi import FastAPI
+
+    from materialist.studio.gate import Gate, names_of
+    from materialist.studio.page import build
 
     page = build(studio)
     page.queue(default_concurrency_limit=8, max_size=200)
+    app = gr.mount_gradio_app(
+        FastAPI(openapi_url=None), page, "/", footer_links=[], show_error=True, allowed_paths=[], ssr_mode=False,
+        max_file_size=f"{SETTINGS.upload_megabytes}mb", theme=_theme(gr), css=asset("style.css"), js=asset("page.js"),
+        enable_monitoring=False, pwa=False, mcp_server=False, run_history=False,
+    )  # fmt: skip
+    names = names_of(host) if studio.single_user else None
+    gate = Gate(app, studio, names=names, proxy=proxy, password=password, port=port)
+    config = uvicorn.Config(
+        gate, host, port, log_level="warning", proxy_headers=False, server_header=False, timeout_graceful_shutdown=1
+    )
+    server = uvicorn.Server(config)
+    # A thread of its own: signals are for the command.
+    thread = threading.Thread(target=server.run, name="server", daemon=True)
+    stop = stop or threading.Event()
     try:
-        _, address, _ = page.launch(
-            server_name=host, server_port=port, share=False, quiet=True, prevent_thread_lock=True, show_error=True,
-            auth=_login(password), auth_message="Any name will do; the password counts.",
-            max_file_size=f"{SETTINGS.upload_megabytes}mb", allowed_paths=[], theme=_theme(gr),
-            css=asset("style.css"), app_kwargs={"middleware": [_host_check(studio, host)]},
-            js=asset("page.js"), footer_links=[], ssr_mode=False, enable_monitoring=False, pwa=False, mcp_server=False,
-        )  # fmt: skip
-        if on_ready is not None:
-            on_ready(str(address))
-        while stop is None or not stop.wait(0.5):
-            if stop is None:
-                time.sleep(0.5)
+        thread.start()
+        while not server.started and thread.is_alive():
+            time.sleep(0.01)
+        if on_ready is not None and server.started:
+            on_ready(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
+        while thread.is_alive() and not stop.wait(0.5):
+            studio.sweep()
     except KeyboardInterrupt:
         return
     finally:
         studio.jobs.close()
-        page.close(verbose=False)
+        server.should_exit = True
+        thread.join(3)
         shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 
@@ -114,19 +142,6 @@ def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: i
     if not 1 <= workers <= 64:
         raise InputError(f"--workers is a number from 1 to 64, not {workers}.")
     return Studio(WorkFolder(work), JobQueue(workers), single_user, seed=seed, device=device)
-
-
-def _login(password: str | None) -> Any:
-    """The check of name and password, or None."""
-    if not password:
-        return None
-    return lambda name, word: hmac.compare_digest(word.encode(), password.encode())
-
-
-def _host_check(studio: Studio, host: str) -> Any:
-    from starlette.middleware import Middleware
-
-    return Middleware(HostCheck, names=names_of(host) if studio.single_user else None)
 
 
 def _theme(gr: Any) -> Any:
@@ -138,62 +153,3 @@ def _theme(gr: Any) -> Any:
         block_label_text_color="#16202e", block_title_text_color="#16202e", button_cancel_background_fill="#b42318",
         button_cancel_text_color="#ffffff", slider_color="#1d4ed8",
     )  # fmt: skip
-
-
-class HostCheck:
-    """ASGI middleware that refuses requests sent by the pages of other sites.
-
-    A browser sends `Origin` with what a page asks of another place; it must be the place that is asked. Where the
-    studio serves this machine only, that place must have one of its names, too: a site that lets its own name point
-    to 127.0.0.1 (DNS rebinding) is of the same origin, but not of ours.
-    """
-
-    def __init__(self, app: Application, names: tuple[str, ...] | None = None):
-        """`names`: host names that may be asked for; None for all."""
-        self.app, self.names = app, names
-
-    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Pass a request on, or answer 403."""
-        if scope["type"] not in ("http", "websocket") or self.allows(dict(scope["headers"])):
-            await self.app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008})
-        else:
-            headers = [(b"content-type", b"text/plain; charset=utf-8")]
-            await send({"type": "http.response.start", "status": 403, "headers": headers})
-            await send({"type": "http.response.body", "body": b"The studio answers its own pages only.\n"})
-
-    def allows(self, headers: dict[bytes, bytes]) -> bool:
-        """Whether a request with these headers (names in lower case) may pass."""
-        host = headers.get(b"host", b"").decode("latin-1").lower()
-        if self.names is not None and _name(f"//{host}") not in self.names:
-            return False
-        origin = headers.get(b"origin", b"").decode("latin-1").lower()
-        if not origin:
-            return True
-        # A proxy before the studio may ask it under another name, and tells the one that it was asked under.
-        asked = {host, headers.get(b"x-forwarded-host", b"").decode("latin-1").lower()} - {""}
-        scheme, place = origin.partition("://")[0], _place(origin)
-        return place is not None and any(place == _place(f"{scheme}://{one}") for one in asked)
-
-
-def names_of(host: str) -> tuple[str, ...]:
-    """Host names of a studio that serves this machine only, bound to `host`."""
-    return (*LOCAL, host.lower().strip("[]"))
-
-
-def _name(address: str) -> str | None:
-    try:
-        return urlsplit(address).hostname
-    except ValueError:
-        return None
-
-
-def _place(address: str) -> tuple[str, int | None] | None:
-    """(host, port) of an address, the usual port of its scheme where it names none; None where it has no host."""
-    try:
-        parts = urlsplit(address)
-        port = parts.port or {"http": 80, "https": 443}.get(parts.scheme)
-    except ValueError:
-        return None
-    return (parts.hostname, port) if parts.hostname else None

@@ -49,6 +49,10 @@ class Session:
 
     def __init__(self, person: str):
         self.person = person
+        self.beats = 0
+        """Requests that the page holds as long as it is open."""
+        self.seen = 0.0
+        """When it was last asked for, by `time.monotonic`."""
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.live: LivePreview | None = None

@@ -7,6 +7,8 @@ import re
 import secrets
 import shutil
 import threading
+import time
+from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,6 +22,8 @@ from materialist.studio.workspace import Project, WorkFolder
 
 LOCAL_PERSON = "me"
 """The person, where the studio serves this machine only."""
+PERSON = "materialist_person"
+"""The cookie that tells whose photos a browser may see."""
 LOST = "The page has lost its session; reload it."
 
 
@@ -38,27 +42,43 @@ class Studio:
     device: str = "auto"
     """Of jobs, as `invert` takes it."""
     _sessions: dict[str, Session] = field(default_factory=dict)
+    _uploads: dict[str, deque[tuple[float, int]]] = field(default_factory=dict)
+    """Person -> when, and how many bytes."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    _swept: float = float("-inf")
+    """When the work folder was swept last."""
 
     def person(self, token: Any) -> str:
-        """The person of a page, from the token that its browser keeps. Raises InputError for an invalid token."""
+        """The person of a page, from the cookie that its browser keeps. Raises InputError for an invalid one."""
         if self.single_user:
             return LOCAL_PERSON
-        if not isinstance(token, str) or not re.fullmatch(r"[a-z0-9]{16,32}", token):
+        if not isinstance(token, str) or not re.fullmatch(r"[a-f0-9]{32}", token):
             raise InputError(LOST)
         return token
 
-    def session(self, page: str | None, person: str | None = None) -> Session:
-        """The session of a page, by Gradio's session hash; `person` starts one. Raises InputError where it is gone."""
-        if not page:
-            raise InputError(LOST)
+    def session(self, page: str | None, person: str) -> Session:
+        """The session of a page, by Gradio's session hash. Raises InputError where it is another person's."""
         with self._lock:
-            known = self._sessions.get(page)
-            if known is None or (person is not None and known.person != person):
-                if person is None and not self.single_user:
-                    raise InputError(LOST)
-                known = self._sessions[page] = Session(person or LOCAL_PERSON)
+            known = self._sessions.setdefault(page, Session(person)) if page else None
+            if known is None or known.person != person:
+                raise InputError(LOST)
+            known.seen = time.monotonic()
             return known
+
+    def note_upload(self, person: str, size: str) -> None:
+        """Count an upload by its Content-Length. Raises InputError above the quota, and where the disk is full."""
+        if not size.isdigit():
+            raise InputError("An upload must say how long it is.")
+        now = time.monotonic()
+        with self._lock:
+            mine = self._uploads.setdefault(person, deque())
+            while mine and now - mine[0][0] > 3600:
+                mine.popleft()
+            if sum(bytes_ for _, bytes_ in mine) + int(size) > SETTINGS.upload_quota:
+                raise InputError(f"You have uploaded {SETTINGS.upload_quota / 1e9:g} GB within an hour; go on later.")
+            if shutil.disk_usage(self.work.cache).free - int(size) < SETTINGS.disk_left:
+                raise InputError("The disk of the studio is full; it takes no more uploads.")
+            mine.append((now, int(size)))
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
@@ -85,7 +105,14 @@ class Studio:
         session.open(project)
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
-        """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`."""
+        """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`.
+
+        Raises InputError where this person, or all together, have too many there.
+        """
+        mine, all_ = len(self.jobs.unfinished(session.person)), len(self.jobs.unfinished())
+        if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
+            whose = f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
+            raise InputError(f"{whose} jobs waiting or running; stop one, or wait until one is done.")
         work = partial(tasks.on_device, self.device, task)
         job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
         session.note_job(job)
@@ -100,6 +127,19 @@ class Studio:
             session.close()
             del session
             gc.collect()
+
+    def sweep(self) -> None:
+        """Forget pages that never showed that they are open, and photos that were not taken apart to the end."""
+        now = time.monotonic()
+        with self._lock:
+            gone = [
+                page for page, one in self._sessions.items() if not one.beats and now - one.seen > SETTINGS.page_seconds
+            ]
+        for page in gone:
+            self.leave(page)
+        if now - self._swept > 3600:
+            self._swept = now
+            self.work.sweep({job.folder for job in self.jobs.unfinished()})
 
     def final_file(self, session: Session) -> Path:
         """Where a page's path-traced pictures lie, without the suffix; they go when the studio ends."""

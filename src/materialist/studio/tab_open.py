@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,10 +74,8 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         return None if name is None else gr.update(value=None)
 
     @handler
-    def start(
-        file: str | None, example: str | None, predictor: str, size: int, fov: str, token: str, request: gr.Request
-    ):
-        session = studio.session(request.session_hash, studio.person(token))
+    def start(file: str | None, example: str | None, predictor: str, size: int, fov: str, request: gr.Request):
+        session = context.session(request)
         if file is not None and Path(file).suffix.lower() == ".zip":
             project = _unpack(context, session, Path(file))
         else:
@@ -89,18 +86,17 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         yield from _show_project(context, session, project)
 
     @handler
-    def resume(name: str | None, token: str, request: gr.Request):
-        session = studio.session(request.session_hash, studio.person(token))
+    def resume(name: str | None, request: gr.Request):
+        session = context.session(request)
         if not name:
             raise InputError("Choose one of your photos in the list first.")
         yield from _resume(context, session, name)
 
     @handler
-    def arrive(token: str, last: str, request: gr.Request):
-        token = token if len(token or "") >= 16 else secrets.token_hex(8)
-        session = studio.session(request.session_hash, studio.person(token))
+    def arrive(last: str, request: gr.Request):
+        session = context.session(request)
         known = _projects(context, session)
-        yield {parts["token"]: token, parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
+        yield {parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
         if any(value == last for _, value in known):
             yield from _resume(context, session, last)
         elif isinstance(studio.start, Project):
@@ -112,14 +108,14 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
         parts["projects"], parts["progress"],
     ]  # fmt: skip
-    wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov", "token")]
+    wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov")]
     sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **LONG)
     sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
     parts["example"].input(choose_example, parts["example"], parts["file"], **LONG)
     parts["start"].click(start, wanted, opening, **LONG)
-    parts["continue"].click(resume, [parts["projects"], parts["token"]], opening, **LONG)
+    parts["continue"].click(resume, parts["projects"], opening, **LONG)
     context.stops("cancel", "invert")
-    page.load(arrive, [parts["token"], parts["last"]], [parts["token"], parts["file"], *opening], **LONG)
+    page.load(arrive, parts["last"], [parts["file"], *opening], **LONG)
 
 
 def _start_inversion(

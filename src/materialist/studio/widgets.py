@@ -24,7 +24,7 @@ from materialist.studio.controls import CONTROLS, control_values, set_option
 from materialist.studio.edit_list import summary
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
-from materialist.studio.studio import Studio
+from materialist.studio.studio import PERSON, Studio
 from materialist.studio.uploads import without_paths
 
 LIVE: dict[str, Any] = {
@@ -92,7 +92,7 @@ class PageContext:
 
     def session(self, request: Any) -> Session:
         """The session of the page that sent a request."""
-        return self.studio.session(request.session_hash)
+        return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
 
     def picture(self, session: Session) -> dict[Any, Any]:
         """Updates after a change of edits."""

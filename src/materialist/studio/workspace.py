@@ -9,9 +9,11 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import tempfile
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,7 @@ from materialist.edits.recipe import Step, read_recipe, with_files
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import whole_file
 from materialist.io.display import encoded
+from materialist.studio import SETTINGS
 from materialist.types import Array
 
 CARD = "project.json"
@@ -95,6 +98,14 @@ class WorkFolder:
         except OSError as error:
             raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
         return project
+
+    def sweep(self, busy: Set[Path]) -> None:
+        """Remove the folders of photos that were not taken apart to the end and lie idle; no job works in `busy`."""
+        for project in self.projects():
+            idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
+            ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
+            if idle and ours and not project.ready and project.folder not in busy:
+                shutil.rmtree(project.folder, ignore_errors=True)
 
 
 def _read(folder: Path) -> Project | None:

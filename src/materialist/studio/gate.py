@@ -1,0 +1,192 @@
+"""The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import secrets
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.datastructures import MutableHeaders
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
+
+from materialist.errors import InputError
+from materialist.studio import SETTINGS, asset
+from materialist.studio.studio import PERSON, Studio
+
+Application = Callable[[Any, Any, Any], Awaitable[None]]
+LOCAL = ("localhost", "127.0.0.1", "::1")
+"""Names of this machine."""
+_BEAT = "/gradio_api/heartbeat/"
+"""A page holds a request to this place, and its name, as long as it is open."""
+_UPLOAD = "/gradio_api/upload"
+_FORM_BYTES = 4096
+HEADERS = {
+    # Gradio makes functions of texts and styles of its own; whatever they do, it stays between page and studio.
+    "content-security-policy": (
+        "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; style-src 'self' 'unsafe-inline'; "
+        "img-src 'self' data: blob:; media-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob:; "
+        "connect-src 'self' data: blob:; object-src 'none'; base-uri 'self'; form-action 'self'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    "cross-origin-resource-policy": "same-origin",
+    "referrer-policy": "same-origin",
+}
+"""Of every answer."""
+
+
+class Gate:
+    """ASGI application before the page.
+
+    It refuses what pages of other sites ask. A browser sends `Origin` with what a page asks of another place; it must
+    be the place that is asked. Where the studio serves this machine only, that place must have one of its names, too:
+    a site that lets its own name point to 127.0.0.1 (DNS rebinding) is of the same origin, but not of ours. Behind a
+    proxy it must be the proxy's. With a password nothing but the form for it is shown before it was given. The name of
+    a page (Gradio's session hash) belongs to the browser that used it first.
+    """
+
+    def __init__(
+        self, app: Application, studio: Studio, *, names: tuple[str, ...] | None = None, proxy: str | None = None,
+        password: str | None = None, port: int = 0,
+    ) -> None:  # fmt: skip
+        """names: host names that may be asked for; None for all. proxy: HOST[:PORT] of the proxy before the studio."""
+        self.app, self.studio = app, studio
+        self.names = names if proxy is None else (str(_name(f"//{proxy}")),)
+        self.proxy, self.password = proxy, password
+        self._cookie = f"materialist_login_{port}"
+        self._logins: set[str] = set()
+        self._wrong: deque[float] = deque()
+        """When the last wrong passwords came."""
+
+    async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
+        """Pass a request on, or answer it."""
+        if scope["type"] == "lifespan":
+            return await self.app(scope, receive, send)
+        if scope["type"] != "http":
+            return await send({"type": "websocket.close", "code": 1008})
+        scope["headers"] = self._heard(scope["headers"])
+        request, cookies = Request(scope, receive), {}
+        app = await self._answer(request, cookies)
+
+        async def answer(message: Any) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers.update(HEADERS)
+                for name, value in cookies.items():
+                    secure = "; Secure" if self.proxy and request.headers["x-forwarded-proto"] == "https" else ""
+                    kept = f"; Max-Age={SETTINGS.person_seconds}" if name == PERSON else ""
+                    headers.append("set-cookie", f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}")
+            await send(message)
+
+        page = _beating(request)
+        if page is None or app is not self.app:
+            return await app(scope, receive, answer)
+        session = self.studio.session(page, scope["person"])
+        session.beats += 1
+        try:
+            await app(scope, receive, answer)
+        finally:
+            session.beats -= 1
+            if not session.beats:  # its memory is freed beside, not within, what the server does for others
+                asyncio.get_running_loop().run_in_executor(None, self.studio.leave, page)
+
+    def allows(self, headers: dict[bytes, bytes]) -> bool:
+        """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
+        told = {name.decode(): value.decode("latin-1").lower() for name, value in headers.items()}
+        asked = told.get("x-forwarded-host", told.get("host", "")) if self.proxy else told.get("host", "")
+        if self.names is not None and _name(f"//{asked}") not in self.names:
+            return False
+        if told.get("sec-fetch-site") in ("cross-site", "same-site") and told.get("sec-fetch-mode") != "navigate":
+            return False
+        origin = told.get("origin", "")
+        scheme, place = origin.partition("://")[0], _place(origin)
+        return not origin or (place is not None and place == _place(f"{scheme}://{asked}"))
+
+    def _heard(self, headers: list[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
+        """The headers that count: those of a proxy only where there is one, whose name then is the page's own."""
+        told = dict(headers)
+        if self.proxy and b"x-forwarded-host" not in told:
+            told[b"x-forwarded-host"] = told.get(b"host", b"")
+        kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k != b"forwarded"]
+        if self.proxy:
+            scheme = b"http" if told.get(b"x-forwarded-proto") == b"http" else b"https"
+            kept += [(b"x-forwarded-host", told[b"x-forwarded-host"]), (b"x-forwarded-proto", scheme)]
+        return kept
+
+    async def _answer(self, request: Request, cookies: dict[str, str]) -> Any:
+        """The application that answers: the page, or a refusal; with cookies to set."""
+        if not self.allows(dict(request.scope["headers"])):
+            return PlainTextResponse("The studio answers its own pages only.\n", 403)
+        if self.password and request.cookies.get(self._cookie) not in self._logins:
+            if (request.method, request.url.path) == ("POST", "/login"):
+                return await self._log_in(request, cookies)
+            return self._form(401)
+        try:
+            person = self.studio.person(request.cookies.get(PERSON))
+        except InputError:  # its browser is new here
+            cookies[PERSON] = person = secrets.token_hex(16)
+        request.scope["person"] = person
+        try:
+            for page in filter(None, (_beating(request), request.query_params.get("session_hash"))):
+                self.studio.session(page, person)
+            if request.url.path.rstrip("/") == _UPLOAD:
+                self.studio.note_upload(person, request.headers.get("content-length", ""))
+        except InputError as error:
+            return PlainTextResponse(f"{error}\n", 403)
+        return self.app
+
+    async def _log_in(self, request: Request, cookies: dict[str, str]) -> Response:
+        """The page where the password is right, else the form again; after too many wrong ones whatever it is."""
+        body = b""
+        async for block in request.stream():
+            body += block
+            if len(body) > _FORM_BYTES:
+                return self._form(413, "That is too long for a password.")
+        now = time.monotonic()
+        while self._wrong and now - self._wrong[0] > 60:
+            self._wrong.popleft()
+        if len(self._wrong) >= SETTINGS.wrong_passwords:
+            return self._form(429, "Too many wrong passwords; wait a minute.")
+        word = parse_qs(body.decode("utf-8", "replace")).get("password", [""])[0]
+        if not hmac.compare_digest(word.encode(), str(self.password).encode()):
+            self._wrong.append(now)
+            return self._form(401, "That is not the password.")
+        cookies[self._cookie] = token = secrets.token_urlsafe(24)
+        self._logins.add(token)
+        return RedirectResponse("/", 303)
+
+    def _form(self, status: int, message: str = "") -> Response:
+        return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
+
+
+def _beating(request: Request) -> str | None:
+    """The page whose heartbeat a request is, if it is one."""
+    path = request.url.path
+    return path.removeprefix(_BEAT).strip("/") if path.startswith(_BEAT) else None
+
+
+def names_of(host: str) -> tuple[str, ...]:
+    """Host names of a studio that serves this machine only, bound to `host`."""
+    return (*LOCAL, host.lower().strip("[]"))
+
+
+def _name(address: str) -> str | None:
+    try:
+        return urlsplit(address).hostname
+    except ValueError:
+        return None
+
+
+def _place(address: str) -> tuple[str, int | None] | None:
+    """(host, port) of an address, the usual port of its scheme where it names none; None where it has no host."""
+    try:
+        parts = urlsplit(address)
+        port = parts.port or {"http": 80, "https": 443}.get(parts.scheme)
+    except ValueError:
+        return None
+    return (parts.hostname, port) if parts.hostname else None

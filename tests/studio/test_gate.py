@@ -1,0 +1,181 @@
+"""Who may talk to the studio, and what a browser may do with its answers."""
+
+import asyncio
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the studio extra")
+from starlette.responses import PlainTextResponse
+from starlette.testclient import TestClient
+
+from materialist.errors import InputError
+from materialist.jobs.queue import JobQueue
+from materialist.studio import StudioSettings, gate
+from materialist.studio.gate import Gate, names_of
+from materialist.studio.server import password_of
+from materialist.studio.studio import PERSON, Studio
+from materialist.studio.workspace import WorkFolder
+
+ALONE = names_of("127.0.0.1")
+
+
+@pytest.fixture
+def studio(tmp_path):
+    made = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
+    yield made
+    made.jobs.close()
+
+
+async def echo(scope, receive, send):
+    """Says what it heard of proxies, and allows everything to everyone, as Gradio's CORS does."""
+    heard = [f"{k.decode()}={v.decode()}" for k, v in scope["headers"] if b"forwarded" in k]
+    answer = PlainTextResponse(" ".join(heard), headers={"access-control-allow-origin": "*"})
+    await answer(scope, receive, send)
+
+
+def client(studio, base="http://studio.example", **options):
+    return TestClient(Gate(echo, studio, **options), base_url=base, follow_redirects=False)
+
+
+def headers(**values):
+    return {name.replace("_", "-").encode(): value.encode() for name, value in values.items()}
+
+
+@pytest.mark.parametrize(
+    ("sent", "alone", "everyone", "behind"),
+    [
+        ({"host": "127.0.0.1:7860"}, True, True, False),
+        ({"host": "localhost:7860", "origin": "http://localhost:7860"}, True, True, False),
+        ({"host": "[::1]:7860", "origin": "http://[::1]:7860"}, True, True, False),
+        ({"host": "evil.example"}, False, True, False),  # a name that was let point here
+        ({"host": "evil.example", "origin": "http://evil.example"}, False, True, False),
+        ({"host": "127.0.0.1:7860", "origin": "http://evil.example"}, False, False, False),
+        ({"host": "127.0.0.1:7860", "origin": "http://127.0.0.1:9000"}, False, False, False),
+        ({"host": "127.0.0.1:7860", "origin": "null"}, False, False, False),
+        ({"host": "127.0.0.1:7860", "sec_fetch_site": "cross-site", "sec_fetch_mode": "no-cors"}, False, False, False),
+        ({"host": "127.0.0.1:7860", "sec_fetch_site": "cross-site", "sec_fetch_mode": "navigate"}, True, True, False),
+        ({"host": "studio.example", "origin": "https://studio.example"}, False, True, True),
+        ({"host": "10.0.0.5:7860", "origin": "https://a.example", "x_forwarded_host": "a.example"},
+         False, False, False),
+        ({"host": "127.0.0.1:7860", "origin": "https://studio.example", "x_forwarded_host": "studio.example"},
+         False, False, True),
+        ({"host": "[broken", "origin": "http://[broken"}, False, False, False),
+        ({}, False, True, False),
+    ],
+)  # fmt: skip
+def test_welcome(studio, sent, alone, everyone, behind):
+    assert Gate(echo, studio, names=ALONE).allows(headers(**sent)) is alone
+    assert Gate(echo, studio).allows(headers(**sent)) is everyone
+    assert Gate(echo, studio, proxy="studio.example").allows(headers(**sent)) is behind
+
+
+def test_forwarded_headers_count_behind_a_proxy_only(studio):
+    told = {"x-forwarded-host": "studio.example", "x-forwarded-for": "1.2.3.4", "forwarded": "host=evil.example"}
+    assert client(studio).get("/", headers=told).text == ""
+    page = client(studio, "http://10.0.0.5:7860", proxy="studio.example")
+    assert page.get("/", headers=told).text == "x-forwarded-host=studio.example x-forwarded-proto=https"
+    assert "Secure" in page.get("/", headers=told).headers["set-cookie"]
+    assert page.get("/", headers={**told, "x-forwarded-host": "evil.example"}).status_code == 403
+    assert page.get("/").status_code == 403
+
+
+def test_no_preflight_of_another_site_is_answered(studio):
+    asked = {"access-control-request-method": "POST", "origin": "http://evil.example"}
+    answer = client(studio).options("/gradio_api/queue/join", headers=asked)
+    assert answer.status_code == 403 and "access-control-allow-origin" not in answer.headers
+
+
+def test_every_answer_tells_the_browser_to_be_careful(studio):
+    page = client(studio, password="word")
+    for answer in (client(studio).get("/"), page.get("/"), client(studio, names=ALONE).get("/")):
+        assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+        assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_sockets_are_closed_and_the_lifespan_passes(studio):
+    reached, sent = [], []
+
+    async def app(scope, receive, send):
+        reached.append(scope["type"])
+
+    async def send(message):
+        sent.append(message)
+
+    for kind in ("websocket", "lifespan"):
+        asyncio.run(Gate(app, studio)({"type": kind, "headers": []}, None, send))
+    assert reached == ["lifespan"] and sent == [{"type": "websocket.close", "code": 1008}]
+
+
+def test_a_password_closes_every_door(studio, monkeypatch):
+    monkeypatch.setattr(gate, "SETTINGS", StudioSettings(wrong_passwords=3))
+    page = client(studio, password="open sesame ü")
+    enter = lambda word: page.post("/login", data={"password": word})  # noqa: E731
+    for place in ("/", "/config", "/assets/a.js", "/gradio_api/heartbeat/abc"):
+        assert page.get(place).status_code == 401
+    assert "password" in page.get("/").text and page.post("/gradio_api/upload").status_code == 401
+    assert enter("x" * 5000).status_code == 413
+    assert enter("wrong").status_code == 401 and page.get("/").status_code == 401
+    answer = enter("open sesame ü")
+    assert answer.status_code == 303 and "SameSite=Lax" in answer.headers["set-cookie"]
+    assert "HttpOnly" in answer.headers["set-cookie"] and page.get("/config").status_code == 200
+    other = TestClient(page.app, follow_redirects=False)
+    assert other.get("/").status_code == 401
+    for _ in range(2):
+        assert other.post("/login", data={"password": "guess"}).status_code == 401
+    assert other.post("/login", data={"password": "open sesame ü"}).status_code == 429  # not even the right one
+    assert page.get("/").status_code == 200
+
+
+def test_a_page_belongs_to_the_browser_that_used_it_first(studio):
+    anna, bert = client(studio), client(studio)
+    anna.get("/")
+    person = anna.cookies[PERSON]
+    assert anna.get("/gradio_api/queue/data?session_hash=abc").status_code == 200
+    assert studio.session("abc", person).person == person
+    for place in ("heartbeat/abc", "queue/data?session_hash=abc"):
+        assert bert.get(f"/gradio_api/{place}").status_code == 403
+    with pytest.raises(InputError, match="reload"):
+        studio.session("abc", studio.person(bert.cookies[PERSON]))
+
+
+def test_a_page_is_forgotten_with_its_heartbeat_and_one_that_has_none_after_a_while(studio, monkeypatch):
+    page = client(studio)
+    page.get("/")
+    person = page.cookies[PERSON]
+    one, two = studio.session("one", person), studio.session("two", person)
+    held = []
+
+    async def app(scope, receive, send):
+        held.append(one.beats)
+        studio.sweep()
+        await echo(scope, receive, send)
+
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(page_seconds=0.0))
+    page.app.app = app
+    assert page.get("/gradio_api/heartbeat/one").status_code == 200
+    assert held[-1] == 1
+    assert studio.session("one", person) is not one and studio.session("two", person) is not two
+
+
+def test_uploads_have_a_quota(studio, monkeypatch):
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(upload_quota=1000))
+    page = client(studio)
+    page.get("/")
+    send = lambda size: page.post("/gradio_api/upload", content=b"x" * size)  # noqa: E731
+    assert send(600).status_code == 200 and send(300).status_code == 200
+    assert send(200).status_code == 403 and "within an hour" in send(200).text
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(disk_left=10**18))
+    assert "full" in send(10).text
+
+
+def test_the_password_need_not_be_an_argument(tmp_path, run):
+    (tmp_path / "word").write_text("open sesame\nsecond line\n")
+    assert password_of(None, tmp_path / "word") == "open sesame" and password_of("word", None) == "word"
+    (tmp_path / "none").write_text("\n")
+    for word, file, message in (("a", "word", "not both"), (None, "none", "empty"), (None, "no", "cannot be read")):
+        with pytest.raises(InputError, match=message):
+            password_of(word, tmp_path / file)
+    code, _, err = run("studio", "--behind-proxy", "studio.example", "--work", tmp_path / "w")
+    assert code == 2 and "--password-file" in err
+    code, _, err = run("studio", "--behind-proxy", "http://x/y", "--open", "--work", tmp_path / "w")
+    assert code == 2 and "HOST" in err
