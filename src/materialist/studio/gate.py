@@ -70,7 +70,8 @@ class Gate:
         if scope["type"] != "http":
             return await send({"type": "websocket.close", "code": 1008})
         scope["headers"] = self._heard(scope["headers"])
-        request, cookies = Request(scope, receive), {}
+        request = Request(scope, receive)
+        cookies: dict[str, str] = {}
         app = await self._answer(request, cookies)
 
         async def answer(message: Any) -> None:
