@@ -19,18 +19,13 @@ WHITE = 0.995
 
 @dataclass(frozen=True)
 class CompositeSettings:
-    """How the photo's residual over the fit follows an edit."""
+    """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
-    floor: float = 0.02
-    """Radiance added to both sides of edited / base; larger trusts ratios of dark pixels less (tuned by eye)."""
-    most_detail: float = 2.0
-    """Largest factor on the photo's detail beyond working size under another light (tuned by eye)."""
-    light_fade: float = 12.0
-    """How fast the fit's error goes when the light changes, per logarithm of the change (tuned by eye)."""
-    rim: float = 4.0
-    """Working pixels that the change beside a new body is continued under its outline (derived: upsampling's reach)."""
-    threads: int = 4
-    """Strips of a large photo that are made at a time, about 0.2 GB each (derived: memory)."""
+    floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
+    most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
+    light_fade: float = 12.0  # how fast the fit's error goes when the light changes, per logarithm of the change
+    rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
+    threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
 
 DEFAULT = CompositeSettings()
@@ -163,10 +158,8 @@ def _unclipped(photo: Array, base: Array) -> Array:
 class DimmingSettings:
     """Where the photo is a lower bound of an emitter's radiance."""
 
-    clipped: float = 0.97
-    """Least channel of a linear photo from which a pixel is clipped (derived: 8 bits)."""
-    nearly: float = 0.9
-    """Least channel from which a pixel may be brighter than it looks (tuned by eye)."""
+    clipped: float = 0.97  # least channel of a linear photo from which a pixel is clipped; derived: 8 bits
+    nearly: float = 0.9  # least channel from which a pixel may be brighter than it looks; tuned by eye
 
 
 DIMMING = DimmingSettings()

@@ -16,18 +16,13 @@ from materialist.types import Array, Scene
 
 @dataclass(frozen=True)
 class LayerSettings:
-    """What counts as a difference, and as a firefly."""
+    """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
-    window: int = 9
-    """Pixels across, over which a difference and its noise are measured; larger sees fainter light (tuned by eye)."""
-    sigmas: float = 3.0
-    """Standard errors by which a mean difference must stand out (derived: 1 in 400 by chance)."""
-    least_gain: float = 0.25
-    """Gain below which a difference is none (tuned by eye)."""
-    bright: float = 1.0
-    """Radiance up to which nothing is a firefly: below white a sparkle does no harm (derived)."""
-    times: float = 3.0
-    """Multiple of the second brightest of the eight neighbours from which a pixel is a firefly (tuned by eye)."""
+    window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
+    sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
+    least_gain: float = 0.25  # gain below which a difference is none
+    bright: float = 1.0  # radiance up to which nothing is a firefly: below white a sparkle does no harm; derived
+    times: float = 3.0  # multiple of the second brightest of the eight neighbours from which a pixel is a firefly
 
 
 DEFAULT = LayerSettings()

@@ -18,20 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class NativeSettings:
-    """Resolution and paths of the native-resolution layer."""
+    """Resolution and paths of the native-resolution layer; tuned by eye unless derived."""
 
-    pixels: int = 1_500_000
-    """Largest number of pixels that are traced; a larger layer is traced smaller and enlarged (derived: time)."""
-    fewest_paths: int = 32
-    """Paths a native pixel, at least, as the denoiser needs (tuned by eye)."""
-    most_paths: int = 4
-    """Paths a native pixel, at most, in multiples of those of the picture (derived: time)."""
-    margin: int = 3
-    """Working pixels around the bodies that the denoiser sees (tuned by eye)."""
-    contact: float = 0.05
-    """Share of a body's extent up to which a surface before it is the ground it stands on (tuned by eye)."""
-    lamp_contact: float = 2.0
-    """The same of lamps, which a surface cuts (tuned by eye)."""
+    pixels: int = (
+        1_500_000  # most pixels that are traced; a larger layer is traced smaller, and enlarged; derived: time
+    )
+    fewest_paths: int = 32  # paths a native pixel, at least, as the denoiser needs
+    most_paths: int = 4  # paths a native pixel, at most, in multiples of those of the picture; derived: time
+    margin: int = 3  # working pixels around the bodies that the denoiser sees
+    contact: float = 0.05  # share of a body's extent up to which a surface before it is the ground it stands on
+    lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
 
 
 SETTINGS = NativeSettings()

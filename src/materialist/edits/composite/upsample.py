@@ -16,32 +16,23 @@ STRIP = 128
 
 @dataclass(frozen=True)
 class MatteSettings:
-    """Shares of a surface in the photo's pixels along its outline."""
+    """Shares of a surface in the photo's pixels along its outline; tuned by eye unless derived."""
 
-    tile: int = 32
-    """Working pixels: side of the parts in which a matte is made (derived: memory)."""
-    border: int = 4
-    """Working pixels from the mask's border up to which a matte may reach (derived: `near` and the mask's error)."""
-    near: float = 2.5
-    """Standard deviation of the windows of mean colours, working pixels; larger averages texture (tuned by eye)."""
-    grain: float = 0.03
-    """Standard deviation of an even surface's colour, sRGB-encoded, channels added (tuned by eye)."""
-    apart: tuple[float, float] = (2.0, 5.0)
-    """Distance of both mean colours, standard deviations of a side: not told apart, and clearly so (tuned by eye)."""
-    beside: tuple[float, float] = (0.3, 0.6)
-    """Distance of a colour from the line between both, share of its length: a mixture, and none (tuned by eye)."""
-    beyond: float = 0.75
-    """Continuation of that line beyond its ends, as the halos of sharpened edges need (tuned by eye)."""
+    tile: int = 32  # working pixels: side of the parts in which a matte is made; derived: memory
+    border: int = 4  # working pixels from the mask's border up to which a matte may reach; derived: `near`
+    near: float = 2.5  # standard deviation of the windows of mean colours, working pixels; larger averages texture
+    grain: float = 0.03  # standard deviation of an even surface's colour, sRGB-encoded, channels added
+    apart: tuple[float, float] = (2.0, 5.0)  # mean colours' distance, standard deviations: not told apart, and clearly
+    beside: tuple[float, float] = (0.3, 0.6)  # a colour's distance from the line between both: a mixture, and none
+    beyond: float = 0.75  # continuation of that line beyond its ends, as the halos of sharpened edges need
 
 
 @dataclass(frozen=True)
 class UpsampleSettings:
-    """Joint bilateral upsampling."""
+    """Joint bilateral upsampling: standard deviations; tuned by eye."""
 
-    colour: float = 0.06
-    """Standard deviation of the colour weight, sRGB-encoded: about a just visible step (tuned by eye)."""
-    radius: float = 0.8
-    """Standard deviation of the spatial weight, working pixels, over 4 x 4 of them (tuned by eye)."""
+    colour: float = 0.06  # of the colour weight, sRGB-encoded: about a just visible step
+    radius: float = 0.8  # of the spatial weight, working pixels, over 4 x 4 of them
 
 
 MATTE = MatteSettings()

@@ -18,14 +18,11 @@ from materialist.types import Array, Body, Scene
 
 @dataclass(frozen=True)
 class InsertSettings:
-    """Size of an inserted mesh."""
+    """Size of an inserted mesh; tuned by eye."""
 
-    width: float = 1 / 6
-    """Longest side at scale 1, share of the width that the picture shows at its depth (tuned by eye)."""
-    nearest: float = 0.02
-    """Depth that nothing may come nearer than, share of the depth of its place (tuned by eye)."""
-    samples: int = 6000
-    """Points that stand for its surface where it falls (tuned by eye)."""
+    width: float = 1 / 6  # longest side at scale 1, share of the width that the picture shows at its depth
+    nearest: float = 0.02  # depth that nothing may come nearer than, share of the depth of its place
+    samples: int = 6000  # points that stand for its surface where it falls
 
 
 SETTINGS = InsertSettings()

@@ -37,16 +37,12 @@ READ = ("KHR_materials_", "EXT_texture_webp", "KHR_lights_punctual", "KHR_textur
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """Limits of the files that are read."""
+    """Limits of the files that are read; tuned by eye."""
 
-    faces: int = 2_000_000
-    """Triangles; above it rendering runs out of memory on ordinary machines (tuned by eye)."""
-    megabytes: float = 512.0
-    """Size of the file (tuned by eye)."""
-    texture: int = 4096
-    """Pixels along the longer side of a texture; larger ones are shrunk (tuned by eye)."""
-    crease: float = 40.0
-    """Degrees: where a file has no normals, faces that meet at a sharper angle keep an edge (tuned by eye)."""
+    faces: int = 2_000_000  # triangles; above it rendering runs out of memory on ordinary machines
+    megabytes: float = 512.0  # size of the file
+    texture: int = 4096  # pixels along the longer side of a texture; larger ones are shrunk
+    crease: float = 40.0  # degrees: where a file has no normals, faces that meet at a sharper angle keep an edge
 
 
 LIMITS = MeshLimits()

@@ -14,14 +14,11 @@ from materialist.types import Array, Scene
 
 @dataclass(frozen=True)
 class SupportSettings:
-    """Which pixels tell the plane that a thing stands on."""
+    """Which pixels tell the plane that a thing stands on; tuned by eye."""
 
-    alike: float = 0.7
-    """Cosine from which a neighbour's normal counts as that of the same surface (tuned by eye)."""
-    fewest: int = 12
-    """Pixels whose median counts, at least; with fewer the one pixel decides (derived)."""
-    nearby: float = 1 / 24
-    """Radius around the place, share of the picture's width, where no radius is given (tuned by eye)."""
+    alike: float = 0.7  # cosine from which a neighbour's normal counts as that of the same surface
+    fewest: int = 12  # pixels whose median counts, at least; with fewer the one pixel decides
+    nearby: float = 1 / 24  # radius around the place, share of the picture's width, where no radius is given
 
 
 DEFAULT = SupportSettings()

@@ -24,32 +24,20 @@ from materialist.types import Array, Body, Photo, Scene
 
 @dataclass(frozen=True)
 class EmitterSettings:
-    """What counts as an emitter, and how bright it is."""
+    """What counts as an emitter, and how bright it is; tuned by eye unless derived."""
 
-    clipped: float = 0.97
-    """Least channel of a linear photo from which a pixel is clipped: its radiance is unknown (derived: 8 bits)."""
-    beside: float = 0.6
-    """Share of `clipped` from which pixels beside an emitter belong to it, as its shade does (tuned by eye)."""
-    reach: float = 0.015
-    """How far beside it, share of the longer side (tuned by eye)."""
-    gap: float = 0.006
-    """Half of the gaps that are closed, as leaves before a window; share of the longer side (tuned by eye)."""
-    upward: float = 0.7
-    """Mean Y of the normals above which a surface reflects a light, or lies in the sun (tuned by eye)."""
-    area: float = 0.001
-    """Smallest share of the picture; less is a highlight (tuned by eye)."""
-    pixels: int = 9
-    """Smallest part of a mask, pixels (derived: a surface needs some triangles)."""
-    hdr: float = 4.0
-    """Least multiple of the median of an HDR photo (tuned by eye)."""
-    known: float = 0.1
-    """Share of clipped pixels up to which the photo tells the radiance (tuned by eye)."""
-    white: float = 0.5
-    """Share of clipped pixels above which an emitter is taken as white (tuned by eye)."""
-    lift: float = 2e-3
-    """Distance of an emitter before its surface, share of the depth (derived: ray offsets)."""
-    spp: int = 32
-    """Paths a pixel of the rendering that estimates the radiance (derived: sums over the whole picture)."""
+    clipped: float = 0.97  # least channel of a linear photo from which a pixel's radiance is unknown; derived: 8 bits
+    beside: float = 0.6  # share of `clipped` from which pixels beside an emitter belong to it, as its shade does
+    reach: float = 0.015  # how far beside it, share of the longer side
+    gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; share of the longer side
+    upward: float = 0.7  # mean Y of the normals above which a surface reflects a light, or lies in the sun
+    area: float = 0.001  # smallest share of the picture; less is a highlight
+    pixels: int = 9  # smallest part of a mask, pixels; derived: a surface needs some triangles
+    hdr: float = 4.0  # least multiple of the median of an HDR photo
+    known: float = 0.1  # share of clipped pixels up to which the photo tells the radiance
+    white: float = 0.5  # share of clipped pixels above which an emitter is taken as white
+    lift: float = 2e-3  # distance of an emitter before its surface, share of the depth; derived: ray offsets
+    spp: int = 32  # paths a pixel of the rendering that estimates the radiance; derived: sums over the whole picture
 
 
 DEFAULT = EmitterSettings()

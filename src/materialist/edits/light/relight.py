@@ -24,12 +24,9 @@ from materialist.types import Array, Lamp, Scene
 class AddedLightSettings:
     """Sizes of added lights."""
 
-    sun_radius: float = 1.5
-    """Angular radius of an added sun, degrees: six real ones, as a map of 512 x 256 needs (derived)."""
-    lamp_unit: float = 0.25
-    """A lamp of power 1 shows a white wall as white from this share of the median depth (a definition)."""
-    lamp_radius: float = 0.015
-    """Radius of a lamp, share of the median depth (tuned by eye)."""
+    sun_radius: float = 1.5  # angular radius of an added sun, degrees: six real ones, as a map of 512 x 256 needs
+    lamp_unit: float = 0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
+    lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
 
 
 SETTINGS = AddedLightSettings()

@@ -19,38 +19,24 @@ POSSIBLE, PROBABLE, CERTAIN = 2, 3, 1
 
 @dataclass(frozen=True)
 class SelectSettings:
-    """When ClickNet decides, and where GrabCut looks without it."""
+    """When ClickNet decides, and where GrabCut looks; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    certain: float = 0.7
-    """Certainty (`certainty`) of ClickNet from which it decides; larger trusts it less (tuned on 125 clicks)."""
+    certain: float = 0.7  # `certainty` of ClickNet from which it decides; larger trusts it less; tuned on 125 clicks
     places: tuple[tuple[float, float], ...] = ((0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7))
-    """Places in a box, shares of its sides, at which ClickNet is asked for the object there (tuned by eye)."""
-    within: float = 0.8
-    """Share of an object that must lie in the box: a table's does not (tuned by eye)."""
-    fills: float = 0.6
-    """Overlap of an object's own box with the given one from which ClickNet's is taken (tuned by eye)."""
-    growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)
-    """Margins around a box that are tried until its object fills it, shares of its shorter side (tuned by eye)."""
-    core: float = 0.01
-    """Radius around a click that is certainly of the object, share of the longer side (tuned by eye)."""
-    probable: float = 0.08
-    """Radius around a click that GrabCut takes for the object at first; larger finds larger objects (54 clicks)."""
-    possible: float = 0.24
-    """Radius around a click beyond which GrabCut does not look (54 clicks)."""
-    gap: float = 0.015
-    """Half of the gap across which two parts are one, share of the longer side (tuned by eye)."""
-    inwards: float = 0.02
-    """How far ClickNet's outline may move inwards to an edge of the photo, share of the longer side (tuned by eye)."""
-    outwards: float = 0.22
-    """How far it may move outwards: thin parts stick out (tuned by eye)."""
-    unlikely: float = 0.3
-    """Likelihood below which a pixel is none of the object; larger keeps the outline closer (tuned by eye)."""
-    near_likely: float = 0.015
-    """Distance from likelier pixels up to which an unlikely one may still be of the object (tuned by eye)."""
-    kept: float = 0.6
-    """Overlap with ClickNet's mask below which GrabCut has lost the object in its surroundings (tuned by eye)."""
-    passes: int = 3
-    """Times that the band follows the outline: a first pass stops at a shadow (tuned by eye)."""
+    """Places in a box, shares of its sides, at which ClickNet is asked for the object there."""
+    within: float = 0.8  # share of an object that must lie in the box: a table's does not
+    fills: float = 0.6  # overlap of an object's own box with the given one from which ClickNet's is taken
+    growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)  # margins tried until a box is filled, shorter sides of it
+    core: float = 0.01  # radius around a click that is certainly of the object
+    probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
+    possible: float = 0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
+    gap: float = 0.015  # half of the gap across which two parts are one
+    inwards: float = 0.02  # how far ClickNet's outline may move inwards to an edge of the photo
+    outwards: float = 0.22  # how far it may move outwards: thin parts stick out
+    unlikely: float = 0.3  # likelihood below which a pixel is none of the object; larger keeps the outline closer
+    near_likely: float = 0.015  # distance from likelier pixels up to which an unlikely one may still be of the object
+    kept: float = 0.6  # overlap with ClickNet's mask below which GrabCut has lost the object in its surroundings
+    passes: int = 3  # times that the band follows the outline: a first pass stops at a shadow
 
 
 DEFAULT = SelectSettings()
