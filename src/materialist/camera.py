@@ -14,6 +14,13 @@ def pixel_rays(camera: Camera) -> Array:
     return rays
 
 
+def rays_through(place: Array, camera: Camera) -> Array:
+    """[..., 3] float64 rays through screen positions [..., 2] in pixels (x right, y down), scaled to z = -1."""
+    middle = np.array([camera.width, camera.height]) / 2
+    across = (np.asarray(place, np.float64) - middle) / camera.focal
+    return np.stack([across[..., 0], -across[..., 1], -np.ones(across.shape[:-1])], -1)
+
+
 def rays_at(rays: Array, height: int, width: int) -> Array:
     """The rays [H, W, 2] (x and y at z = -1) of a picture or of a part of one, at height x width pixels.
 
@@ -43,3 +50,8 @@ def project(points: Array, camera: Camera) -> tuple[Array, Array]:
     xs = points[..., 0] / safe * camera.focal + camera.width / 2
     ys = -points[..., 1] / safe * camera.focal + camera.height / 2
     return np.stack([xs, ys], -1), depth
+
+
+def unit(vectors: Array) -> Array:
+    """[..., 3] or [..., 2] vectors of length 1; those of no length stay 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

@@ -81,8 +81,7 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     assert share.shape == (CAMERA.height, CAMERA.width)
     assert share.sum() == pytest.approx(np.pi * outline() ** 2, rel=0.02)
     assert ((share > 0) & (share < 1)).any() and not coverage(target.mi_scene, CAMERA, ["body1"]).any()
-    size, box = (4 * CAMERA.height, 4 * CAMERA.width), (0, 4 * CAMERA.height, 0, 4 * CAMERA.width)
-    larger = first_hits(target.mi_scene, CAMERA, {"body0": body}, size, box).share
+    larger = first_hits(target.mi_scene, CAMERA, {"body0": body}, (4 * CAMERA.height, 4 * CAMERA.width)).share
     assert larger.sum() == pytest.approx(16 * np.pi * outline() ** 2, rel=0.02)
 
 
@@ -95,7 +94,7 @@ def test_radiance_is_that_of_the_rays_that_meet_the_body_first():
     geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere
     target = RenderScene(geometry, CAMERA, bodies=(sphere(surface(0.5, 1.0)),))
     target.set_envmap(uniform())
-    size, box = (CAMERA.height, CAMERA.width), (0, CAMERA.height, 0, CAMERA.width)
+    size, box = (CAMERA.height, CAMERA.width), np.s_[0 : CAMERA.height, 0 : CAMERA.width]
     seen = radiance(target, size, box, spp=64, seed=1, max_depth=3, names=["body0"])
     left, right = disc() & (columns < CAMERA.width // 2 - 1), disc() & (columns > CAMERA.width // 2)
     assert (seen[left] == 0).all() and seen[right].min() > 0.1

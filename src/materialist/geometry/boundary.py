@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.camera import rays_through
 from materialist.errors import InputError
 from materialist.geometry.cuts import Cuts, find_cuts
 from materialist.types import Array, Camera, Mesh
@@ -95,13 +96,8 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
     leads = pixels & (component == np.arange(4))
     number = (np.cumsum(leads) - 1).reshape(leads.shape)
     index = np.where(pixels, np.take_along_axis(number, component, -1), -1)
-    corners = (
-        index[:-1, :-1, BOTTOM_RIGHT],
-        index[:-1, 1:, BOTTOM_LEFT],
-        index[1:, :-1, TOP_RIGHT],
-        index[1:, 1:, TOP_LEFT],
-    )
-    return np.stack(corners, -1)
+    upper = index[:-1, :-1, BOTTOM_RIGHT], index[:-1, 1:, BOTTOM_LEFT]
+    return np.stack([*upper, index[1:, :-1, TOP_RIGHT], index[1:, 1:, TOP_LEFT]], -1)
 
 
 def _component_table() -> Array:
@@ -152,13 +148,13 @@ def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex:
     for slot in range(4):
         screen[ids[:, slot], 0] = columns + slot % 2
         screen[ids[:, slot], 1] = rows + slot // 2
-    points = _unproject_corners(screen, mean_inverse, camera)  # [V, 3]
+    points = rays_through(screen, camera) / mean_inverse[:, None]  # [V, 3]
     normals = np.stack([np.bincount(ids.ravel(), np.repeat(normal[surface][:, k], 4), count) for k in range(3)], -1)
     faces = ids[:, QUAD].reshape(-1, 3)  # [2P, 3]
     pixel = np.repeat(rows * width + columns, 2)
 
     tuck_screen, tuck_inverse, back = _tucks(surface, cuts, vertex, reach, mean_inverse)  # [T, 4, 2], [T, 4], [T]
-    tuck_points = _unproject_corners(tuck_screen.reshape(-1, 2), tuck_inverse.ravel(), camera)
+    tuck_points = (rays_through(tuck_screen, camera) / tuck_inverse[..., None]).reshape(-1, 3)
     tuck_normals = np.repeat(normal.reshape(-1, 3)[back], 4, axis=0)
     tuck_uv = np.repeat(np.stack([(back % width + 0.5) / width, (back // width + 0.5) / height], -1), 4, axis=0)
     tuck_faces = (count + np.arange(len(back))[:, None, None] * 4 + QUAD).reshape(-1, 3)
@@ -233,13 +229,6 @@ def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Ar
     nearer = inverse.ravel()[second] > inverse.ravel()[first]
     front, back = np.where(nearer, second, first), np.where(nearer, first, second)
     return front, back, np.where(nearer[:, None], step, -step)
-
-
-def _unproject_corners(screen: Array, inverse: Array, camera: Camera) -> Array:
-    """[N, 3] float64 points at screen positions [N, 2] (pixels) with inverse depth [N]."""
-    x = (screen[:, 0] - camera.width / 2) / camera.focal
-    y = (camera.height / 2 - screen[:, 1]) / camera.focal
-    return np.stack([x, y, -np.ones(len(screen))], -1) / inverse[:, None]
 
 
 def face_camera(normals: Array, points: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from skimage.morphology import convex_hull_image
 
-from materialist.camera import unproject
+from materialist.camera import rays_through, unproject
 from materialist.geometry.extents import PlaneExtent, axes, extent_of
 from materialist.geometry.planes import Plane
 from materialist.types import Array, Camera, Mesh
@@ -186,8 +186,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     height, width = farthest.shape
     cell = max(1, max(height, width) // DEFAULT.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
-    x, y = (xs[None] - width / 2) / camera.focal, (height / 2 - ys[:, None]) / camera.focal
-    rays = np.stack(np.broadcast_arrays(x, y, np.array(-1.0)), -1)  # [h+1, w+1, 3] through the cell corners
+    rays = rays_through(np.stack(np.meshgrid(xs, ys), -1), camera)  # [h+1, w+1, 3] through the cell corners
     reach = sheet.plane.inverse_depth(rays)  # [h+1, w+1]
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import unproject
+from materialist.camera import unit, unproject
 from materialist.types import Array, Camera
 
 
@@ -68,8 +68,7 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
 
 def _slanted(normal: Array, points: Array) -> Array:
     """[H, W] bool: predicted normal [H, W, 3] within `slanted` of grazing, seen from the camera at points [H, W, 3]."""
-    length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(points, axis=-1)
-    return np.abs((normal * points).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted)) * length
+    return np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted))
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:
@@ -102,8 +101,7 @@ def _triangle_angle(a: Array, b: Array, c: Array) -> Array:
     normal = np.cross(b - a, c - a)
     centroid = a + b + c
     length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(centroid, axis=-1)
-    sine = np.abs((normal * centroid).sum(-1)) / np.maximum(length, 1e-300)
-    return np.arcsin(np.minimum(sine, 1))
+    return np.arcsin(np.minimum(np.abs((normal * centroid).sum(-1)) / np.maximum(length, 1e-300), 1))
 
 
 def _edge_angle(a: Array, b: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.geometry.planes import Plane
 from materialist.types import Array
@@ -58,8 +59,7 @@ def read_extents(provenance: dict[str, Any]) -> tuple[PlaneExtent, ...]:
 def axes(normal: Array) -> Array:
     """[2, 3] unit: to the right and up for one who faces a plane with this normal [3]; of a ceiling, any such pair."""
     normal = np.asarray(normal, np.float64)
-    across = np.cross([0.0, 1, 0] if abs(normal[1]) < 0.9 else [0.0, 0, 1], normal)
-    across /= np.linalg.norm(across)
+    across = unit(np.cross([0.0, 1, 0] if abs(normal[1]) < 0.9 else [0.0, 0, 1], normal))
     return np.stack([across, np.cross(normal, across)])
 
 

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.geometry.silhouette import window
 from materialist.types import Array
 
 _SWEEPS = 14
 """Relaxations at each size; the coarser sizes have done the rest (by eye)."""
+
+
+def nearest(known: Array) -> tuple[Array, Array]:
+    """[H, W] row and column of the nearest known place; known [H, W] bool, somewhere true."""
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return rows, columns
 
 
 def membrane(values: Array, known: Array) -> Array:
@@ -37,7 +46,7 @@ def _filled(values: Array, known: Array) -> Array:
     total = _halved(np.pad(values, ((0, height % 2), (0, width % 2), (0, 0))) * weight)
     count = _halved(weight)
     coarse = _filled(total / np.maximum(count, 1e-9), count[..., 0] > 0)
-    fine = _doubled(coarse)[:height, :width]
+    fine = coarse.repeat(2, 0).repeat(2, 1)[:height, :width]
     return _relaxed(np.where(known[..., None], values, fine), known)
 
 
@@ -47,19 +56,14 @@ def _halved(values: Array) -> Array:
     return rows[:, ::2] + rows[:, 1::2]
 
 
-def _doubled(values: Array) -> Array:
-    return values.repeat(2, 0).repeat(2, 1)
-
-
 def _relaxed(values: Array, known: Array) -> Array:
     """Each unknown place becomes the mean of its four neighbours, over and over; only around the unknown ones."""
-    rows, columns = np.flatnonzero((~known).any(1)), np.flatnonzero((~known).any(0))
-    window = np.s_[max(rows[0] - 1, 0) : rows[-1] + 2, max(columns[0] - 1, 0) : columns[-1] + 2]
-    part, free = values[window].copy(), ~known[window]
+    around = window(~known, margin=1)
+    part, free = values[around].copy(), ~known[around]
     for _ in range(_SWEEPS):
         framed = np.pad(part, ((1, 1), (1, 1), (0, 0)), mode="edge")
         mean = (framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]) / 4
         part[free] = mean[free]
     out = values.copy()
-    out[window] = part
+    out[around] = part
     return out

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from materialist.camera import pixel_rays
+from materialist.camera import pixel_rays, unit
 from materialist.geometry.boundary import check_maps
 from materialist.types import Array, Camera
 
@@ -74,7 +74,7 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, m
         if grown.sum() < least:
             break
         flat = np.median(small.normal[grown] @ fit.facing) > DEFAULT.flat
-        if flat and _unit(-fit.coefficients) @ fit.facing > DEFAULT.like_geometry:
+        if flat and unit(-fit.coefficients) @ fit.facing > DEFAULT.like_geometry:
             found.append(fit)
         free &= ~grown
     return _label(_Maps(rays, normal.astype(np.float64), depth), found)
@@ -134,12 +134,20 @@ def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None
 
 
 def _refit(maps: _Maps, inside: Array) -> _Fit | None:
-    """Least squares over the pixels inside [H, W]; weighted by depth, so that the relative error counts."""
+    """The plane of least squares over the pixels inside [H, W]."""
     if inside.sum() < 3:
         return None
-    scaled = maps.rays[inside] * maps.depth[inside, None]
-    coefficients = np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
-    return _Fit(coefficients, _unit(maps.normal[inside].mean(0)))
+    coefficients = through(maps.rays[inside], maps.depth[inside])
+    return _Fit(coefficients, unit(maps.normal[inside].mean(0)))
+
+
+def through(rays: Array, depth: Array) -> Array:
+    """[3] whose product with a ray is the inverse depth of the plane through points at rays [N, 3], depth [N].
+
+    Weighted by depth, so that the relative error counts.
+    """
+    scaled = rays * depth[:, None]
+    return np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
 
 
 def _grow(maps: _Maps, free: Array, fit: _Fit) -> tuple[_Fit, Array]:
@@ -195,8 +203,3 @@ def _without_specks(mask: Array) -> Array:
     keep = sizes >= DEFAULT.speck * mask.size
     keep[0] = False
     return keep[patches]
-
-
-def _unit(vector: Array) -> Array:
-    """[3] scaled to length 1; a zero vector stays."""
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)

@@ -19,6 +19,38 @@ def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
     return inside
 
 
+def window(mask: Array, native: tuple[int, ...] | None = None, margin: int = 0) -> tuple[slice, slice]:
+    """Rows and columns of the pixels of a mask [H, W] bool that is not empty, and of `margin` around them.
+
+    native: size of a larger picture whose rows and columns they are; None: those of the mask.
+    """
+    sides = []
+    for axis in (0, 1):
+        where, count = np.flatnonzero(mask.any(1 - axis)), mask.shape[axis]
+        first, last, size = max(where[0] - margin, 0), min(where[-1] + 1 + margin, count), (native or mask.shape)[axis]
+        sides.append(slice(int(first * size // count), int(-(-last * size // count))))
+    return sides[0], sides[1]
+
+
+def area(box: tuple[slice, slice]) -> int:
+    """Pixels of a window."""
+    return (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
+
+
+def disc(radius: int) -> Array:
+    """[2 r + 1, 2 r + 1] uint8: the pixels within a radius, for `cv2.erode` and its like."""
+    import cv2
+
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2))
+
+
+def grown(mask: Array, radius: int) -> Array:
+    """[H, W] bool: a mask grown by a disc of `radius` pixels."""
+    import cv2
+
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), disc(radius)) > 0)
+
+
 def border_distance(inside: Array) -> Array:
     """[H, W] pixels from each pixel's centre to the silhouette, 0 outside; the picture's border is no silhouette."""
     from scipy.ndimage import distance_transform_edt

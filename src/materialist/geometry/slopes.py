@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from materialist.camera import unit
+from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import spacing
 from materialist.types import Array
 
@@ -93,12 +95,10 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
 
 def continued(values: Array, known: Array, far: float = 1.5) -> Array:
     """[H, W] float64: a map carried on along the planes of its last known pixels for `far` pixels, constant beyond."""
-    from scipy.ndimage import distance_transform_edt
-
     right, down = depth_slopes(values, known)
-    away, (i, j) = distance_transform_edt(~known, return_indices=True)
+    i, j = nearest(known)
     rows, columns = np.indices(known.shape)
-    part = np.minimum(1, far / np.maximum(away, 1e-9))
+    part = np.minimum(1, far / np.maximum(np.hypot(rows - i, columns - j), 1e-9))
     beyond = values[i, j] + part * (right[i, j] * (columns - j) + down[i, j] * (rows - i))
     return np.where(known, values, beyond).astype(np.float64)
 
@@ -121,8 +121,7 @@ def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -
     upright = -(down * depth)[..., None] * rays - np.array([0, step, 0])
     normal = np.cross(upright, across)
     normal *= np.sign((normal * rays).sum(-1, keepdims=True))
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-30)
-    return np.where(known[..., None], normal, 0)
+    return np.where(known[..., None], unit(normal), 0)
 
 
 def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
@@ -132,4 +131,4 @@ def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
     mean = np.where(inside[..., None], normal, 0).astype(np.float64)
     if sigma > 0.1:
         mean = gaussian_filter(mean, (sigma, sigma, 0))
-    return mean / np.maximum(np.linalg.norm(mean, axis=-1, keepdims=True), 1e-9)
+    return unit(mean)

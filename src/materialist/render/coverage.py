@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from materialist.geometry.silhouette import area
 from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
 _RAYS = 2**20
 """Pixels looked at together: bounds the memory."""
-Box = tuple[int, int, int, int]
-"""Rows and columns (top, bottom, left, right) of a part of a picture, the ends excluded."""
+Box = tuple[slice, slice]
+"""Rows and columns of a part of a picture."""
 
 
 @dataclass(frozen=True)
@@ -36,38 +38,46 @@ def coverage(scene, camera: Camera, names: Sequence[str]) -> Array:
 
     scene: a Mitsuba scene (`RenderScene.mi_scene`).
     """
-    size = (camera.height, camera.width)
-    return first_hits(scene, camera, dict.fromkeys(names), size, (0, size[0], 0, size[1])).share
+    return first_hits(scene, camera, dict.fromkeys(names), (camera.height, camera.width)).share
 
 
-def first_hits(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, int], box: Box) -> FirstHits:
+def only(scene, names: Sequence[str]):
+    """The named shapes of a Mitsuba scene as a scene of their own, to see what hides them."""
+    import mitsuba as mi
+
+    chosen = {shape.id(): shape for shape in scene.shapes() if shape.id() in names}
+    return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **chosen})
+
+
+def first_hits(
+    scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box | None = None
+) -> FirstHits:
     """See `FirstHits`.
 
     Args:
         scene: a Mitsuba scene (`RenderScene.mi_scene`).
         bodies: by the names of their shapes; None: its albedo is not asked for.
-        size: (H, W) of the whole picture. box: the part of it that is wanted.
+        size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
-    top, bottom, left, right = box
-    rows = max(1, _RAYS // max(right - left, 1))
+    rows, columns = box or (slice(0, size[0]), slice(0, size[1]))
+    step = max(1, _RAYS // max(columns.stop - columns.start, 1))
     strips = [
-        _strip(scene, camera, bodies, size, (first, min(first + rows, bottom), left, right))
-        for first in range(top, bottom, rows)
+        _strip(scene, camera, bodies, size, (slice(first, min(first + step, rows.stop)), columns))
+        for first in range(rows.start, rows.stop, step)
     ]
     found = np.concatenate(strips)  # [h, w, 8]
     take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
     return FirstHits(take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7]))
 
 
-def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, int], box: Box) -> Array:
+def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box) -> Array:
     """[h, w, 8] share, albedo, normal and depth of a few rows."""
     import mitsuba as mi
 
-    top, bottom, left, right = box
-    h, w = bottom - top, right - left
+    h, w = (side.stop - side.start for side in box)
     shapes = {shape.id(): shape for shape in scene.shapes()}
     total = np.zeros((h * w, 8))
-    for direction in _directions(camera, size, box):
+    for direction in _grid(camera, size, box):
         si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), direction))
         normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
         for name, body in bodies.items():
@@ -80,19 +90,29 @@ def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple
     return total.reshape(h, w, 8)
 
 
-def _directions(camera: Camera, size: tuple[int, int], box: Box) -> Iterator:
+def _grid(camera: Camera, size: tuple[int, ...], box: Box) -> Iterator:
     """Unit directions through GRID x GRID points of every pixel of a box, one point of all pixels at a time."""
     import drjit as dr
     import mitsuba as mi
 
-    top, bottom, left, right = box
-    pixel, width = dr.arange(mi.UInt32, (bottom - top) * (right - left)), right - left
-    row, column = mi.Float(pixel // width) + top, mi.Float(pixel % width) + left
-    half = float(np.tan(np.radians(camera.fov) / 2))
+    pixel = dr.arange(mi.UInt32, area(box))
     for k in range(GRID * GRID):
-        x = (column + dr.opaque(mi.Float, (k % GRID + 0.5) / GRID)) / size[1] * 2 - 1
-        y = 1 - (row + dr.opaque(mi.Float, (k // GRID + 0.5) / GRID)) / size[0] * 2
-        yield dr.normalize(mi.Vector3f(x * half, y * (half * camera.height / camera.width), -1))
+        x, y = (dr.opaque(mi.Float, (n + 0.5) / GRID) for n in (k % GRID, k // GRID))
+        yield directions(camera, size, box, pixel, x, y)
+
+
+def directions(camera: Camera, size: tuple[int, ...], box: Box, pixel: Any, x: Any, y: Any) -> Any:
+    """Unit directions through pixels of a box (row-major, UInt32), at places x, y in [0, 1] inside of them.
+
+    The sides of the working size are rounded, so at the upper and lower rim this may be off by half a pixel of it.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    width, half = box[1].stop - box[1].start, float(np.tan(np.radians(camera.fov) / 2))
+    across = (mi.Float(pixel % width) + box[1].start + x) / size[1] * 2 - 1
+    up = 1 - (mi.Float(pixel // width) + box[0].start + y) / size[0] * 2
+    return dr.normalize(mi.Vector3f(across * half, up * (half * camera.height / camera.width), -1))
 
 
 def _albedo(body: Body, uv: Array) -> Array:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from materialist.camera import rays_through, unit
 from materialist.errors import InputError
-from materialist.geometry.membrane import membrane
-from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in
+from materialist.geometry.membrane import membrane, nearest
+from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in, window
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
 from materialist.solids.front import DEFAULT as FRONT
 from materialist.solids.front import smooth_front
@@ -98,6 +99,11 @@ class _View:
         """Root of the object's area, pixels."""
         return float(np.sqrt(self.inside.sum()))
 
+    @property
+    def length(self) -> Array:
+        """[h, w] of the rays."""
+        return np.linalg.norm(self.rays, axis=-1)
+
 
 def _check(normal: Array, thickness: Array, inside: Array) -> None:
     if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
@@ -112,23 +118,15 @@ def _check(normal: Array, thickness: Array, inside: Array) -> None:
 def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
     margin = DEFAULT.margin
     edge = margin + 1
-    rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
-    top, left = rows[0] - edge, columns[0] - edge
-    bottom, right = rows[-1] + edge + 1, columns[-1] + edge + 1
-    y, x = np.arange(top, bottom), np.arange(left, right)
+    y, x = (np.arange(side.start - edge, side.stop + edge) for side in window(inside))
     # Beyond the frame everything goes on as at its edge, for some pixels.
     i, j = np.clip(y, 0, camera.height - 1)[:, None], np.clip(x, 0, camera.width - 1)[None]
     near = ((y >= -margin) & (y < camera.height + margin))[:, None] & ((x >= -margin) & (x < camera.width + margin))
-    rays = np.stack(
-        np.broadcast_arrays(
-            ((x + 0.5 - camera.width / 2) / camera.focal)[None],
-            ((camera.height / 2 - y - 0.5) / camera.focal)[:, None], np.array(-1.0),
-        ), -1,
-    )  # fmt: skip
-    beyond = np.zeros(inside.shape) if behind is None else np.asarray(behind)
+    rays = rays_through(np.stack(np.meshgrid(x, y), -1) + 0.5, camera)
+    beyond = np.zeros(inside.shape) if behind is None else behind
     return _View(
-        np.asarray(depth)[i, j], np.asarray(normal)[i, j], inside[i, j] & near, np.asarray(thickness)[i, j],
-        beyond[i, j], None if back is None else np.asarray(back)[i, j], rays, int(left), int(top),
+        depth[i, j], normal[i, j], inside[i, j] & near, thickness[i, j], beyond[i, j],
+        None if back is None else back[i, j], rays, int(x[0]), int(y[0]),
     )  # fmt: skip
 
 
@@ -142,8 +140,7 @@ def _thickness(view: _View, front: Array) -> Array:
 
 def _cavity(view: _View, front: Array, thick: Array, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
-    length = np.linalg.norm(view.rays, axis=-1)
-    facing = np.abs((view.normal * view.rays).sum(-1)) / length
+    facing = np.abs((view.normal * view.rays).sum(-1)) / view.length
     through = wall / np.clip(facing, DEFAULT.grazing, 1)  # [h, w] along the ray, of one wall
     left = thick - 2 * through
     pixel = front * spacing(view.rays)
@@ -151,14 +148,14 @@ def _cavity(view: _View, front: Array, thick: Array, wall: float, camera: Camera
     if room.sum() < 16:
         return None
     inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
-    return _closed(inner, front + through / length, np.where(room, left, 0), camera)
+    return _closed(inner, front + through / view.length, np.where(room, left, 0), camera)
 
 
 def _closed(view: _View, front: Array, thick: Array, camera: Camera) -> Shell:
     """Front and back, [h, w] planar depth and the way between them along the rays, over one triangulated region."""
     import cv2
 
-    known, length = view.inside, np.linalg.norm(view.rays, axis=-1)
+    known, length = view.inside, view.length
     edge = silhouette_field(known)  # [h, w] pixels
     factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
@@ -190,18 +187,13 @@ def _closed(view: _View, front: Array, thick: Array, camera: Camera) -> Shell:
 
 def _between(normal: Array, known: Array, place: Array) -> Array:
     """[V, 3] unit normals at places [V, 2] of a map [h, w, 3], the nearest known ones beyond the mask."""
-    from scipy.ndimage import distance_transform_edt
-
-    i, j = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    found = _sampled(normal[i, j], place)
-    return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+    return unit(_sampled(normal[nearest(known)], place))
 
 
 def _room(view: _View, front: Array) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
-    length = np.linalg.norm(view.rays, axis=-1)
     known = view.inside & (view.behind > 0)
-    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - front, 0) * length, NOTHING)
+    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - front, 0) * view.length, NOTHING)
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
 

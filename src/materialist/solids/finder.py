@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import pixel_rays
-from materialist.geometry.silhouette import object_size, surface_in
+from materialist.camera import pixel_rays, unit
+from materialist.geometry.silhouette import object_size, surface_in, window
 from materialist.solids.outline import by_outline
 from materialist.solids.revolution import Axis, Revolution, profile_of
 from materialist.types import Array, Camera
@@ -55,7 +55,6 @@ def surface_of_revolution(
         return None
     rays = pixel_rays(camera).astype(np.float64)
     depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
-    up = None if up is None else np.asarray(up, np.float64)
     found = _by_normals(depth, normal, inside, rays, up, behind)
     if found is not None:
         return found, found.thickness(depth, inside, rays)
@@ -73,10 +72,9 @@ def upright(normal: Array, plane: Array) -> Array | None:
     """
     counts = np.bincount(plane[plane >= 0], minlength=1)
     for k in np.argsort(-counts)[: np.count_nonzero(counts > 12)]:
-        mean = normal[plane == k].mean(0, dtype=np.float64)
-        length = float(np.linalg.norm(mean))
-        if mean[1] > 0.6 * max(length, 1e-9):
-            return mean / length
+        mean = unit(normal[plane == k].mean(0, dtype=np.float64))
+        if mean[1] > 0.6:
+            return mean
     return None
 
 
@@ -95,10 +93,10 @@ def _axis(depth: Array, normal: Array, inside: Array, rays: Array, up: Array | N
     """The axis that the normals meet best, and their mean sine with the planes through it."""
     from scipy.optimize import minimize
 
-    rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
-    step = max(1, round(max(np.ptp(rows), np.ptp(columns)) / DEFAULT.coarse))
+    rows, columns = window(inside)
+    step = max(1, round((max(rows.stop - rows.start, columns.stop - columns.start) - 1) / DEFAULT.coarse))
     thin = np.zeros_like(inside)
-    thin[rows[0] :: step, columns[0] :: step] = True
+    thin[rows.start :: step, columns.start :: step] = True
     thin &= inside
     points, normals = (rays * depth[..., None])[thin], normal[thin]  # [N, 3]
     size = object_size(inside, depth, rays)
@@ -112,9 +110,7 @@ def _axis(depth: Array, normal: Array, inside: Array, rays: Array, up: Array | N
 
     def sine(values: Array) -> float:
         tried = axis(values)
-        across = np.cross(tried.up, points - tried.foot)
-        across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
-        return float(np.abs((normals * across).sum(-1)).mean())
+        return float(np.abs((normals * unit(np.cross(tried.up, points - tried.foot))).sum(-1)).mean())
 
     def cost(values: Array) -> float:
         far = np.maximum(np.abs(values[:2]) - DEFAULT.reach, 0).sum()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from materialist.camera import pixel_rays, project
+from materialist.camera import pixel_rays, project, unit
 from materialist.geometry.silhouette import silhouette_field
 from materialist.solids.profile import Profile, fitted
 from materialist.solids.revolution import DEFAULT as REVOLUTION
@@ -117,8 +117,7 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
 
     own = rays[inside]
     middle = own.mean(0)
-    first = np.cross(up, -middle)
-    first /= np.linalg.norm(first)  # across the plane through the middle of the mask
+    first = unit(np.cross(up, -middle))  # across the plane through the middle of the mask
     second = np.cross(up, first)
 
     def plane(angle: float) -> Array:
@@ -190,8 +189,7 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     """
     from scipy.ndimage import map_coordinates
 
-    first = np.cross(axis.up, axis.foot)
-    first /= np.linalg.norm(first)
+    first = unit(np.cross(axis.up, axis.foot))
     halves = []
     for half in (0.0, np.pi):
         least = np.full((len(h), len(r)), np.inf)
@@ -211,8 +209,7 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     from scipy.ndimage import gaussian_filter1d
 
     smooth = gaussian_filter1d(line, 3.0, axis=0, mode="nearest")
-    step = np.gradient(smooth, axis=0)
-    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
+    step = unit(np.gradient(smooth, axis=0))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
@@ -228,8 +225,7 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     wide, top = side[-1]
     r = np.arange(0, wide, cell)[::-1]
     cap = np.stack([r, top + slope * (wide**2 - r**2) / (2 * max(wide, cell))], -1)
-    lean = np.stack([slope * r / max(wide, cell), np.ones_like(r)], -1)
-    lean /= np.linalg.norm(lean, axis=1, keepdims=True)
+    lean = unit(np.stack([slope * r / max(wide, cell), np.ones_like(r)], -1))
     seen, leaning = np.concatenate([side, cap]), np.concatenate([leaning, lean])
     high = float(np.ptp(seen[:, 1]))
     floor = float(side[0, 1])

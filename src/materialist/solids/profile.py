@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.types import Array
 
 
@@ -86,8 +87,7 @@ class Profile:
             ends = np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6
             if len(line) < 4 or not ends or tree.query(place)[0].min() > DEFAULT.beside * self.cell + level:
                 continue
-            normal = np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
-            normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+            normal = unit(np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line)))
             along = np.gradient(line, axis=0)
             if np.sum(along[:, 0] * normal[:, 1] - along[:, 1] * normal[:, 0]) > 0:
                 place, normal = place[::-1], normal[::-1]
@@ -235,11 +235,8 @@ def _points(at: Array, leaning: Array, shape: tuple[int, int]) -> tuple:
     up = np.stack([x - 1, -x, 1 - x, x], 1)
     weight = 1 / np.sqrt(np.bincount(index, minlength=shape[0] * shape[1])[index])
     parts, wanted = [], []
-    for columns, target, strength in (
-        (value, 0 * x, 1.0),
-        (out, leaning[:, 0], DEFAULT.lean),
-        (up, leaning[:, 1], DEFAULT.lean),
-    ):
+    told = (value, 0 * x, 1.0), (out, leaning[:, 0], DEFAULT.lean), (up, leaning[:, 1], DEFAULT.lean)
+    for columns, target, strength in told:
         parts.append(columns * (weight * strength)[:, None])
         wanted.append(target * weight * strength)
     rows = np.repeat(np.arange(3 * len(at)), 4)

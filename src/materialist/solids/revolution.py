@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import project
+from materialist.camera import project, unit
+from materialist.geometry.extents import axes
+from materialist.geometry.silhouette import grown
 from materialist.solids.profile import Profile, fitted
 from materialist.solids.shell import Shell, inside_out, joined
 from materialist.types import Array, Camera
@@ -55,19 +57,16 @@ class Axis:
 
     def leaning(self, points: Array, normals: Array) -> Array:
         """[N, 2] unit normals of the profile at points [N, 3] with normals [N, 3]."""
-        found = np.stack([(normals * self._out(points)).sum(-1), normals @ self.up], -1)
-        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+        return unit(np.stack([(normals * self._out(points)).sum(-1), normals @ self.up], -1))
 
     def spread(self, points: Array, leaning: Array) -> Array:
         """[N, 3] unit normals at points [N, 3] where the profile leans by [N, 2]."""
-        found = leaning[:, :1] * self._out(points) + leaning[:, 1:] * self.up
-        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-12)
+        return unit(leaning[:, :1] * self._out(points) + leaning[:, 1:] * self.up)
 
     def _out(self, points: Array) -> Array:
         """[N, 3] unit, across the axis, to points [N, 3]."""
         away = points - self.foot
-        out = away - (away @ self.up)[:, None] * self.up
-        return out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-12)
+        return unit(away - (away @ self.up)[:, None] * self.up)
 
 
 @dataclass(frozen=True)
@@ -168,9 +167,7 @@ def _passed(
     depth: Array, inside: Array, rays: Array, axis: Axis, extent: tuple[float, float], cell: float
 ) -> Array:  # fmt: skip
     """[M, 2] places of the half plane that rays pass before they meet anything; extent: (width, height) of the body."""
-    import cv2
-
-    near = cv2.dilate(inside.astype(np.uint8), np.ones((2 * DEFAULT.near + 1,) * 2, np.uint8)) > 0
+    near = grown(inside, DEFAULT.near)
     stride = max(1, int(near.sum()) // DEFAULT.rays)
     front = np.where(inside, depth - DEFAULT.before * cell, np.inf)[near][::stride]
     ray = rays[near][::stride]
@@ -185,10 +182,8 @@ def _passed(
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     """One line [K, 2] with normals [K, 2], the body to its left, swept around the axis; ends at the axis are poles."""
-    first = np.cross(axis.up, [0.0, 0, 1] if abs(axis.up[2]) < 0.9 else [1.0, 0, 0])
-    first /= np.linalg.norm(first)
     angle = 2 * np.pi * np.arange(DEFAULT.around) / DEFAULT.around
-    out = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * np.cross(axis.up, first)  # [A, 3]
+    out = np.stack([np.cos(angle), np.sin(angle)], -1) @ axes(axis.up)  # [A, 3]
     ring = bool(np.allclose(line[0], line[-1]))
     rows, lean = (line[:-1], leaning[:-1]) if ring else (line, leaning)
     points = axis.foot + rows[:, None, :1] * out + rows[:, None, 1:] * axis.up  # [K, A, 3]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from materialist.camera import rays_through, unit
 from materialist.types import Array, Camera
 
 
@@ -157,10 +158,9 @@ def closed(region: MeshedRegion, sheets: Sheets, camera: Camera) -> Shell:
 
 def _across(points: Array, outward: Array) -> Array:
     """[R, 3] unit normals of a wall along the rays to points [R, 3], that ends the region towards `outward` [R, 2]."""
-    ray = points / np.linalg.norm(points, axis=-1, keepdims=True)
+    ray = unit(points)
     side = np.stack([outward[:, 0], -outward[:, 1], np.zeros(len(outward))], -1)
-    side -= (side * ray).sum(-1, keepdims=True) * ray
-    return side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
+    return unit(side - (side * ray).sum(-1, keepdims=True) * ray)
 
 
 def _strip(one: Array, two: Array, edges: Array) -> Array:
@@ -173,19 +173,15 @@ def _outward(points: Array, edges: Array) -> Array:
     """[R, 2] unit directions (y down) away from the region at its border's points [R, 2]."""
     along = points[edges[:, 1]] - points[edges[:, 0]]
     # The region lies to the left of its edges seen with y up: outside is to the right.
-    side = np.stack([-along[:, 1], along[:, 0]], -1)
-    side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
+    side = unit(np.stack([-along[:, 1], along[:, 0]], -1))
     total = np.zeros_like(points)
     for k in range(2):
         np.add.at(total, edges[:, k], side)
-    return total / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-9)
+    return unit(total)
 
 
 def _in_space(place: Array, front: Array, beyond: Array, camera: Camera) -> tuple[Array, Array]:
     """[N, 3] points on the rays through `place` [N, 2], `beyond` [N] along the ray behind planar depth `front` [N]."""
-    column, row = place[:, 0] + 0.5, place[:, 1] + 0.5
-    rays = np.stack(
-        [(column - camera.width / 2) / camera.focal, (camera.height / 2 - row) / camera.focal, -np.ones(len(row))], -1
-    )
+    rays = rays_through(place + 0.5, camera)
     points = rays * (front + beyond / np.linalg.norm(rays, axis=-1))[:, None]
-    return points, np.clip(np.stack([column / camera.width, row / camera.height], -1), 0, 1).astype(np.float32)
+    return points, np.clip((place + 0.5) / [camera.width, camera.height], 0, 1).astype(np.float32)

@@ -10,7 +10,8 @@ import numpy as np
 
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.native_layer import NativeLayer
-from materialist.edits.composite.upsample import GuidedUpsample, matte, strips, window
+from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
+from materialist.geometry.silhouette import window
 from materialist.types import Array, Photo
 
 WHITE = 0.995

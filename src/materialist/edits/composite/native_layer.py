@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from materialist.edits.composite.upsample import matte, nearest, window
+from materialist.edits.composite.upsample import matte
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
 from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
+from materialist.geometry.membrane import nearest
+from materialist.geometry.silhouette import area, grown, window
 from materialist.types import Array, Body, Scene
 
 if TYPE_CHECKING:
@@ -65,8 +67,8 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     """
     import cv2
 
-    from materialist.render.coverage import first_hits
-    from materialist.render.native import only, radiance
+    from materialist.render.coverage import first_hits, only
+    from materialist.render.native import radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
@@ -79,19 +81,17 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     camera, native, working = scene.camera, scene.photo.original.shape[:2], scene.depth.shape
     shapes = {f"body{k}": body for k, body in enumerate(edited.bodies)}
     chosen = {name: shapes.get(name, LAMP) for name in names}
-    small = first_hits(target.mi_scene, camera, chosen, working, (0, working[0], 0, working[1])).share
+    small = first_hits(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
     there = window(small > 0, native, SETTINGS.margin)
-    box = (there[0].start, there[0].stop, there[1].start, there[1].stop)
-    sight = first_hits(target.mi_scene, camera, chosen, native, box)
-    alone = first_hits(only(target.mi_scene, names), camera, chosen, native, box)
+    sight = first_hits(target.mi_scene, camera, chosen, native, there)
+    alone = first_hits(only(target.mi_scene, names), camera, chosen, native, there)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     gap = (SETTINGS.lamp_contact if names == lamps else SETTINGS.contact) * _extent(alone)
-    size, part = _traced_size(native, box)
+    size, part = _traced_size(native, there)
     # As many paths as a picture of working size has, on the part that the bodies take.
-    pixels = (part[1] - part[0]) * (part[3] - part[2])
-    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // pixels))
+    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // area(part)))
     depth = path_depth(edited)
     picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))
     if clean:
@@ -108,12 +108,13 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
 
 def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
     """Size of the picture that is traced, and the native box in it."""
-    factor = min(1.0, np.sqrt(SETTINGS.pixels / ((box[1] - box[0]) * (box[3] - box[2]))))
-    height, width = (max(2, round(n * factor)) for n in native)
-    y, x = height / native[0], width / native[1]
-    top, left = int(box[0] * y), int(box[2] * x)
-    bottom, right = max(top + 1, round(box[1] * y)), max(left + 1, round(box[3] * x))
-    return (height, width), (top, min(bottom, height), left, min(right, width))
+    factor = min(1.0, np.sqrt(SETTINGS.pixels / area(box)))
+    size = tuple(max(2, round(n * factor)) for n in native)
+    sides = []
+    for side, whole, traced in zip(box, native, size):
+        first = side.start * traced // whole
+        sides.append(slice(first, min(max(first + 1, round(side.stop * traced / whole)), traced)))
+    return (size[0], size[1]), (sides[0], sides[1])
 
 
 def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Array:
@@ -127,15 +128,12 @@ def _behind_things(sight: Any, alone: Any, scene: Scene, there: tuple[slice, sli
 
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
     """
-    import cv2
-
     native, working = scene.photo.original.shape[:2], scene.depth.shape
     nearer = alone.depth - _resized(scene.depth, native, "NEAREST")[there]
     hidden = (alone.share > sight.share + 0.05) & (nearer > gap)
     if not hidden.any():
         return sight.share
-    kernel = np.ones((2 * int(np.ceil(2 * max(native[0] / working[0], 1.0))) + 1,) * 2, np.uint8)
-    near = cv2.dilate(hidden.astype(np.uint8), kernel) > 0
+    near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))
     whole = np.zeros(native, np.float32)
     whole[there] = spread(alone.depth)
     depth = spread(_resized(whole, working, "NEAREST"))

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.geometry.membrane import nearest
+from materialist.geometry.silhouette import window
 from materialist.types import Array
 
 STRIP = 128
@@ -42,24 +44,6 @@ UPSAMPLE = UpsampleSettings()
 def strips(height: int, size: int = STRIP, start: int = 0) -> Iterator[slice]:
     """Slices of at most `size` rows that cover `height` rows, from `start` on."""
     return (slice(top, min(top + size, height)) for top in range(start, height, size))
-
-
-def window(mask: Array, native: tuple[int, int], margin: int = 0) -> tuple[slice, slice]:
-    """The native rows and columns of the pixels of a mask [H, W] bool that is not empty, and of `margin` around."""
-    sides = []
-    for axis in (0, 1):
-        where, count = np.flatnonzero(mask.any(1 - axis)), mask.shape[axis]
-        first, last = max(where[0] - margin, 0), min(where[-1] + 1 + margin, count)
-        sides.append(slice(first * native[axis] // count, -(-last * native[axis] // count)))
-    return sides[0], sides[1]
-
-
-def nearest(mask: Array) -> tuple[Array, Array]:
-    """[H, W] row and column of the nearest pixel of a mask [H, W] bool, which is not empty."""
-    from scipy.ndimage import distance_transform_edt
-
-    rows, columns = distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    return rows, columns
 
 
 class GuidedUpsample:

@@ -11,6 +11,7 @@ import numpy as np
 from materialist.edits.core.sky import photo_sky
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.errors import SetupError
+from materialist.geometry.silhouette import window
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
@@ -86,11 +87,9 @@ class EditRenderer:
         if not covered.any():
             return edited.materials.albedo, edited.normal
         bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
-        rows, columns = np.flatnonzero(covered.any(1)), np.flatnonzero(covered.any(0))
-        box = (int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1)
-        sight = first_hits(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, box)
+        part = window(covered)
+        sight = first_hits(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, part)
         albedo, normal = edited.materials.albedo.copy(), edited.normal.copy()
-        part = np.s_[box[0] : box[1], box[2] : box[3]]
         share = np.where(covered[part], sight.share, 0)[..., None]
         albedo[part] = share * sight.albedo + (1 - share) * albedo[part]
         normal[part] = share * sight.normal + (1 - share) * normal[part]

@@ -19,6 +19,7 @@ from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support
 from materialist.errors import InputError
+from materialist.geometry.extents import axes
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
@@ -203,10 +204,7 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
 
 def upright(direction: Array) -> Array:
     """[3, 3] rotation from the camera frame to one whose z axis is against gravity."""
-    z = -direction
-    x = np.cross([0.0, 0.0, 1.0], z) if abs(z[2]) < 0.9 else np.cross([0.0, 1.0, 0.0], z)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
+    return np.concatenate([axes(-direction), -direction[None]])
 
 
 def _places(at: Any, count: int) -> list[tuple[float, float]]:

@@ -13,6 +13,8 @@ from materialist.edits.core.region import checked_region
 from materialist.edits.glass.thickness import ObjectThickness, object_thickness, objects_in
 from materialist.edits.remove.native import resized
 from materialist.edits.remove.remove import remove
+from materialist.geometry.membrane import nearest
+from materialist.geometry.slopes import blurred_normals
 from materialist.options import Glass
 from materialist.solids.closed import closed_proxy
 from materialist.solids.shell import Shell, joined
@@ -115,7 +117,7 @@ def _two_interface(
     linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
     share = np.clip(resized(own.astype(np.float32), native), 0, 1)[..., None]
-    near = resized(_beyond(picture, own), native)
+    near = resized(picture[nearest(own)], native)  # with nothing else mixed in where it is enlarged
     original = (share * near + (1 - share) * photo.original).astype(np.float32)
     return replace(removed, photo=replace(photo, linear=linear, original=original))
 
@@ -125,17 +127,7 @@ def _front(scene: Scene, own: Array, found: ObjectThickness) -> tuple[Array, Arr
 
     Normals of the maps are blurred as for the closed proxy.
     """
-    from materialist.geometry.slopes import blurred_normals
-
     if found.revolution is None:
         return own, scene.depth, blurred_normals(scene.normal, own, 0.01 * float(np.sqrt(own.sum())))
     depth, normal = found.revolution.front(own, pixel_rays(scene.camera).astype(np.float64))
     return depth > 0, depth, normal
-
-
-def _beyond(picture: Array, own: Array) -> Array:
-    """[H, W, 3] the picture with its nearest values outside the mask, so that enlarging mixes in nothing else."""
-    from scipy.ndimage import distance_transform_edt
-
-    rows, columns = distance_transform_edt(~own, return_distances=False, return_indices=True)
-    return picture[rows, columns]

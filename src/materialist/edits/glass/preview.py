@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from materialist.edits.composite.layers import without_fireflies
 from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
+from materialist.geometry.silhouette import area, window
 from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
@@ -52,6 +51,9 @@ class GlassPreview:
         sky = photo_sky(self._edited)
         self._light = self._edited.envmap if sky is None else sky
         self._name = f"body{len(self._edited.bodies) - 1}"
+        self._size = scene.depth.shape
+        self.share: Array
+        """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
         self._look()
 
     def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
@@ -69,16 +71,12 @@ class GlassPreview:
             raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
-        paths = max(FEWEST, min(spp, PATHS // ((box[1] - box[0]) * (box[3] - box[2]))))
+        paths = max(FEWEST, min(spp, PATHS // area(box)))
         seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
-        calm = without_fireflies(spread(seen))
-        guide = self._guide
-        return self._in_photo(denoised(calm, guide.albedo, guide.normal))
-
-    @property
-    def share(self) -> Array:
-        """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
-        return self._share
+        traced = denoised(without_fireflies(spread(seen)), self._guide.albedo, self._guide.normal)
+        out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
+        out[box] = share * traced + (1 - share) * out[box]
+        return out
 
     @property
     def filled(self) -> Array:
@@ -87,24 +85,14 @@ class GlassPreview:
 
     def _look(self) -> None:
         """What of the body is seen where."""
-        camera = self.scene.camera
-        self._size = working = (camera.height, camera.width)
-        share = self._sight((0, working[0], 0, working[1])).share
-        rows, columns = np.flatnonzero(share.any(1)), np.flatnonzero(share.any(0))
-        if not len(rows):
-            raise InputError("The camera sees nothing of the object; mark another one.")
-        self._share = share
-        self._box = (
-            max(0, int(rows[0]) - MARGIN), min(working[0], int(rows[-1]) + 1 + MARGIN),
-            max(0, int(columns[0]) - MARGIN), min(working[1], int(columns[-1]) + 1 + MARGIN),
-        )  # fmt: skip
-        self._guide = self._sight(self._box)
-
-    def _sight(self, box: tuple[int, int, int, int]) -> Any:
         from materialist.render.coverage import first_hits
 
-        target = self._target(self._edited.bodies[-1].surface)
-        return first_hits(target.mi_scene, self.scene.camera, {self._name: self._edited.bodies[-1]}, self._size, box)
+        scene, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
+        self.share = first_hits(scene, self.scene.camera, body, self._size).share
+        if not self.share.any():
+            raise InputError("The camera sees nothing of the object; mark another one.")
+        self._box = window(self.share > 0, margin=MARGIN)
+        self._guide = first_hits(scene, self.scene.camera, body, self._size, self._box)
 
     def _target(self, surface: Surface) -> RenderScene:
         """The ray tracer's scene with the body of that glass."""
@@ -118,11 +106,3 @@ class GlassPreview:
         target.set_materials(edited.materials)
         target.set_envmap(self._light)
         return target
-
-    def _in_photo(self, traced: Array) -> Array:
-        """[H, W, 3] the traced rectangle in the photo without the object."""
-        top, bottom, left, right = self._box
-        out = self._edited.photo.linear.copy()
-        share = self._share[top:bottom, left:right, None]
-        out[top:bottom, left:right] = share * traced + (1 - share) * out[top:bottom, left:right]
-        return out

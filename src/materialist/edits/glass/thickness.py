@@ -9,6 +9,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
+from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
 from materialist.predict.refraction import best_thickness, thickness
@@ -56,14 +57,14 @@ def objects_in(mask: Array) -> list[Array]:
 
     Specks count to the nearest object.
     """
-    from scipy.ndimage import distance_transform_edt, label
+    from scipy.ndimage import label
 
     number, _ = label(mask, np.ones((3, 3)))
     area = np.bincount(number.ravel())
     area[0] = 0
     large = np.flatnonzero(area >= max(WALL.part * area.max(), 1))
-    rows, columns = distance_transform_edt(~np.isin(number, large), return_distances=False, return_indices=True)
-    return [mask & (number[rows, columns] == k) for k in large]
+    whose = number[nearest(np.isin(number, large))]
+    return [mask & (whose == k) for k in large]
 
 
 def object_thickness(

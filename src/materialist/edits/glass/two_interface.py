@@ -20,9 +20,10 @@ from itertools import pairwise
 import numpy as np
 
 from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
-from materialist.camera import pixel_rays, project
+from materialist.camera import pixel_rays, project, rays_through, unit
 from materialist.envmap import bilinear, environment
 from materialist.errors import InputError
+from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import surface_in
 from materialist.geometry.slopes import back_normals
 from materialist.options import Glass
@@ -127,34 +128,29 @@ class Front:
         self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None,
         thickness: Array | None = None,
     ):  # fmt: skip
-        from scipy.ndimage import distance_transform_edt
-
         self.camera = camera
-        all_rays = pixel_rays(camera).astype(np.float64)
         self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
-        rows, columns = distance_transform_edt(~inside, return_distances=False, return_indices=True)
-        self._inverse = 1 / depth[rows, columns].astype(np.float64)[..., None]  # [H, W, 1], linear on planes
-        self._normals = normal[rows, columns].astype(np.float64)  # [H, W, 3]
+        own = nearest(inside)
+        self._inverse = 1 / depth[own].astype(np.float64)[..., None]  # [H, W, 1], linear on planes
+        self._normals = normal[own].astype(np.float64)  # [H, W, 3]
         self.through(np.zeros(2))
-        self._backs = None if back is None else back[rows, columns].astype(np.float64)
+        self._backs = None if back is None else back[own].astype(np.float64)
         self._ends: Array | None = None
         if thickness is not None:
-            ends = depth + thickness / np.linalg.norm(all_rays, axis=-1)  # [H, W] planar depth of the back
-            self._ends, self._longest = ends[rows, columns], LONGEST * float(thickness[inside].max())
+            ends = depth + thickness / np.linalg.norm(pixel_rays(camera), axis=-1)  # [H, W] planar depth of the back
+            self._ends, self._longest = ends[own], LONGEST * float(thickness[inside].max())
 
     def through(self, offset: Array) -> None:
         """Look through the pixels at this distance [2] (x right, y down) from their centres."""
         place = self._centres + offset
-        middle = np.array([self.camera.width, self.camera.height]) / 2
-        x, y = ((place - middle) / self.camera.focal).T
-        rays = np.stack([x, -y, -np.ones_like(x)], -1)
+        rays = rays_through(place, self.camera)
         self.point = rays / bilinear(self._inverse, place)  # [N, 3] x
-        self.direction = _unit(rays)  # [N, 3]
-        self.normal = _facing(_unit(bilinear(self._normals, place)), self.direction)  # [N, 3]
+        self.direction = unit(rays)  # [N, 3]
+        self.normal = _facing(unit(bilinear(self._normals, place)), self.direction)  # [N, 3]
 
     def normal_at(self, point: Array) -> Array:
         """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
-        return _facing(self._read(self._normals, point), _unit(point))
+        return _facing(self._read(self._normals, point), unit(point))
 
     def back_at(self, point: Array) -> Array:
         """[N, 3] the back's outward unit normal at points [N, 3]: its own, or the opposite of the front's."""
@@ -168,9 +164,7 @@ class Front:
         return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
 
     def _read(self, normals: Array, point: Array) -> Array:
-        place, _ = project(point, self.camera)
-        found = bilinear(normals, place)
-        return found / np.maximum(np.linalg.norm(found, axis=-1, keepdims=True), 1e-9)
+        return unit(bilinear(normals, project(point, self.camera)[0]))
 
 
 def cross(front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1)) -> Crossing:
@@ -258,9 +252,4 @@ def _behind(origin: Array, direction: Array, distance: Array, surface: Array, ca
 def _facing(normal: Array, direction: Array) -> Array:
     """Unit normals [N, 3] made to point against the directions, at least grazingly."""
     cosine = np.sum(normal * direction, -1, keepdims=True)
-    turned = np.where(cosine > -1e-3, normal - (cosine + 1e-3) * direction, normal)
-    return _unit(turned)
-
-
-def _unit(vector: Array) -> Array:
-    return vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12)
+    return unit(np.where(cosine > -1e-3, normal - (cosine + 1e-3) * direction, normal))

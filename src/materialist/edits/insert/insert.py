@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support, picture_width, support_at
@@ -91,7 +92,7 @@ def frame(support: Support) -> Array:
     Where the surface faces the camera, front is down the picture instead.
     """
     up = support.normal
-    towards = -support.point / np.linalg.norm(support.point)
+    towards = -unit(support.point)
     front = towards - (towards @ up) * up
     down = np.array([0.0, -1.0, 0.0])
     down = down - (down @ up) * up
@@ -99,7 +100,7 @@ def frame(support: Support) -> Array:
     front = share * front + (1 - share) * down
     if np.linalg.norm(front) < 1e-6:
         front = np.cross([1.0, 0.0, 0.0], up)
-    front = front / np.linalg.norm(front)
+    front = unit(front)
     return np.stack([np.cross(up, front), up, front], -1)
 
 

@@ -15,6 +15,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import uniform_surface
 from materialist.edits.core.topology import edge_faults, volume
@@ -381,5 +382,5 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
 
 
 def _unit(vectors: Array) -> Array:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.where(length > 1e-30, vectors / np.maximum(length, 1e-30), [0.0, 1.0, 0.0])
+    """[..., 3] of length 1; up where there is no length."""
+    return np.where(vectors.any(-1, keepdims=True), unit(vectors), [0.0, 1.0, 0.0])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import unproject
+from materialist.camera import rays_through, unit, unproject
 from materialist.edits.core.region import checked_pixel
 from materialist.errors import InputError
 from materialist.types import Array, Scene
@@ -50,9 +50,7 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
     if not depth > 0:
         raise InputError(f"The place {at[0]:g},{at[1]:g} is sky, where nothing can stand; choose a surface.")
     camera = scene.camera
-    ray = np.array(
-        [(at[0] - camera.width / 2) / camera.focal, (camera.height / 2 - at[1]) / camera.focal, -1.0], np.float64
-    )
+    ray = rays_through(np.array(at), camera)
     point = ray * depth
     reach = radius if radius else picture_width(scene, depth) * DEFAULT.nearby
     near = _near(scene, point, reach, row, column)
@@ -60,8 +58,7 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
     members = (scene.geometry.plane_label == label) & (scene.depth > 0) if label >= 0 else near
     normal = scene.normal[row, column].astype(np.float64)
     if members.sum() >= DEFAULT.fewest:
-        normal = np.median(scene.normal[members].astype(np.float64), axis=0)
-        normal /= max(float(np.linalg.norm(normal)), 1e-12)
+        normal = unit(np.median(scene.normal[members].astype(np.float64), axis=0))
     if near.sum() >= DEFAULT.fewest:
         points = unproject(scene.depth, camera)[near].astype(np.float64)
         offset = np.median(points @ normal)
@@ -81,7 +78,5 @@ def _near(scene: Scene, point: Array, reach: float, row: int, column: int) -> Ar
     points = unproject(scene.depth, scene.camera)
     close = ((points - point) ** 2).sum(-1) < reach**2
     window = np.s_[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
-    facing = np.median(scene.normal[window].reshape(-1, 3), axis=0)
-    return (
-        close & (scene.depth > 0) & (scene.normal @ facing > DEFAULT.alike * max(float(np.linalg.norm(facing)), 1e-6))
-    )
+    facing = unit(np.median(scene.normal[window].reshape(-1, 3), axis=0))
+    return close & (scene.depth > 0) & (scene.normal @ facing > DEFAULT.alike)

@@ -18,6 +18,7 @@ from materialist.edits.core.surfaces import (
     with_emitters,
 )
 from materialist.errors import InputError
+from materialist.geometry.silhouette import disc
 from materialist.render.scene import part
 from materialist.types import Array, Body, Photo, Scene
 
@@ -61,8 +62,7 @@ def visible_lights(scene: Scene) -> list[Array]:
         return []
     near = ndimage.distance_transform_edt(~bright) <= max(1, round(DEFAULT.reach * longer))
     grown = ndimage.binary_propagation(bright, mask=(value >= DEFAULT.beside * least) & surface & near)
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * round(DEFAULT.gap * longer) + 1,) * 2)
-    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, kernel) > 0
+    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(DEFAULT.gap * longer))) > 0
     masks = [
         mask for mask in _parts(closed)
         if (mask & bright).sum() >= DEFAULT.area * mask.size

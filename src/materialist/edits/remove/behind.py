@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import pixel_rays
-from materialist.edits.composite.upsample import window
+from materialist.camera import pixel_rays, unit
 from materialist.geometry.membrane import membrane
+from materialist.geometry.planes import through
+from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Camera
 
 SKY, LOOSE = -2, -1
@@ -63,8 +64,7 @@ def behind(
     """
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
     out = HiddenGeometry(depth.astype(np.float32), normal.astype(np.float32), known)
-    margin = max(8, round(SETTINGS.window * float(np.sqrt(hole.sum()))) + 1)
-    box = window(hole, hole.shape, margin)
+    box = window(hole, margin=max(8, round(SETTINGS.window * float(np.sqrt(hole.sum()))) + 1))
     around = _Surroundings(depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float))
     label = around.labels()
     for k in np.unique(label[around.hole]):
@@ -126,29 +126,19 @@ class _Surroundings:
         spanned = self._on_plane(own) if label >= 0 else membrane(self.inverse, own)
         spanned = np.where(spanned > 0, spanned, self.spanned)[here]
         limit = np.where(front[here] > 0, (1 - SETTINGS.gap) / np.maximum(front[here], 1e-12), np.inf)
-        normal = membrane(self.normal, own)[here]
-        length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-        return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), normal / length
+        return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), unit(membrane(self.normal, own)[here])
 
     def _on_plane(self, own: Array) -> Array:
         """[h, w] inverse depth of the plane through the pixels `own` [h, w] bool, bent to meet them at the hole."""
-        flat = self.rays @ self._plane(own)
+        flat = self.rays @ through(self.rays[own], 1 / np.maximum(self.inverse[own], 1e-12))
         sound = flat > 0.2 * np.median(self.inverse[own])
         bend = membrane(np.where(sound, self.inverse / np.where(sound, flat, 1), 1), own & sound)
         return np.where(sound, flat * bend, 0)
 
-    def _plane(self, own: Array) -> Array:
-        """[3] whose product with a ray is the inverse depth of the plane through the pixels `own` [h, w] bool."""
-        scaled = self.rays[own] / np.maximum(self.inverse[own], 1e-12)[:, None]  # the relative error of depth counts
-        return np.linalg.lstsq(scaled, np.ones(len(scaled)), rcond=None)[0]
-
 
 def _ring(hole: Array, width: float) -> Array:
     """[H, W] bool: pixels beside the hole, within `width` of its size."""
-    import cv2
-
-    reach = max(2, round(width * float(np.sqrt(hole.sum()))))
-    return (cv2.dilate(hole.astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0) & ~hole
+    return grown(hole, max(2, round(width * float(np.sqrt(hole.sum()))))) & ~hole
 
 
 def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:

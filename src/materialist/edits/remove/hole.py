@@ -8,6 +8,7 @@ import numpy as np
 
 from materialist.edits.core.region import checked_region
 from materialist.errors import InputError
+from materialist.geometry.silhouette import grown
 from materialist.types import Array, Scene
 
 
@@ -51,7 +52,7 @@ def make_hole(
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     bodies = np.zeros_like(own) if bodies is None else bodies
-    gone = _dilated(own, round(grow * max(own.shape)))
+    gone = grown(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
     if (gone & surface).sum() > SETTINGS.most * surface.sum() or (gone | ~surface).all():
         if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
@@ -66,13 +67,5 @@ def make_hole(
     plane = scene.geometry.plane_label
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
     share = SETTINGS.shadow if shadow is None else shadow
-    painted = gone | (ground & _dilated(gone, round(share * float(np.sqrt(own.sum())))))
+    painted = gone | (ground & grown(gone, round(share * float(np.sqrt(own.sum())))))
     return Hole(own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies)
-
-
-def _dilated(mask: Array, radius: int) -> Array:
-    """[H, W] bool: a mask grown by a disc of `radius` pixels."""
-    import cv2
-
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
-    return cv2.dilate(mask.astype(np.uint8), kernel) > 0

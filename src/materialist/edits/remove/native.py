@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.composite.upsample import strips, window
+from materialist.edits.composite.upsample import strips
+from materialist.geometry.silhouette import window
 from materialist.types import Array, Photo
 
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.edits.composite.upsample import nearest
-from materialist.geometry.membrane import membrane
+from materialist.geometry.membrane import membrane, nearest
 from materialist.types import Array
 
 

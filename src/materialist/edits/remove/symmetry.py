@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays, project
+from materialist.geometry.silhouette import grown
 from materialist.types import Array, Camera
 
 
@@ -58,8 +59,7 @@ def repeated_sources(
         if known.sum() < SETTINGS.fewest or hidden.sum() < SETTINGS.hidden:
             continue
         some = np.random.default_rng(0).permutation(np.flatnonzero(known))[:2000]
-        wide = 2 * int(np.ceil(0.25 * np.sqrt(hidden.sum()))) + 1
-        near = np.flatnonzero(known & (cv2.dilate(hidden.astype(np.uint8), np.ones((wide, wide), np.uint8)) > 0))
+        near = np.flatnonzero(known & grown(hidden, int(np.ceil(0.25 * np.sqrt(hidden.sum())))))
         shifts = _shifts(albedo, points, known, hidden, camera)
         shifts = [
             s for s in shifts if _error(albedo, some, _landings(points, some, [s], known, camera)) < SETTINGS.error

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_levels
+from materialist.geometry.silhouette import disc, grown, window
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
@@ -73,11 +74,10 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
 
 def box_overlap(mask: Array, box: Box) -> float:
     """Intersection over union of the bounding box of a mask [H, W] bool with a box; 0 for an empty mask."""
-    import cv2
-
-    x, y, width, height = cv2.boundingRect(mask.astype(np.uint8))
+    if not mask.any():
+        return 0.0
     own, given = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
-    own[y : y + height, x : x + width] = True
+    own[window(mask)] = True
     given[box[1] : box[3], box[0] : box[2]] = True
     return overlap(own, given)
 
@@ -129,19 +129,15 @@ def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likel
     `likely` [H, W] in [0, 1]: the outline stays out of what is clearly none of the object. `points` (column, row) lie
     on the object.
     """
-    import cv2
-
-    def disc(share: float) -> Array:
-        radius = max(2, round(share * max(rough.shape)))
-        return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
-
-    possible = cv2.dilate((likely > DEFAULT.unlikely).astype(np.uint8), disc(DEFAULT.near_likely)) > 0
+    near, inwards, outwards = (
+        max(2, round(share * max(rough.shape))) for share in (DEFAULT.near_likely, DEFAULT.inwards, DEFAULT.outwards)
+    )
+    possible = grown(likely > DEFAULT.unlikely, near)
     mask = rough
     for _ in range(DEFAULT.passes):
-        inner = cv2.erode(mask.astype(np.uint8), disc(DEFAULT.inwards), borderValue=1) > 0
-        if not inner.any():
-            inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3), np.uint8), borderValue=1) > 0
-        outer = (cv2.dilate(mask.astype(np.uint8), disc(DEFAULT.outwards)) > 0) & (possible | mask)
+        inner = ~grown(~mask, inwards)
+        inner = inner if inner.any() else ~grown(~mask, 1)
+        outer = grown(mask, outwards) & (possible | mask)
         label = np.where(inner, CERTAIN, np.where(mask, PROBABLE, np.where(outer, POSSIBLE, 0))).astype(np.uint8)
         for x, y in points:
             label[y, x] = CERTAIN
@@ -181,11 +177,10 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     from scipy import ndimage
     from skimage.morphology import remove_small_holes
 
-    radius = max(2, round(DEFAULT.gap * max(mask.shape)))
-    kernel, disc = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * r + 1,) * 2) for r in (1, radius))
-    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, kernel) > 0
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
-    closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, disc) > 0
+    wide = disc(max(2, round(DEFAULT.gap * max(mask.shape))))
+    closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, wide) > 0
     parts, count = ndimage.label(opened | closed)
     if count == 0:
         return mask
