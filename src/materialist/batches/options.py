@@ -25,8 +25,8 @@ class BatchOptions(OperationOptions):
         high=1_000_000, called="number of paths (spp)",
     )  # fmt: skip
     workers: int | None = option(
-        None, "Worker processes; else one a GPU, or one a processor as far as memory reaches.", kind="whole", low=1, high=1024,
-        called="number of workers",
+        None, "Worker processes; else one a GPU, or one a processor as far as memory reaches.", kind="whole", low=1,
+        high=1024, called="number of workers",
     )  # fmt: skip
     ray: str | None = option(None, "A Ray cluster instead, or local.", kind="name", metavar="ADDRESS")
     resume: bool = option(False, "Go on with the batch in RUNS: finished photos are kept.", kind="switch")

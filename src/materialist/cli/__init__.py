@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from typing import Any
 
 import typer
 
@@ -13,20 +15,22 @@ from materialist.cli.outcome import run_to_exit_code
 ABOUT = "Physically based editing of a single photograph, by inverse rendering."
 MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
 FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
+COMMANDS: tuple[Callable[..., Any], ...] = (
+    scenes.invert, scenes.render, scenes.export, setup.doctor, edits.select, edits.edit, edits.glass, edits.remove,
+    edits.insert, edits.apply, films.relight, films.drop, batch.batch, studio.studio,
+)  # fmt: skip
+TRAINING: tuple[Callable[..., Any], ...] = (train.data, train.matnet, train.refraction, train.clicks)
 app = group("materialist", ABOUT)
-for command in (scenes.invert, scenes.render, scenes.export, setup.doctor):
+for command in COMMANDS:
     add_command(app, command)
-models = group("models", MODELS, app)
-for name, command in (("list", setup.list_models), ("download", setup.download_model), ("verify", setup.verify_model)):
-    add_command(models, command, name)
 add_command(app, bench.bench, context_settings=FREE)
+models = group("models", MODELS, app)
+add_command(models, setup.list_models, "list")
+add_command(models, setup.download_model, "download")
+add_command(models, setup.verify_model, "verify")
 trainers = group("train", "Make training data, and train the networks that predict materials.", app)
-for command in (train.data, train.matnet, train.refraction, train.clicks):
+for command in TRAINING:
     add_command(trainers, command)
-for command in (edits.select, edits.edit, edits.glass, edits.remove, edits.insert, edits.apply):
-    add_command(app, command)
-for command in (films.relight, films.drop, batch.batch, studio.studio):
-    add_command(app, command)
 
 
 def _show_version(wanted: bool) -> None:

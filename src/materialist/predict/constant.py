@@ -22,7 +22,7 @@ VALUES = {
 class ConstantPredictor(Predictor):
     """Neutral materials on a plane that faces the camera."""
 
-    name = "constant"
+    source = "constant"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""

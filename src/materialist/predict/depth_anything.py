@@ -10,7 +10,8 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
-from materialist.predict.protocol import MapSet, Predictor
+from materialist.predict.models import locate
+from materialist.predict.protocol import MapSet
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
 
@@ -18,27 +19,15 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of sRGB values in [0, 1], as the network was trained."""
 
 
-class DepthAnything(Predictor):
-    """Gives depth alone.
-
-    Args:
-        where: a folder with a transformers model, a hub id, or "" for Depth Anything V2 Small.
-    """
+class DepthAnything(hub.HubPredictor):
+    """Gives depth alone; by default Depth Anything V2 Small."""
 
     gives = ("depth",)
+    default, libraries = "depth-anything", ("transformers",)
 
     def __init__(self, where: str = "", *, device: str = "auto"):
-        self._where, self._device = where, device
-
-    @property
-    def name(self) -> str:
-        """'depth-anything (which one)'."""
-        return f"depth-anything ({self._where or 'V2 Small'})"
-
-    def prepare(self, wanted: Collection[str]) -> None:
-        """Raise SetupError or WeightsError where the library or the model is missing."""
-        hub.locate(self._where, "depth-anything")
-        hub.library("transformers")
+        super().__init__(where, device=device)
+        self.source = f"depth-anything ({where or 'V2 Small'})"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """Planar depth at the photo's size; `seed` changes nothing.
@@ -46,10 +35,10 @@ class DepthAnything(Predictor):
         The network sees sRGB values. A metric model's depth is taken as it is, in metres; a relative one gives inverse
         depth without scale and shift, see `relative.from_relative`.
         """
-        folder, _ = hub.locate(self._where, "depth-anything")
+        folder = locate(self.where, self.default)
         digest = hub.checked(folder)
         model = hub.load(hub.library("transformers").DepthAnythingForDepthEstimation, folder)
-        values = _run(model, photo.linear, on_gpu(self._device))
+        values = _run(model, photo.linear, on_gpu(self.device))
         if model.config.depth_estimation_type == "metric":
             return MapSet({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
         depth, note, warnings = planar(values, photo.camera, normal, inverse=True, name=self.name)

@@ -1,13 +1,15 @@
-"""What the hub predictors share: where a model lies, and loading it whole or not at all."""
+"""What the hub predictors share: their libraries, and loading a model whole or not at all."""
 
 from __future__ import annotations
 
 import importlib
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from materialist.errors import SetupError, WeightsError
-from materialist.predict.models import KNOWN, hub_model, is_hub_id, require
+from materialist.predict.models import locate
+from materialist.predict.protocol import Predictor
 from materialist.predict.weights import CHECKSUMS, INSTEAD, reason, verify_folder
 
 INSTALL = "pip install 'materialist[hub]'"
@@ -25,19 +27,24 @@ def library(name: str) -> Any:
     return module
 
 
-def locate(where: str, default: str) -> tuple[Path, str]:
-    """The folder of a model and what to call it: a folder as it is, else a download of a hub id, else of `default`.
+class HubPredictor(Predictor):
+    """A model that optional libraries run.
 
-    Raises WeightsError when it is not there; nothing is downloaded.
+    Args:
+        where: a folder with a model, a hub id, or "" for the default.
     """
-    if where and not any(where == model.name for model in KNOWN):
-        folder = Path(where).expanduser()
-        if folder.is_dir():
-            return folder, folder.name
-        if not is_hub_id(where):
-            raise WeightsError(f"There is no folder {where} with a model; give one, or a hub id as owner/name.")
-    model = hub_model(where or default)
-    return require(model), model.repo
+
+    default: ClassVar[str] = ""
+    libraries: ClassVar[tuple[str, ...]]
+
+    def __init__(self, where: str = "", *, device: str = "auto"):
+        self.where, self.device = where or self.default, device
+
+    def prepare(self, wanted: Collection[str]) -> None:
+        """Raise SetupError or WeightsError where a library or the model is missing."""
+        locate(self.where, self.default)
+        for name in self.libraries:
+            library(name)
 
 
 def checked(folder: Path) -> str:

@@ -40,11 +40,7 @@ class MapsPredictor(Predictor):
         self.folder = Path(folder).expanduser()
         if not self.folder.is_dir():
             raise InputError(f"There is no folder {self.folder} to read maps from.")
-
-    @property
-    def name(self) -> str:
-        """'maps:DIR'."""
-        return f"maps:{self.folder}"
+        self.source = f"maps:{self.folder}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps at the working size of the photo; `seed` changes nothing.

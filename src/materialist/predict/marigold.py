@@ -12,6 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import WeightsError
 from materialist.predict import hub
 from materialist.predict.device import on_gpu
+from materialist.predict.models import locate
 from materialist.predict.protocol import MapSet, MixedPredictor, Predictor
 from materialist.predict.relative import planar
 from materialist.types import Array, Photo
@@ -32,34 +33,26 @@ def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
     Raises WeightsError where `where` is no Marigold model on this machine.
     """
     if where:
-        return Marigold(where, GIVES[_pipeline_class(hub.locate(where, "")[0])], device=device)
+        return Marigold(where, GIVES[_pipeline_class(locate(where, ""))], device=device)
     parts = {model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())}
     return MixedPredictor({name: model for model, part in parts.items() for name in part.gives}, parts)
 
 
-class Marigold(Predictor):
+class Marigold(hub.HubPredictor):
     """One Marigold model: a folder with a pipeline of diffusers or a hub id, and the maps that it gives."""
 
+    libraries = ("diffusers", "transformers")
+
     def __init__(self, where: str, gives: tuple[str, ...], *, device: str = "auto"):
-        self.where, self.gives, self.device = where, gives, device
-
-    @property
-    def name(self) -> str:
-        """'marigold (which model)'."""
-        return f"marigold ({self.where})"
-
-    def prepare(self, wanted: Collection[str]) -> None:
-        """Raise SetupError or WeightsError where a library or the model is missing."""
-        hub.locate(self.where, "")
-        hub.library("diffusers")
-        hub.library("transformers")
+        super().__init__(where, device=device)
+        self.gives, self.source = gives, f"marigold ({where})"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
-        folder, label = hub.locate(self.where, "")
-        source = f"marigold ({label}){hub.checked(folder)}"
+        folder = locate(self.where, "")
+        source = f"marigold ({folder.name.replace('--', '/')}){hub.checked(folder)}"
         kind, gpu = _pipeline_class(folder), on_gpu(self.device)
         pipeline = hub.pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)

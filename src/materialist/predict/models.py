@@ -103,11 +103,27 @@ def require(model: HubModel) -> Path:
     )
 
 
-def weights_file(folder: Path) -> Path:
-    """The file of weights in a folder, safetensors before pickles. Raises WeightsError when there is none."""
-    found = [path for end in WEIGHTS for path in sorted(folder.glob(f"*{end}"))]
+def locate(where: str, default: str) -> Path:
+    """A file or folder as it is, else the download of a model's name or hub id, or of `default` where that is "".
+
+    Raises WeightsError when it is not there; nothing is downloaded.
+    """
+    path, named = Path(where).expanduser(), any(where == model.name for model in KNOWN)
+    if where and not named and path.exists():
+        return path
+    if where and not named and not is_hub_id(where):
+        raise WeightsError(
+            f"There is no folder or no file {where} with a model; give one, or a hub id as owner/name, or fetch the "
+            f"published one (materialist models download {default or 'NAME'}); or {INSTEAD}."
+        )
+    return require(hub_model(where or default))
+
+
+def weights_file(path: Path) -> Path:
+    """The file itself, or the weights in a folder, safetensors before pickles. Raises WeightsError for none."""
+    found = [path] if path.is_file() else [file for end in WEIGHTS for file in sorted(path.glob(f"*{end}"))]
     if not found:
-        raise WeightsError(f"{folder} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}.")
+        raise WeightsError(f"{path} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}.")
     return found[0]
 
 

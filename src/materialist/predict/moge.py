@@ -36,11 +36,7 @@ class MogeFolder(MapsPredictor):
             raise InputError(f"{self.folder} holds {several}.")
         self.folder = self.folder if self.folder in found else found[0]
         self.field_of_view = _field_of_view(self.folder / "fov.json")
-
-    @property
-    def name(self) -> str:
-        """'moge:DIR'."""
-        return f"moge:{self.folder}"
+        self.source = f"moge:{self.folder}"
 
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
         """The values of a map at their own size; depth is 0 where mask.png is."""

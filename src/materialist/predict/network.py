@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -61,6 +62,8 @@ class StoredNetwork(nn.Module):
 
         Raises WeightsError where the file is missing, damaged, of another kind, or does not fit its architecture.
         """
+        if not path.is_file():
+            raise WeightsError(f"There are no weights of {cls.__name__} at {path}; make some with: {cls.COMMAND}.")
         tensors, header = read_state(path), metadata(path)
         if header.get("format") != cls.FORMAT:
             raise WeightsError(
@@ -75,6 +78,12 @@ class StoredNetwork(nn.Module):
             ) from error
         load_weights(network, tensors | shared_tensors(network), path)
         return network.eval().requires_grad_(False), facts
+
+
+@lru_cache(maxsize=4)
+def loaded(kind: type[StoredNetwork], path: Path) -> Any:
+    """The network of a kind in a file, read once. Raises WeightsError as `StoredNetwork.load`."""
+    return kind.load(path)[0]
 
 
 def shared_tensors(network: nn.Module) -> dict[str, Tensor]:

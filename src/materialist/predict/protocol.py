@@ -37,10 +37,13 @@ class Predictor(ABC):
     field_of_view: float | None = None
     """Horizontal, degrees, where the predictor knows it."""
 
+    source: str
+    """What the report calls it: name, file or folder, and the start of the weights' checksum."""
+
     @property
-    @abstractmethod
     def name(self) -> str:
         """The name of the predictor in the report."""
+        return self.source
 
     @abstractmethod
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
@@ -67,26 +70,18 @@ class Predictor(ABC):
 
 
 class MixedPredictor(Predictor):
-    """Every map from its own source.
-
-    Args:
-        chosen: map -> spec of its source.
-        sources: spec -> predictor.
-    """
+    """Every map from its own source."""
 
     def __init__(self, chosen: Mapping[str, str], sources: Mapping[str, Predictor]):
+        """`chosen`: map -> spec of its source. `sources`: spec -> predictor."""
         self.sources = sources
         self.shares = {spec: [name for name in MAPS if chosen[name] == spec] for spec in sources}
         self.depth_spec = chosen["depth"]
         self.field_of_view = sources[self.depth_spec].field_of_view
-
-    @property
-    def name(self) -> str:
-        """Every source with its maps, as in 'albedo: marigold; roughness, metallic, normal, depth: bundled'."""
-        return "; ".join(f"{', '.join(names)}: {self.sources[spec].name}" for spec, names in self.shares.items())
+        # As in 'albedo: marigold; roughness, metallic, normal, depth: bundled'.
+        self.source = "; ".join(f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items())
 
     def prepare(self, wanted: Collection[str]) -> None:
-        """Prepare the sources of the wanted maps."""
         for spec, names in self.shares.items():
             if not set(names).isdisjoint(wanted):
                 self.sources[spec].prepare(names)

@@ -101,10 +101,11 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
     from materialist.predict import hub
     from materialist.predict.device import on_gpu
+    from materialist.predict.models import locate
 
     gpu = on_gpu(device)
     try:
-        folder, _ = hub.locate(where, DEFAULT)
+        folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
             "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",
             safety_checker=None, requires_safety_checker=False,

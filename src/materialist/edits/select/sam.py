@@ -66,10 +66,10 @@ def segment(
 
 def folder_of(where: str) -> Any:
     """The folder of a model or of a downloaded hub id. Raises WeightsError that says how to get it."""
-    from materialist.predict.hub import locate
+    from materialist.predict.models import locate
 
     try:
-        return locate(where, REPO)[0]
+        return locate(where, REPO)
     except WeightsError as error:
         raise WeightsError(
             f"The weights of SAM 2 are not here; fetch them with: materialist models download {where}, or leave "

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from materialist.errors import InputError, WeightsError
+from materialist.errors import InputError
 from materialist.predict.clicks.features import NORMAL_X, features
 from materialist.types import Array
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
 """The weights that ship with the package; docs/training.md says how they were made."""
-
-
 SIDE = 224
 """Longer side at which the network sees the photo, pixels."""
 
@@ -48,12 +45,13 @@ def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: s
     import cv2
     import torch
 
-    from materialist.predict.network import STRIDE
+    from materialist.predict.clicks.network import ClickNet
+    from materialist.predict.network import STRIDE, loaded
 
     height, width = photo.depth.shape
     if not clicks or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
         raise InputError(f"The clicks are {list(clicks)}; give at least one inside {width} x {height} pixels.")
-    network = _loaded(Path(weights) if str(weights) else WEIGHTS)
+    network = loaded(ClickNet, Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     size = max(1, round(width * scale)), max(1, round(height * scale))
     way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
@@ -71,15 +69,3 @@ def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: s
         both = (network(padded) + network(mirrored).flip(-1)) / 2
     share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
     return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
-
-
-@lru_cache(maxsize=2)
-def _loaded(path: Path) -> Any:
-    if not path.is_file():
-        raise WeightsError(
-            f"There are no weights of ClickNet at {path}; train some (materialist train clicks), or select with "
-            "--with grabcut."
-        )
-    from materialist.predict.clicks.network import ClickNet
-
-    return ClickNet.load(path)[0]

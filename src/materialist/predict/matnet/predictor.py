@@ -12,9 +12,9 @@ from materialist.errors import WeightsError
 from materialist.predict.device import on_gpu
 from materialist.predict.matnet.inference import INPUT_SIZE, infer, planar_depth
 from materialist.predict.matnet.network import SIZES, MatNet
-from materialist.predict.models import hub_model, is_hub_id, require, weights_file
+from materialist.predict.models import locate, weights_file
 from materialist.predict.protocol import MapSet, Predictor
-from materialist.predict.weights import INSTEAD, load_weights, metadata, read_state, verify_file
+from materialist.predict.weights import load_weights, metadata, read_state, verify_file
 from materialist.types import Array, Photo
 
 
@@ -31,7 +31,7 @@ class MatNetPredictor(Predictor):
     """
 
     def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
-        path = _locate(str(where))
+        path = weights_file(locate(str(where), "matnet"))
         digest = verify_file(path)
         state = read_state(path)
         self.trained_here = metadata(path).get("format") == MatNet.FORMAT  # its depth output is depth
@@ -44,11 +44,6 @@ class MatNetPredictor(Predictor):
         self.network = network.to("cuda" if on_gpu(device) else "cpu").eval()
         self.input_size = input_size
         self.source = f"matnet {size} {path.name} sha256:{digest[:16]}"
-
-    @property
-    def name(self) -> str:
-        """What the report calls it: size, file and the start of its checksum."""
-        return self.source
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted of the network's maps at the photo's size; `seed` changes nothing.
@@ -66,18 +61,3 @@ class MatNetPredictor(Predictor):
         found["normal"] = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0).astype(np.float32)
         found["depth"] = np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
         return MapSet({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
-
-
-def _locate(where: str) -> Path:
-    """The file of weights that `where` means. Raises WeightsError."""
-    path = Path(where).expanduser()
-    if where and path.is_file():
-        return path
-    if where and path.is_dir():
-        return weights_file(path)
-    if where and not is_hub_id(where):
-        raise WeightsError(
-            f"There is no file {where}; --predictor matnet:FILE needs MatNet's weights (a .safetensors or .pth file), "
-            f"--predictor matnet alone the published ones (materialist models download matnet); or {INSTEAD}."
-        )
-    return weights_file(require(hub_model(where or "matnet")))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from materialist.predict.refraction.crop import BACK_X, Window, features, to_win
 from materialist.solids.finder import surface_of_revolution
 from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
-
-if TYPE_CHECKING:
-    from materialist.predict.refraction.network import RefractionNet
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
 """The weights that ship with the package; docs/training.md says how they were made."""
@@ -66,11 +62,14 @@ def thickness(
         InputError: maps of different sizes, or a mask without any surface.
         WeightsError: the weights are missing, damaged, or for another network.
     """
+    from materialist.predict.network import loaded
+    from materialist.predict.refraction.network import RefractionNet
+
     inside = surface_in(mask, depth, camera)
     for name, value in (("photo", photo_linear), ("normals", normal)):
         if value.shape != (*inside.shape, 3):
             raise InputError(f"The {name} has shape {value.shape}, the camera needs {(*inside.shape, 3)}.")
-    network, _ = _loaded(Path(weights) if str(weights) else WEIGHTS)
+    network = loaded(RefractionNet, Path(weights) if str(weights) else WEIGHTS)
     maps = (photo_linear, inside, normal, depth, pixel_rays(camera))
     answers = [_answer(network, Window.around(inside).moved(*frame), *maps) for frame in FRAMES]
     found = np.mean(answers, axis=0)  # [H, W, 5]
@@ -107,7 +106,7 @@ def best_thickness(
 
 
 def _answer(
-    network: RefractionNet, window: Window, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array
+    network: Any, window: Window, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array
 ) -> Array:
     """[H, W, 5] float32 of one window, 0 outside the mask: both thicknesses in scene units, and the back's normal."""
     import torch
@@ -118,15 +117,3 @@ def _answer(
     turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
     channels = [*(found[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
     return np.stack([window.put_back(channel, view.inside, inside) for channel in channels], -1)
-
-
-@lru_cache(maxsize=2)
-def _loaded(path: Path) -> tuple[RefractionNet, dict[str, Any]]:
-    if not path.is_file():
-        raise WeightsError(
-            f"There are no weights of RefractionNet at {path}; train some (materialist train refraction -o RUN), or "
-            "take the thickness by symmetry."
-        )
-    from materialist.predict.refraction.network import RefractionNet
-
-    return RefractionNet.load(path)
