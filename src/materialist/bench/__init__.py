@@ -8,23 +8,11 @@ from typing import Any
 
 from materialist.errors import InputError
 
-BENCHMARKS = {
-    "photo-alone": "PhotoAloneBench",
-    "invert": "InvertBench",
-    "beside": "BesideBench",
-    "batch": "BatchBench",
-    "light": "LightBench",
-    "ablation": "AblationBench",
-    "materials": "MaterialsBench",
-    "whdr": "WhdrBench",
-    "predictor": "PredictorBench",
-    "thickness": "ThicknessBench",
-    "select": "SelectBench",
-    "glass": "GlassBench",
-    "edit": "EditBench",
-    "studio": "StudioBench",
-}
-"""Name -> the class in the module of that name."""
+BENCHMARKS = (
+    "photo-alone", "invert", "beside", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
+    "select", "glass", "edit", "studio",
+)  # fmt: skip
+"""Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
 
 
 def run(name: str, *, output: str | Path, data: str | Path | None = None, force: bool = False, **options: Any) -> Path:
@@ -45,4 +33,6 @@ def run(name: str, *, output: str | Path, data: str | Path | None = None, force:
 
 def benchmark_class(name: str) -> Any:
     """The class of a benchmark, whose fields are its options."""
-    return getattr(import_module(f"materialist.bench.{name.replace('-', '_')}"), BENCHMARKS[name])
+    words = name.split("-")
+    module = import_module(f"materialist.bench.{'_'.join(words)}")
+    return getattr(module, "".join(word.capitalize() for word in words) + "Bench")

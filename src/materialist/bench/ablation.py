@@ -156,7 +156,7 @@ def _maps(materials: Materials) -> torch.Tensor:
     """[H W, 5] albedo, roughness, metallic."""
     import torch
 
-    maps = np.dstack((materials.albedo, materials.roughness, materials.metallic))
+    maps = np.dstack(tuple(vars(materials).values()))
     return torch.from_numpy(maps.reshape(-1, 5).astype(np.float32))
 
 

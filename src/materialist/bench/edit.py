@@ -23,7 +23,7 @@ import numpy as np
 
 from materialist import metrics
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, edits, true_scene
+from materialist.bench.edits import KINDS, Edit, awaited, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.option_kinds import option
 from materialist.procedural.synthetic import SyntheticSample, make_sample
@@ -92,7 +92,7 @@ class EditBench(Benchmark):
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
-        """How long previews and a final edit take; the scene has the true maps, which cost the same as fitted ones."""
+        """How long previews and a final edit take."""
         import cv2
 
         from materialist.edits.composite.composite import composite
@@ -103,12 +103,8 @@ class EditBench(Benchmark):
         from materialist.edits.material.material import edit
         from materialist.edits.preview import Preview
 
-        size, shared = self.latency, {"seed": self.seed, "device": self.device}
-        scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=self.seed, spp=16))
-        mask = np.zeros(scene.depth.shape, bool)
-        mask[size // 3 : size // 2, size // 3 : size // 2] = True
-        mask &= scene.depth > 0
-        sample = f"{size} x {size}"
+        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
+        scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(Preview, scene, **shared)
         yield {"method": "preview: built once", "sample": sample, **cost}
         changes = [edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.procedural.arrangements import Item
 from materialist.procedural.objects import shapes
-from materialist.procedural.synthetic import SyntheticSample, TrueScene
+from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Prediction, Scene
 
 KINDS = ("hue", "metal", "relight", "insert", "glass", "remove")
@@ -117,6 +118,15 @@ def _insertion(sample: SyntheticSample, stage: TrueScene) -> Iterator[Edit]:
     truth = _staged(stage, [*stage.items, cup])
     mask = truth.seen == len(stage.items)
     yield Edit("insert", lambda scene: insert(scene, model, at), truth, sample.envmap, mask)
+
+
+def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]:
+    """A scene with true maps, which cost the same as fitted ones, a region [H, W] bool of it, and what to call both."""
+    scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
+    mask, third = np.zeros(scene.depth.shape, bool), np.s_[size // 3 : 2 * size // 3]
+    mask[third, third] = True
+    mask &= scene.depth > 0
+    return scene, mask, f"{size} x {size}, {int(mask.sum())} pixels"
 
 
 def true_scene(sample: SyntheticSample, maps: Prediction | None = None) -> Scene:

@@ -31,13 +31,11 @@ from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, numbers, timed
-from materialist.bench.edits import true_scene
+from materialist.bench.edits import awaited
 from materialist.bench.glass_models import Background, Case
 from materialist.bench.report import CEILING, Column, Report, strip
-from materialist.color import linear_to_srgb
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
-from materialist.procedural.synthetic import make_sample
 from materialist.types import Array
 
 DRAWN = ("two_interface, true d", "two_interface, predicted d", "closed, predicted d", "closed, predicted d, inpainted")
@@ -145,18 +143,10 @@ class GlassBench(Benchmark):
         yield from sensitivity(case, d["predicted"], true, draws=self.draws, seed=self.seed)
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
-        """Rows of the preview: built, its first picture, and one picture after another, as a person changes sliders.
-
-        The scene is a synthetic one with its true maps; its object takes about a tenth of the picture.
-        """
+        """Rows of the preview: built, its first picture, and one picture after another, as a person changes sliders."""
         from materialist.edits.glass.preview import GlassPreview
 
-        scene = true_scene(make_sample(0, 0, 0, size=self.latency, data=data, seed=self.seed, spp=16))
-        third = self.latency // 3
-        mask = np.zeros(scene.depth.shape, bool)
-        mask[third : 2 * self.latency // 3, third : 2 * self.latency // 3] = True
-        mask &= scene.depth > 0
-        sample = f"{self.latency} x {self.latency}, {int(mask.sum())} pixels"
+        scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(lambda: GlassPreview(scene, mask, device=self.device, seed=self.seed))
         yield {"method": "preview: built once", "sample": sample, **cost}
         # Kernels are compiled at the first picture of a kind.
@@ -189,7 +179,7 @@ def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str
     truth = case.truth * case.gain
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.
     inside = np.where(mask[..., None], picture * case.gain, truth)
-    found = {"psnr": metrics.psnr(inside, truth, mask=mask), "ssim": masked_ssim(inside, truth, mask)}
+    found = {"psnr": metrics.psnr(inside, truth, mask=mask), "ssim": metrics.ssim(inside, truth, mask=mask)}
     found["frame"] = float(found["psnr"] - 10 * np.log10(mask.mean()))
     box = scenes.window(mask)
     if (distance := lpips(inside[box], truth[box])) is not None:
@@ -198,14 +188,3 @@ def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str
         true = case.scene.front.thickness
         found["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
     return {f"{name}_{group}": value for name, value in found.items()}
-
-
-def masked_ssim(a: Array, b: Array, mask: Array) -> float:
-    """SSIM of linear pictures [H, W, 3] on their sRGB encoding, its map averaged over the mask [H, W]."""
-    from skimage.metrics import structural_similarity
-
-    options: dict[str, Any] = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    _, each = structural_similarity(
-        linear_to_srgb(a), linear_to_srgb(b), data_range=1, channel_axis=-1, full=True, **options
-    )
-    return float(each[mask].mean())

@@ -16,6 +16,7 @@ from materialist.errors import InputError
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
+from materialist.procedural.objects.glassware import KINDS, make_shape
 from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
 from materialist.procedural.synthetic import sensor
 from materialist.procedural.world import Viewpoint, orbit
@@ -25,6 +26,8 @@ GROUPS = ("symmetric", "asymmetric")
 """Whether an object's back is its front mirrored, as the paper sorts its objects."""
 VESSELS = ("bowl", "coffeemug", "teapot_newell", "wineglass")
 """Meshes of the data folder that are walls around air; the protocol is about solid objects."""
+SOLIDS = {"symmetric": (0, 2, 12), "asymmetric": (5, 7, 3, 15)}
+"""Kinds of shapes in `glassware` that are solid: turned bodies, superellipsoids; lumps, twists, creatures."""
 ENVMAP_ROWS = {"room": 64, "envmap": 256}
 """Light in a room is brought to few rows: small suns make caustics that no affordable picture shows cleanly."""
 
@@ -73,7 +76,7 @@ class SeenSide:
 def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
     """The first `count` symmetric and `count` asymmetric objects: procedural, or watertight meshes of DATA/meshes."""
     if data is None:
-        return [thing for k in range(count) for thing in (_turned(k, seed), _free(k, seed))]
+        return [_made(group, k, seed) for k in range(count) for group in GROUPS]
     found: list[list[GlassObject]] = []
     for group in GROUPS:
         files = sorted((data / "meshes" / group).glob("*.ply"))
@@ -87,6 +90,14 @@ def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
     return [thing for pair in zip_longest(*found) for thing in pair if thing]
 
 
+def _made(group: str, k: int, seed: int) -> GlassObject:
+    """Solid number k of a group, of the shapes that RefractionNet never saw."""
+    kinds = SOLIDS[group]
+    index = KINDS * (k // len(kinds)) + kinds[k % len(kinds)]
+    solid = shapes.placed(make_shape(index, "heldout", seed).solid, scale=0.7)
+    return GlassObject(f"{group} {k}", group, shapes.grounded(solid))
+
+
 def is_closed(solid: Solid) -> bool:
     """Whether every edge of the mesh has two faces that run through it in opposite directions."""
     import trimesh
@@ -95,50 +106,6 @@ def is_closed(solid: Solid) -> bool:
     corners = np.sort(mesh.faces, 1)
     mesh.update_faces((np.diff(corners) > 0).all(1))
     return bool(mesh.is_watertight and mesh.is_winding_consistent)
-
-
-def _turned(index: int, seed: int) -> GlassObject:
-    """A solid of revolution or a superellipsoid: its own mirror image."""
-    rng = np.random.default_rng([seed, 7, index])
-    kind = index % 4
-    if kind == 0:
-        return GlassObject(f"ellipsoid {index}", "symmetric", shapes.superquadric(rng.uniform(0.45, 0.7, 3), 1, 1))
-    if kind == 1:
-        y = np.linspace(0, 1, 60)
-        radius = 0.17 + 0.07 * np.sin(rng.uniform(4, 8) * y + rng.uniform(0, 6)) + 0.05 * rng.uniform(-1, 1) * y
-        radius = radius * np.sqrt(np.clip(y / 0.12, 0, 1) * np.clip((1 - y) / 0.12, 0, 1))
-        return GlassObject(f"baluster {index}", "symmetric", shapes.lathe(np.stack([radius, 0.7 * y], -1)))
-    if kind == 2:
-        return GlassObject(
-            f"capsule {index}", "symmetric", shapes.capsule(rng.uniform(0.13, 0.2), rng.uniform(0.2, 0.35))
-        )
-    extent = rng.uniform(0.4, 0.65, 3)
-    return GlassObject(
-        f"cushion {index}", "symmetric", shapes.superquadric(extent, rng.uniform(0.5, 0.8), rng.uniform(0.5, 1))
-    )
-
-
-def _free(index: int, seed: int) -> GlassObject:
-    """A lumpy or twisted body."""
-    from materialist.procedural.objects.glassware import centred
-
-    rng = np.random.default_rng([seed, 8, index])
-    if index % 2:
-        turn, bend = rng.choice([-1, 1]) * rng.uniform(1, 3), rng.uniform(-0.4, 0.4)
-        column = shapes.superquadric(np.array([0.5, 1, rng.uniform(0.25, 0.5)]), 0.6, rng.uniform(0.5, 1))
-        body = centred(shapes.warped(column, lambda p: _twist(p, turn, bend)))
-        name = f"twisted {index}"
-    else:
-        body = centred(shapes.blob(rng, rng.uniform(0.6, 1, 3), rng.uniform(0.2, 0.4), 72))
-        name = f"blob {index}"
-    return GlassObject(name, "asymmetric", shapes.grounded(shapes.placed(body, scale=0.65)))
-
-
-def _twist(points: Array, turn: float, bend: float) -> Array:
-    """[V, 3] turned about Y in proportion to their height, and bent aside."""
-    angle = turn * points[:, 1]
-    x = points[:, 0] * np.cos(angle) - points[:, 2] * np.sin(angle) + bend * points[:, 1] ** 2
-    return np.stack([x, points[:, 1], points[:, 0] * np.sin(angle) + points[:, 2] * np.cos(angle)], -1)
 
 
 class GlassScene:

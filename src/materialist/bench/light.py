@@ -35,8 +35,8 @@ from materialist.predict import NEUTRAL_METALLIC
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Materials
 
-NEUTRAL = 0.5
-"""Albedo and roughness of the paper's runs without given materials (A = R = 0.5, M = 0.1)."""
+NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
+"""Albedo, roughness and metallic of the paper's runs without given materials."""
 
 
 @dataclass(frozen=True)
@@ -153,13 +153,8 @@ class _Stage:
             found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
             mesh = RenderScene(found.geometry, found.camera, device=device)
             off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
-            yield {
-                "method": "inversion" + suffix,
-                **self._of_light(found.envmap),
-                **self._on(mesh, found.materials, found.envmap),
-                "albedo_l1": float(off.mean()),
-                **cost,
-            }
+            figures = self._of_light(found.envmap) | self._on(mesh, found.materials, found.envmap)
+            yield {"method": "inversion" + suffix, **figures, "albedo_l1": float(off.mean()), **cost}
 
     def fitted(self, methods: list[str]) -> Iterator[Row]:
         """A row for every method of fitting the light."""
@@ -177,12 +172,9 @@ class _Stage:
     def _of_light(self, envmap: Array) -> dict[str, float]:
         """The map against the true one, and the true scene under it against the photo."""
         picture = self.sample.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
-        return {
-            **metrics.envmap_metrics(envmap, self.sample.envmap),
-            "render_ssim": metrics.ssim(picture, self.photo),
-            "render_psnr": metrics.psnr(picture, self.photo),
-            "render_mse": metrics.mse(picture, self.photo),
-        }
+        of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
+        names = ("ssim", "psnr", "mse")
+        return of_map | {f"render_{name}": getattr(metrics, name)(picture, self.photo) for name in names}
 
     def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
         """PSNR of a RenderScene with these materials, under this light and under the other."""
@@ -212,7 +204,8 @@ def fit(
     light = replace(named.light, field=method.field or named.light.field, height=method.height or named.light.height)
     height = sample.envmap.shape[0]
     surface = truth.depth > 0
-    given = truth if method.given else replace(truth, materials=_neutral(truth.materials))
+    maps = zip(vars(truth.materials).values(), NEUTRAL, strict=True)
+    given = truth if method.given else replace(truth, materials=Materials(*(np.full_like(m, v) for m, v in maps)))
     engine: Any
     if method.engine == "path":
         pixels = np.flatnonzero(surface.reshape(-1))
@@ -226,12 +219,3 @@ def fit(
     result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
     envmap = prepared_envmap(field(max(light.height, 16)), height)
     return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, mesh
-
-
-def _neutral(materials: Materials) -> Materials:
-    """The paper's materials where none are given: A = R = 0.5, M = 0.1."""
-    return Materials(
-        np.full_like(materials.albedo, NEUTRAL),
-        np.full_like(materials.roughness, NEUTRAL),
-        np.full_like(materials.metallic, NEUTRAL_METALLIC),
-    )

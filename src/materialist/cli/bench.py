@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from materialist import bench as benchmarks
+from materialist.bench import BENCHMARKS
 from materialist.cli.options import Run, output_option
 from materialist.cli.outcome import report_success
 from materialist.errors import InputError
@@ -16,11 +18,7 @@ def bench(
     context: typer.Context,
     name: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME",
-            help="photo-alone, invert, beside, batch, light, ablation, materials, whdr, predictor, thickness, select, "
-            "glass, edit, studio.",
-        ),
+        typer.Argument(metavar="NAME", help=f"{', '.join(BENCHMARKS)}."),
     ],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
     run: Run,
@@ -30,8 +28,6 @@ def bench(
     options = parse_extra(context.args)
     if data is not None and not data.is_dir():
         raise InputError(f"There is no data folder at {data}.")
-    from materialist import bench as benchmarks
-
     how: dict[str, Any] = {"seed": run.seed, "device": run.device, "force": run.force}
     benchmarks.run(name, data=data, output=output, **how | options)
     report_success("bench", run.as_json, [f"Look at {output}"], name=name, report=str(output))

@@ -44,16 +44,17 @@ def psnr_without_noise(first: Array, second: Array, b: Array) -> float:
     return float(-10 * np.log10(max(mse((first + second) / 2, b) - noise, 1e-8)))
 
 
-def ssim(a: Array, b: Array) -> float:
+def ssim(a: Array, b: Array, *, mask: Array | None = None) -> float:
     """Structural similarity of linear images [H, W, 3] on their sRGB encoding; 1 when equal.
 
-    Wang et al. 2004 as published: Gaussian window, sigma 1.5 (11 x 11), mean over pixels and channels. Images smaller
-    than the window are compared through the largest odd window that fits; below 3 x 3 pixels raises InputError.
+    Wang et al. 2004 as published: Gaussian window, sigma 1.5 (11 x 11), mean over pixels (of `mask` [H, W] bool) and
+    channels. Images smaller than the window are compared through the largest odd window that fits; below 3 x 3 pixels
+    raises InputError.
     """
-    return ssim_of_values(linear_to_srgb(_checked(a, b)), linear_to_srgb(b))
+    return ssim_of_values(linear_to_srgb(_checked(a, b)), linear_to_srgb(b), mask=mask)
 
 
-def ssim_of_values(a: Array, b: Array) -> float:
+def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
     """As `ssim`, of maps [H, W] or [H, W, C] in [0, 1] as they are, without encoding."""
     from skimage.metrics import structural_similarity
 
@@ -62,7 +63,10 @@ def ssim_of_values(a: Array, b: Array) -> float:
         raise InputError(f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}.")
     window = {"gaussian_weights": True, "sigma": 1.5} if smallest >= 11 else {"win_size": smallest - 1 + smallest % 2}
     a, b, channel = a.astype(np.float64), b.astype(np.float64), -1 if a.ndim == 3 else None
-    return float(structural_similarity(a, b, data_range=1, channel_axis=channel, use_sample_covariance=False, **window))
+    how = {"data_range": 1, "channel_axis": channel, "use_sample_covariance": False, **window}
+    if mask is None:
+        return float(structural_similarity(a, b, **how))
+    return float(structural_similarity(a, b, full=True, **how)[1][mask].mean())
 
 
 def sh_coefficients(envmap: Array, degree: int = 3) -> Array:

@@ -244,3 +244,4 @@ _KINDS: tuple[tuple[Callable[[np.random.Generator], Solid], bool, bool], ...] = 
     (_vase, True, True), (_frustum, False, True),
 )  # fmt: skip
 """What makes a shape, whether the shape is hollow, and whether it stands."""
+KINDS = len(_KINDS)

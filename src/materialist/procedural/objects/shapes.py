@@ -28,24 +28,14 @@ class Solid:
 
 
 def box(size: Array) -> Solid:
-    """Sharp box of extent `size` [3]; the texture covers each side once."""
-    corners: list[Array] = []
-    faces: list[list[list[int]]] = []
-    normals: list[Array] = []
-    uv: list[Array] = []
-    quad = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+    """Sharp box of extent `size` [3] standing on y = 0; the texture covers each side once."""
+    sides = []
     for axis in range(3):
+        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
         for sign in (-1, 1):
-            first = 4 * len(faces)
-            side = np.zeros((4, 3))
-            side[:, axis] = sign / 2
-            side[:, (axis + 1) % 3], side[:, (axis + 2) % 3] = quad[:, 0] * sign, quad[:, 1]
-            corners.append(side)
-            normals.append(np.tile(np.eye(3)[axis] * sign, (4, 1)))
-            uv.append(quad + 0.5)
-            faces.append([[first, first + 1, first + 2], [first, first + 2, first + 3]])
-    vertices = np.concatenate(corners) * size + [0, size[1] / 2, 0]
-    return Solid(vertices, np.concatenate(faces).astype(np.int32), np.concatenate(normals), np.concatenate(uv))
+            corner = (sign * (np.eye(3)[axis] - u) - v) / 2
+            sides.append(panel(corner * size, sign * u * size, v * size, (1, 1)))
+    return grounded(joined(sides))
 
 
 def superquadric(size: Array, e1: float, e2: float, n: int = 64) -> Solid:
@@ -97,13 +87,10 @@ def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Sol
     return lathe(np.concatenate([bottom, outside, rim, inside, floor]), n)
 
 
-def panel(origin: Array, right: Array, up: Array, repeat: tuple[float, float]) -> Solid:
+def panel(origin: ArrayLike, right: Array, up: Array, repeat: tuple[float, float]) -> Solid:
     """Rectangle from `origin` along `right` and `up` (all [3]), facing right x up, its texture repeated."""
-    vertices = np.stack([origin, origin + right, origin + right + up, origin + up]).astype(float)
-    normal = np.cross(right, up)
-    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * repeat
-    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    return Solid(vertices, faces, np.tile(normal / np.linalg.norm(normal), (4, 1)), uv)
+    solid = sheet(origin, right, up)
+    return replace(solid, uv=np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * repeat)
 
 
 def load(path: Path) -> Solid:
