@@ -45,16 +45,12 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
     photo, which is begun again, `BatchSettings.tries` times in all. The results do not depend on the number of workers.
 
-    Args:
-        source: a folder, a list file, a photo, or a URL; see `list_photos`.
-        runs: folder of the results, on this machine or one that the cluster shares.
-        progress: called with a Status whenever something happens.
-        options: fields of BatchOptions, and options of `materialist.invert`; `{name}` in a text is the photo's name.
+    `source`: see `list_photos`. `progress` is called with a Status whenever something happens. `options`: fields of
+    BatchOptions, and options of `materialist.invert`; `{name}` in a text is the photo's name.
 
-    Raises:
-        InputError: options or edits that no photo could be inverted with; RUNS is another's.
-        OutputError: RUNS cannot be written. SetupError, WeightsError: what every photo needs is missing here.
-        KeyboardInterrupt: as pressed, after the workers are ended and the summary is written.
+    Raises InputError for options or edits that no photo could be inverted with and for RUNS of another, OutputError
+    where RUNS cannot be written, SetupError and WeightsError for what every photo needs and is missing here;
+    KeyboardInterrupt as pressed, after the workers are ended and the summary is written.
     """
     start = time.monotonic()
     own = {one.name for one in fields(BatchOptions)}

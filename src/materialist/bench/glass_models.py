@@ -211,8 +211,7 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     """Thickness along the camera rays, and the normals of the back, by where they come from.
 
     'true', 'predicted' (what `materialist glass` takes by itself), 'network' (RefractionNet alone, where its weights
-    are), 'symmetry'. Where the normals are None they are those of the thickness: 'true' leaves out what the true ones
-    add. The upright direction comes from the floor of the background, where there is one.
+    are), 'symmetry'. Where the normals are None they are those of the thickness: 'true' leaves out what true ones add.
     """
     from materialist.predict.refraction import thickness
     from materialist.solids.symmetry import symmetric_thickness

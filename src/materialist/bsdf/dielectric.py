@@ -14,14 +14,9 @@ from materialist.types import Array
 def refract(direction: Array, normal: Array, ratio: float) -> tuple[Array, Array]:
     """Snell's law in vector form (paper, Material Transparency Editing: the direction omega_t).
 
-    Args:
-        direction: [..., 3] unit, towards the surface.
-        normal: [..., 3] unit, with normal . direction <= 0.
-        ratio: index of refraction of the side the ray comes from, over that of the other side.
-
-    Returns:
-        [..., 3] unit direction beyond the surface, and [...] bool where there is none because all light is
-        reflected; the direction is then that of the reflection.
+    Of unit directions [..., 3] at unit normals [..., 3] with normal . direction <= 0; `ratio`: index of refraction of
+    the side the ray comes from, over that of the other. Returns the unit directions beyond the surface, and [...] bool
+    where there is none because all light is reflected; the direction is then that of the reflection.
     """
     cosine = np.clip(-np.sum(direction * normal, -1, keepdims=True), 0, 1)
     squared = 1 - ratio**2 * (1 - cosine**2)  # cosine squared on the other side
@@ -38,12 +33,8 @@ def reflect(direction: Array, normal: Array) -> Array:
 def fresnel_dielectric(cosine: Array, ior: float) -> Array:
     """Exact reflectance [...] of unpolarised light (F_s of the paper's f_glass, without Schlick's approximation).
 
-    Args:
-        cosine: [...] of the angle between the ray and the normal, in [0, 1].
-        ior: index of refraction of the other side over that of the side the ray comes from.
-
-    Returns:
-        In [0, 1]; 1 where reflection is total.
+    `cosine`: [...] of the angle between the ray and the normal, in [0, 1]. `ior`: index of refraction of the other side
+    over that of the side the ray comes from. In [0, 1]; 1 where reflection is total.
     """
     cosine = np.clip(cosine, 0, 1)
     squared = 1 - (1 - cosine**2) / ior**2

@@ -78,7 +78,6 @@ class InteriorVerse(Source):
         return len(self.pictures)
 
     def refresh(self) -> None:
-        """List the folder again."""
         self.pictures, self.missing, self.bare = [], [], 0
         for part in parts(self.folder):
             for scene in _scenes(part / f"{self.split}.txt"):

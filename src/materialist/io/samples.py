@@ -101,7 +101,6 @@ class SampleFolder(Source):
         return len(self.paths)
 
     def read(self, index: int) -> Sample:
-        """Sample number `index`."""
         return read_sample(self.paths[index])
 
     def number(self, index: int) -> int:
@@ -109,7 +108,6 @@ class SampleFolder(Source):
         return int(self.paths[index].stem)
 
     def refresh(self) -> None:
-        """List the folders again."""
         self.paths = []
         for folder in self.folders:
             found = sorted((folder / "samples").glob("[0-9]*.npz"))

@@ -30,10 +30,8 @@ class DepthAnything(hub.HubPredictor):
         self.source = f"depth-anything ({where or 'V2 Small'})"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
-        """Planar depth at the photo's size; `seed` changes nothing.
-
-        The network sees sRGB values. A metric model's depth is taken as it is, in metres; a relative one gives inverse
-        depth without scale and shift, see `relative.from_relative`.
+        """Planar depth. The network sees sRGB values; a metric model's depth is in metres and taken as it is, a
+        relative one gives inverse depth without scale and shift, see `relative.from_relative`.
         """
         folder = locate(self.where, self.default)
         digest = hub.checked(folder)

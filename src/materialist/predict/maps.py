@@ -43,10 +43,9 @@ class MapsPredictor(Predictor):
         self.source = f"maps:{self.folder}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
-        """The wanted maps at the working size of the photo; `seed` changes nothing.
+        """The wanted maps. A missing roughness or metallic is the paper's neutral start, a missing normal is unknown.
 
-        A missing roughness or metallic is the paper's neutral start (0.5 and 0.1), a missing normal is unknown;
-        warnings tell both, and every resampling and clipping. Raises InputError when albedo or depth is missing, a map
+        Warnings tell both, and every resampling and clipping. Raises InputError when albedo or depth is missing, a map
         has another aspect ratio than the photo, or its values cannot be meant.
         """
         size, maps = photo.linear.shape[:2], dict[str, Array]()

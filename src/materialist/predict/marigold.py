@@ -73,12 +73,10 @@ class Marigold(hub.HubPredictor):
 
 
 def appearance(output: Array, properties: dict) -> dict[str, Array]:
-    """Albedo, and roughness and metallic where they are among the targets.
+    """Albedo, and roughness and metallic where they are among the targets, of output [T, H, W, 3] in [0, 1].
 
-    Args:
-        output: [T, H, W, 3] in [0, 1], one picture a target.
-        properties: the pipeline's `target_properties`: the order of the targets, what their channels are
-            (`sub_target_names`), and whether the albedo is linear or sRGB (`prediction_space`; sRGB unless said).
+    `properties`: the pipeline's `target_properties`: the order of the targets, what their channels are
+    (`sub_target_names`), and whether the albedo is linear or sRGB (`prediction_space`; sRGB unless said).
     """
     maps: dict[str, Array] = {}
     ours = {"metallicity": "metallic", "roughness": "roughness"}

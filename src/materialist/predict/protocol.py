@@ -47,7 +47,7 @@ class Predictor(ABC):
 
     @abstractmethod
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
-        """The wanted maps at the photo's working size; equal seeds give equal maps.
+        """The wanted maps at the photo's working size; equal seeds give equal maps, most predictors ignore them.
 
         `normal` [H, W, 3], where known, sets the scale of a relative depth (docs/predictors.md, "Relative depth").
         """

@@ -24,18 +24,14 @@ NETWORKS = ("auto", "bundled", "matnet", "marigold", "depth-anything")
 
 
 def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | None) -> Predictor:
-    """The predictor named by `spec`, with single maps from others where `parts` says so.
+    """The predictor named by `spec`, one of `CHOICES`, with single maps from others where `parts` says so.
 
-    Args:
-        spec: one of `CHOICES`; docs/predictors.md says what each needs.
-        device: 'auto', 'cpu' or 'cuda', for predictors that are networks.
-        parts: albedo, roughness, metallic, normal or depth = the spec of the source of this map alone, as in
-            `get_predictor("matnet", albedo="marigold")`; None means `spec`.
+    `parts`: albedo, roughness, metallic, normal or depth = the spec of the source of this map alone, as in
+    `get_predictor("matnet", albedo="marigold")`; None means `spec`. Nothing is ever downloaded here.
 
     Raises:
         InputError: an unknown name, a folder that is not there, or a source that does not give its map.
-        SetupError: an optional library is missing.
-        WeightsError: weights are missing or damaged. Nothing is ever downloaded here.
+        SetupError: an optional library is missing. WeightsError: weights are missing or damaged.
     """
     if unknown := [name for name in parts if name not in MAPS]:
         raise InputError(f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}.")

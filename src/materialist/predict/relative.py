@@ -44,12 +44,8 @@ def from_relative(
     nearest: the ratio whose surface has the least mean angle to the given normals. (The mean and not the median: a wall
     that faces the camera has its normals at every ratio and may be most of the picture.)
 
-    Args:
-        values: [H, W] float32, any unit.
-        normal: [H, W, 3] unit normals from elsewhere; zero where unknown.
-
-    Returns:
-        depth [H, W] float32 > 0, the ratio, and whether it was fitted to the normals.
+    Returns depth [H, W] float32 > 0 of values [H, W], the ratio, and whether it was fitted to the normals [H, W, 3]
+    (unit; zero where unknown).
     """
     low, high = np.percentile(values, SETTINGS.percentiles)
     t = ((values - low) / max(high - low, 1e-6 * max(abs(low), abs(high), 1e-6))).astype(np.float32)

@@ -42,14 +42,10 @@ def produce(
     folder: str | Path, options: DataSetOptions, *, count: int, workers: int = 1, resume: bool = False,
     progress: Progress | None = None,
 ) -> Made:  # fmt: skip
-    """Render the samples 0 .. count - 1 that `folder` lacks.
+    """Render the samples 0 .. count - 1 that `folder` lacks; sample i depends on the options and i alone.
 
-    Sample i depends on the options and i alone. Each is written under a temporary name and then renamed.
-
-    Raises:
-        InputError: bad numbers, a mesh that is damaged, a folder that holds something and no `resume`, or one begun
-            with other options.
-        OutputError: the folder cannot be written.
+    Raises InputError for bad numbers, a mesh that is damaged, a folder that holds something and no `resume`, or one
+    begun with other options; OutputError when the folder cannot be written.
     """
     folder = Path(folder)
     if count < 1 or workers < 1:

@@ -12,17 +12,11 @@ from materialist.types import Array
 
 
 def photographic(image: Array, rng: np.random.Generator) -> Array:
-    """The picture as an 8-bit photo of the scene would decode.
+    """The picture [H, W, 3] as an 8-bit photo of the scene would decode: float32 linear in [0, 1].
 
     White balance, exposure, lens blur, vignetting, sensor noise, a tone curve, saturation, 8 bits and JPEG, each at
-    random and often weak, then back to linear by the sRGB curve: what a reader of photos hands to a predictor.
-
-    Args:
-        image: [H, W, 3] linear Rec.709 radiance, >= 0, exposed so that white is 1; may exceed 1.
-        rng: decides everything; equal states give equal pictures.
-
-    Returns:
-        [H, W, 3] float32 linear, in [0, 1].
+    random and often weak, then back to linear by the sRGB curve: what a reader of photos hands to a predictor. `image`
+    is linear Rec.709 radiance, >= 0, exposed so that white is 1; may exceed 1.
     """
     picture = np.nan_to_num(np.asarray(image, np.float32), posinf=1e4)
     picture = white_balanced(picture, rng) * np.float32(2 ** rng.normal(0, 0.2))

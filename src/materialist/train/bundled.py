@@ -64,7 +64,6 @@ class BundledTask(MapsTask):
         self.architecture = architecture
 
     def make(self) -> BundledNetwork:
-        """A network of the architecture."""
         network = BundledNetwork(self.architecture)
         return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
@@ -103,7 +102,6 @@ class BundledTask(MapsTask):
         }
 
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
-        """As the predictor does it."""
         assert isinstance(network, BundledNetwork)
         with torch.inference_mode():
             return infer(network, sample.image, sample.rays, device=next(network.parameters()).device)

@@ -224,7 +224,6 @@ class ClickTask(Task):
         self.held_out, self.architecture = found[len(found) - aside :], architecture
 
     def make(self) -> ClickNet:
-        """ClickNet."""
         return ClickNet(self.architecture)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:

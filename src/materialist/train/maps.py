@@ -39,7 +39,6 @@ class Pictures(Examples):
         return len(self._places)
 
     def refresh(self) -> None:
-        """List the set again."""
         self.source.refresh()
         self._places = trained_on(self.source)
 

@@ -81,7 +81,6 @@ class RefractionTask(Task):
         return RefractionNet()
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        """Relative length and logarithm of solid and hollow thickness; the normals of the back."""
         return thickness_losses(network(batch["maps"]).float(), batch, ThicknessLoss())
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:

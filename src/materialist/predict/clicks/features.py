@@ -20,16 +20,12 @@ DEEP = 2.0
 
 
 def features(rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]]) -> Array:
-    """The maps that ClickNet reads.
+    """The maps [CHANNELS, H, W] float32 that ClickNet reads of rgb [H, W, 3] sRGB in [0, 1], normal [H, W, 3] unit,
+    depth [H, W] planar in any unit, 0 = no surface, and clicks (column, row) on one object, at least one.
 
-    Args:
-        rgb: [H, W, 3] sRGB in [0, 1]. normal: [H, W, 3] unit. depth: [H, W] planar, any unit, 0 = no surface.
-        clicks: (column, row) of pixels on one object; at least one.
-
-    Returns:
-        [CHANNELS, H, W] float32: rgb - 0.5; normal; log depth over that of the clicks; surface; |rgb - clicks'| (3);
-        cosine to the clicks' normals; a spot at the clicks; the distance to them, in units of the longer side. Of
-        several clicks, the one that a pixel is most like counts.
+    rgb - 0.5; normal; log depth over that of the clicks; surface; |rgb - clicks'| (3); cosine to the clicks' normals; a
+    spot at the clicks; the distance to them, in units of the longer side. Of several clicks, the one that a pixel is
+    most like counts.
     """
     height, width = depth.shape
     surface = depth > 0

@@ -30,17 +30,11 @@ class ClickMaps(NamedTuple):
 
 
 def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: str | Path = "") -> Array:
-    """How likely each pixel belongs to the object that all clicks lie on: the mean over the photo and its mirror image.
+    """[H, W] float32 in [0, 1]: how likely each pixel belongs to the object that all clicks lie on.
 
-    Args:
-        clicks: (column, row), at least one, inside the photo.
-        weights: a .safetensors file from `materialist train clicks`, or "" for those in the package.
-
-    Returns:
-        [H, W] float32 in [0, 1]; the same input gives the same result.
-
-    Raises:
-        InputError: no click, or one outside. WeightsError: weights that are missing, damaged, or of another network.
+    The mean over the photo and its mirror image. `clicks`: (column, row), at least one. `weights`: a file of
+    `materialist train clicks`, or "" for those in the package. Raises InputError for no click or one outside,
+    WeightsError.
     """
     import cv2
     import torch

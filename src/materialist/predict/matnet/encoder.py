@@ -17,14 +17,7 @@ OFFSET = 0.1
 
 
 class Encoder(nn.Module):
-    """Pictures to patch tokens of several depths.
-
-    Args:
-        width: channels of a token.
-        blocks: number of transformer blocks.
-        heads: attention heads; must divide `width`.
-        grid: side of the learned position embedding, patches.
-    """
+    """Pictures to patch tokens of several depths. `grid`: side of the learned position embedding, patches."""
 
     def __init__(self, width: int, blocks: int, heads: int, grid: int = GRID):
         super().__init__()
@@ -39,13 +32,8 @@ class Encoder(nn.Module):
         nn.init.normal_(self.cls_token, std=1e-6)
 
     def forward(self, image: Tensor, layers: Sequence[int]) -> list[Tensor]:
-        """Normalised tokens after each block in `layers` (ascending).
-
-        Args:
-            image: [B, 3, H, W]; H and W multiples of 14.
-
-        Returns:
-            for each layer the patch features as a picture, [B, width, H / 14, W / 14].
+        """The patch features after each block in `layers` (ascending), normalised, as pictures [B, width, H / 14, W /
+        14] of an image [B, 3, H, W], whose sides are multiples of 14.
         """
         rows, columns = image.shape[-2] // PATCH, image.shape[-1] // PATCH
         patches = self.patch_embed(image)  # [B, rows * columns, width]

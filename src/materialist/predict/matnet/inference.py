@@ -16,18 +16,11 @@ INPUT_SIZE = 518
 
 
 def infer(network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE) -> dict[str, Array]:
-    """The network's raw outputs for one picture, as the published inference computes them.
+    """The network's raw outputs for a picture [H, W, 3] float32 linear, about [0, 1], as the published inference has
+    them: albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges.
 
-    The picture is resized (bicubic, aspect kept) so that its shorter side is at least `input_size` and both sides are
-    multiples of 14; the outputs are resized back (bilinear, corners aligned).
-
-    Args:
-        linear: [H, W, 3] float32 linear RGB, about [0, 1].
-        input_size: >= 14.
-
-    Returns:
-        albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges. The
-        normals are interpolated and not normalised again.
+    The picture is resized (bicubic, aspect kept) so that its shorter side is at least `input_size` >= 14 and both sides
+    are multiples of 14; the outputs are resized back (bilinear, corners aligned), the normals not normalised again.
     """
     height, width = linear.shape[:2]
     rows, columns = network_size(height, width, input_size)
@@ -55,12 +48,11 @@ def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple
 
 
 def planar_depth(output: Array) -> Array:
-    """Planar depth [H, W] > 0 from the published network's depth output [H, W]: 2 max - output.
+    """Planar depth [H, W] > 0 from the published network's depth output [H, W]: 2 max - output, as its pipeline does
+    it.
 
-    The decoder starts from Depth Anything, whose output is large near the camera, and the published weights keep that
-    sense: the output falls with distance, in no fixed unit. The published pipeline turns it round by subtracting it
-    from twice its maximum before meshing; we do the same, so that its results can be repeated. The far side is then
-    at most twice as far as the near one: a relief with the right order and plausible proportions, not a measurement.
+    The decoder starts from Depth Anything, and the output still falls with distance, in no fixed unit. The far side is
+    then at most twice as far as the near one: a relief with the right order, not a measurement.
     """
     top = float(output.max())
     if top <= 0:  # nothing was seen: a flat wall

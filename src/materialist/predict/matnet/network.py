@@ -55,15 +55,11 @@ class MatNet(StoredNetwork):
         self.material_head = Head(size.width, size.pyramid, size.fused, outputs=8)
 
     def forward(self, image: Tensor) -> dict[str, Tensor]:
-        """The raw outputs, for training.
+        """The raw outputs for images [B, 3, H, W] linear RGB, about [0, 1], without mean and deviation; H, W multiples
+        of 14.
 
-        Args:
-            image: [B, 3, H, W] linear RGB, about [0, 1], without mean and deviation; H and W multiples of 14.
-
-        Returns:
-            albedo [B, 3, H, W], roughness, metallic, depth [B, 1, H, W]: >= 0, not bounded above; normal
-            [B, 3, H, W]: unit, camera frame (+X right, +Y up, +Z to the viewer). What `depth` means depends on the
-            weights: in the published ones it falls with distance (see `planar_depth`).
+        albedo [B, 3, H, W], roughness, metallic, depth [B, 1, H, W]: >= 0, not bounded above; normal [B, 3, H, W]:
+        unit, camera frame. What `depth` means depends on the weights: in the published ones it falls with distance.
         """
         features = self.pretrained(image, self.architecture.layers)
         materials = self.material_head(features)
@@ -78,13 +74,8 @@ class MatNet(StoredNetwork):
 
 
 class Head(nn.Module):
-    """Features of four encoder layers to one picture.
-
-    Args:
-        width: channels of the features.
-        pyramid: channels at the four scales (4, 2, 1 and 1/2 times the patch grid).
-        fused: channels while the scales are put together.
-        outputs: channels of the result.
+    """Features of four encoder layers to one picture. `pyramid`: channels at 4, 2, 1 and 1/2 times the patch grid;
+    `fused`: channels while these are put together.
     """
 
     def __init__(self, width: int, pyramid: Sequence[int], fused: int, outputs: int):

@@ -19,15 +19,10 @@ from materialist.types import Array, Photo
 
 
 class MatNetPredictor(Predictor):
-    """MatNet with weights from a file, a folder, or a model that was downloaded from a hub.
+    """MatNet with weights from a file, a folder, or a model that was downloaded from a hub; "": the published ones.
 
-    Args:
-        where: a file or folder of weights, a hub id (owner/name), or "" for the published weights.
-        device: 'auto', 'cpu' or 'cuda'.
-        input_size: shorter side that the network sees, pixels.
-
-    Raises:
-        WeightsError: the weights are missing, damaged, or for another network.
+    `input_size`: shorter side that the network sees, pixels. Raises WeightsError for weights that are missing, damaged,
+    or for another network.
     """
 
     def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
@@ -46,12 +41,11 @@ class MatNetPredictor(Predictor):
         self.source = f"matnet {size} {path.name} sha256:{digest[:16]}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
-        """The wanted of the network's maps at the photo's size; `seed` changes nothing.
+        """The wanted of the network's maps; `seed` changes nothing.
 
-        The network sees linear values, as in training (InteriorVerse). Its albedo is linear, its normals are in our
-        camera frame already (the published renderer puts its camera at the origin, looking down -Z, and uses them as
-        they are), roughness is perceptual. Materials are clipped to [0, 1]; for depth see `planar_depth`. Weights of
-        `train matnet --config paper` answer with depth itself, as their loss asks.
+        It sees linear values, as in training (InteriorVerse). Albedo is linear, normals are in our camera frame, as the
+        published renderer uses them, roughness is perceptual; materials are clipped to [0, 1]. For depth see
+        `planar_depth`; weights of `train matnet --config paper` answer with depth itself, as their loss asks.
         """
         maps = infer(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):

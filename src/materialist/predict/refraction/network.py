@@ -27,14 +27,10 @@ class RefractionNet(UNet):
         super().__init__(CHANNELS, ANSWERS, architecture or UNetArchitecture())
 
     def forward(self, maps: Tensor) -> Tensor:
-        """Thickness and back of a batch of objects.
+        """[B, 5, S, S] float32 of maps [B, CHANNELS, S, S] (`crop.features`), S a multiple of 32; 0 outside the mask.
 
-        Args:
-            maps: [B, CHANNELS, S, S] float32 of `crop.features`; S a multiple of 32.
-
-        Returns:
-            [B, 5, S, S] float32, 0 outside the mask: solid thickness, in units of the object's size; hollow <= solid;
-            the outward normal of the last surface, unit, in the frame of the features, away from the viewer.
+        Solid thickness, in units of the object's size; hollow <= solid; the outward normal of the last surface, unit,
+        in the frame of the features, away from the viewer.
         """
         raw = self.raw(maps)
         inside = maps[:, MASK : MASK + 1]

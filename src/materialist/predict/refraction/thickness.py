@@ -46,21 +46,16 @@ def thickness(
 ) -> Thickness:
     """The thickness and the back of the object under a mask, as RefractionNet predicts them.
 
+    Both lengths are along the straight camera rays in the units of `depth`, normals are where those rays leave.
+
     Args:
-        photo_linear: [H, W, 3] linear Rec.709.
-        mask: [H, W] bool or weights: one object. Pixels without a surface do not count.
-        normal: [H, W, 3] unit, camera frame.
-        depth: [H, W] planar depth, scene units, 0 where there is no surface.
+        photo_linear: [H, W, 3] linear Rec.709. mask: [H, W] bool or weights: one object.
+        normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, 0 where there is no surface.
         camera: its size must be that of the maps.
         weights: a .safetensors file from `materialist train refraction`, or "" for those in the package.
 
-    Returns:
-        Both thicknesses along the straight camera rays, in the units of `depth`, and the normals where those rays
-        leave the object; the same input gives the same result.
-
     Raises:
-        InputError: maps of different sizes, or a mask without any surface.
-        WeightsError: the weights are missing, damaged, or for another network.
+        InputError: maps of different sizes, or a mask without any surface. WeightsError: no usable weights.
     """
     from materialist.predict.network import loaded
     from materialist.predict.refraction.network import RefractionNet
@@ -84,18 +79,11 @@ def best_thickness(
     photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, up: Array | None = None,
     behind: Array | None = None,
 ) -> Thickness:  # fmt: skip
-    """The thickness of the object under a mask: of a surface of revolution by itself, else as RefractionNet says.
+    """The thickness of the object under a mask: of a surface of revolution by itself, else as `thickness` has it.
 
-    Args:
-        photo_linear, mask, normal, depth, camera: as for `thickness`.
-        up: [3] unit, the upright direction in the camera's frame, where a support tells it.
-        behind: [H, W] planar depth of the surface behind the object, 0 = nothing.
-
-    Returns:
-        As `thickness`; `back` is None for surfaces of revolution, whose `revolution` tells more.
-
-    Raises:
-        InputError and WeightsError as `thickness`.
+    `back` is None for surfaces of revolution, whose `revolution` tells more. `up`: [3] unit, the upright direction in
+    the camera's frame, where a support tells it. `behind`: [H, W] planar depth of the surface behind the object, 0 =
+    nothing.
     """
     guess = thickness(photo_linear, mask, normal, depth, camera)
     found = surface_of_revolution(depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind)

@@ -102,12 +102,9 @@ def draw_view(
 ) -> tuple[Array, Array]:
     """A random view of the shape, cut from a picture of any size as `Window` does at prediction.
 
-    `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise.
-
-    Returns:
-        maps [CHANNELS, S, S] float16, see `crop.features`, and target [5, S, S] float16, 0 outside the true mask: solid
-        and hollow thickness in units of the object's size, and the normal of the last surface in the frame of
-        `crop.to_window`, away from the viewer.
+    `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise. Returns maps
+    [CHANNELS, S, S] float16, see `crop.features`, and target [5, S, S] float16, 0 outside the true mask: solid and
+    hollow thickness in units of the object's size, and the normal of the last surface in the frame of `crop.to_window`.
     """
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
