@@ -143,16 +143,12 @@ def _sample(maps: dict[str, Array], valid: Array, camera: Camera) -> Sample:
     image = np.maximum(np.nan_to_num(maps["im"][..., :3], posinf=6e4), 0)
     bright = float(np.percentile(image.max(-1), 97))
     unit = lambda a: np.clip(np.nan_to_num(a), 0, 1).astype(np.float32)  # noqa: E731
+    exposed, material = (image * (WHITE / max(bright, 1e-6))).astype(np.float32), maps["material"]
     return Sample(
-        image=(image * (WHITE / max(bright, 1e-6))).astype(np.float32),
-        albedo=unit(maps["albedo"][..., :3]),
-        roughness=unit(maps["material"][..., 0]),
-        metallic=unit(maps["material"][..., 1]),
-        normal=normal.astype(np.float32),
-        depth=np.where(surface, depth, 0).astype(np.float32),
-        mask=surface.astype(np.float32),
-        rays=rays[..., :2].copy(),
-    )
+        exposed, unit(maps["albedo"][..., :3]), unit(material[..., 0]), unit(material[..., 1]),
+        normal.astype(np.float32), np.where(surface, depth, 0).astype(np.float32), surface.astype(np.float32),
+        rays[..., :2].copy(),
+    )  # fmt: skip
 
 
 def _map(path: Path, name: str) -> Array:
@@ -160,8 +156,7 @@ def _map(path: Path, name: str) -> Array:
     file = _sibling(path, name)
     if not file.is_file():
         raise InputError(f"{file} is missing; every InteriorVerse picture needs {', '.join(MAPS)}.")
-    values = read_exr(file)
-    values = values[..., None] if values.ndim == 2 else values
+    values = np.atleast_3d(read_exr(file))
     needed = {"depth": 1, "material": 2}.get(name, 3)
     if values.shape[2] < needed:
         raise InputError(f"{file} has {values.shape[2]} channels, but {needed} are needed.")
@@ -170,11 +165,9 @@ def _map(path: Path, name: str) -> Array:
 
 def _mask(path: Path, size: tuple[int, int]) -> Array:
     """[H, W] bool; all true when there is no mask file."""
-    file = _sibling(path, "mask")
-    if not file.is_file():
+    if not (file := _sibling(path, "mask")).is_file():
         return np.ones(size, bool)
-    values = read_exr(file)
-    values = values[..., 0] if values.ndim == 3 else values
+    values = np.atleast_3d(read_exr(file))[..., 0]
     if values.shape != size:
         raise InputError(f"{file} is {values.shape}, but its picture is {size}.")
     return values > 0.5

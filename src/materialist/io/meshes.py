@@ -19,6 +19,8 @@ from materialist.types import Body, Mesh, Surface
 
 _FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
 
+_OF_GLASS = ("transmission", "ior", "tint", "emission", "glass_roughness")
+"""What scene.json says of the surface of a body."""
 _HEADER = """\
 ply
 format binary_little_endian 1.0
@@ -69,14 +71,11 @@ def read_ply(path: str | Path) -> Mesh:
         raise SceneError(f"The mesh {path} is truncated; save the scene again.")
     vertices = np.frombuffer(body[:split], "<f4").reshape(-1, 8)
     faces = np.frombuffer(body[split:], _FACE)
+    place, normals, uv = (np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1))
     return Mesh(
-        np.array(vertices[:, :3], np.float32, order="C"),
-        faces["vertex_indices"].astype(np.int32),
-        np.array(vertices[:, 3:6], np.float32, order="C"),
-        np.array(vertices[:, 6:], np.float32, order="C"),
-        faces["pixel"].astype(np.int32),
+        place, faces["vertex_indices"].astype(np.int32), normals, uv, faces["pixel"].astype(np.int32),
         faces["plane"].astype(np.int16),
-    )
+    )  # fmt: skip
 
 
 def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
@@ -88,13 +87,7 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
         write_ply(folder / "bodies" / f"{k}.ply", body.mesh)
         for name in ("albedo", "roughness", "metallic"):
             write_exr(folder / "bodies" / f"{k}.{name}.exr", getattr(surface, name))
-        entries.append(
-            {
-                "name": body.name, "transmission": surface.transmission, "ior": surface.ior,
-                "tint": list(surface.tint), "emission": list(surface.emission),
-                "glass_roughness": surface.glass_roughness,
-            }
-        )  # fmt: skip
+        entries.append({"name": body.name, **{key: getattr(surface, key) for key in _OF_GLASS}})
     return entries
 
 
@@ -111,8 +104,8 @@ def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
         )
     except InputError as error:
         raise SceneError(f"{error} Save the scene again.") from error
-    surface = Surface(
-        albedo, roughness, metallic, float(entry["transmission"]), float(entry["ior"]), tuple(entry["tint"]),
-        tuple(entry.get("emission", (0.0, 0.0, 0.0))), entry.get("glass_roughness"),
-    )  # fmt: skip
+    told: dict[str, Any] = {
+        key: tuple(v) if isinstance(v := entry[key], list) else v for key in _OF_GLASS if key in entry
+    }
+    surface = Surface(albedo, roughness, metallic, **told)
     return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))

@@ -57,14 +57,11 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
     span = f"{known.min():.3g} to {known.max():.3g}" if len(known) else "none"
     continued = len(np.unique(geometry.plane_label[geometry.plane_label >= 0]))
     exposure = f"exposed by {photo.stops:+d} stops" if photo.stops else "as given"
+    off = f"mean |difference| of sRGB x {display.ERROR_GAIN}"
     pictures = [
         ("Photo", exposure, srgb_levels(photo.linear)),
         ("Re-rendering", score, srgb_levels(scene.rerender)),
-        (
-            "Error",
-            f"mean |difference| of sRGB x {display.ERROR_GAIN}",
-            display.error(photo.linear, scene.rerender),
-        ),
+        ("Error", off, display.error(photo.linear, scene.rerender)),
     ]
     maps = [
         ("Albedo", f"mean {m.albedo.mean():.2f}", srgb_levels(m.albedo)),

@@ -40,24 +40,22 @@ def load_scene(path: str | Path) -> Scene:
     folder = Path(path)
     meta = _read_meta(folder)
     try:
-        camera = Camera(**meta["camera"])
+        camera, prior = Camera(**meta["camera"]), meta["prior"]
         shape = (camera.height, camera.width)
-        prior, materials = meta["prior"], _read_materials(folder / "maps", shape)
+        before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
         label = _read_labels(folder / "plane_label.png", shape)
         return Scene(
             camera=camera,
             photo=_read_photo(folder, meta["photo"], shape),
             prior=Prediction(
-                _read_materials(folder / "prior", shape),
-                _exr(folder / "prior/normal.exr", (*shape, 3)),
-                _exr(folder / "prior/depth.exr", shape),
+                *_read_maps(folder / "prior", shape),
                 prior["predictor"],
                 tuple(prior["warnings"]),
                 prior.get("sources", {}),
-            ),
+            ),  # fmt: skip
             materials=materials,
-            normal=_exr(folder / "maps/normal.exr", (*shape, 3)),
-            depth=_exr(folder / "maps/depth.exr", shape),
+            normal=normal,
+            depth=depth,
             geometry=Geometry(read_ply(folder / "mesh.ply"), label),
             envmap=_exr(folder / "envmap.exr", None),
             rerender=_exr(folder / "rerender.exr", (*shape, 3)),
@@ -76,13 +74,9 @@ def _write(scene: Scene, folder: Path) -> None:
     write_exr(folder / "photo.exr", photo.linear)
     write_png(folder / "photo.png", photo.linear)
     original = _write_original(photo, folder)
-    for name, materials, normal, depth in (
-        ("prior", scene.prior.materials, scene.prior.normal, scene.prior.depth),
-        ("maps", scene.materials, scene.normal, scene.depth),
-    ):
+    for name, maps in (("prior", scene.prior), ("maps", scene)):
         (folder / name).mkdir()
-        maps = {"albedo": materials.albedo, "roughness": materials.roughness, "metallic": materials.metallic}
-        for key, array in {**maps, "normal": normal, "depth": depth}.items():
+        for key, array in {**vars(maps.materials), "normal": maps.normal, "depth": maps.depth}.items():
             write_exr(folder / name / f"{key}.exr", array)
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
@@ -112,18 +106,9 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "original": original,
             "has_source": photo.source is not None,
             "camera": asdict(photo.camera),
-            "hdr": photo.hdr,
-            "fov_source": photo.fov_source,
-            "path": photo.path,
-            "deep": photo.deep,
-            "stops": photo.stops,
-            "warnings": list(photo.warnings),
+            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "warnings")},
         },
-        "prior": {
-            "predictor": scene.prior.predictor,
-            "warnings": list(scene.prior.warnings),
-            "sources": scene.prior.sources,
-        },
+        "prior": {key: getattr(scene.prior, key) for key in ("predictor", "warnings", "sources")},
         "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
         **({"lamps": [asdict(lamp) for lamp in scene.lamps]} if scene.lamps else {}),
     }
@@ -159,26 +144,16 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     except (MaterialistError, OSError) as error:
         raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
     return Photo(
-        _exr(folder / "photo.exr", (*shape, 3)),
-        Camera(**meta["camera"]),
-        original,
-        meta["hdr"],
-        meta["fov_source"],
-        meta["path"],
-        source,
-        tuple(meta["warnings"]),
-        bool(meta.get("deep", False)),
-        stops,
-    )
+        _exr(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"], meta["fov_source"],
+        meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
+    )  # fmt: skip
 
 
-def _read_materials(folder: Path, shape: tuple[int, int]) -> Materials:
-    """Albedo, roughness and metallic of a folder."""
-    return Materials(
-        _exr(folder / "albedo.exr", (*shape, 3)),
-        _exr(folder / "roughness.exr", shape),
-        _exr(folder / "metallic.exr", shape),
-    )
+def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
+    """Materials, normals and depth of a folder."""
+    names = ("albedo", "roughness", "metallic", "normal", "depth")
+    maps = [_exr(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in names]
+    return Materials(*maps[:3]), maps[3], maps[4]
 
 
 def _exr(path: Path, shape: tuple[int, ...] | None) -> Array:

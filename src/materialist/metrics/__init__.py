@@ -75,14 +75,14 @@ def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
     Orthonormal basis about +Y, ordered (l, m) = (0,0), (1,-1), (1,0), (1,1), ...; every texel is weighted with its
     exact solid angle, so a constant map L has the single coefficient L sqrt(4 pi).
     """
-    from scipy.special import factorial, lpmv
+    from scipy.special import sph_harm_y
 
     envmap = np.asarray(envmap, np.float64)
     if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
         raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
     h, w = envmap.shape[:2]
     weight = row_solid_angle(h)  # [h] steradian per texel
-    cos_theta = np.cos((np.arange(h) + 0.5) * np.pi / h)  # [h]
+    theta = (np.arange(h) + 0.5) * np.pi / h  # [h]
     phi = ((np.arange(w) + 0.5) / w - 0.5) * 2 * np.pi  # [w] azimuth from -Z towards +X
     # The basis is a product of a row and a column function: sum the columns once per order m.
     rows = [np.einsum("hwc,w->hc", envmap, np.cos(m * phi)) for m in range(degree + 1)]
@@ -91,9 +91,8 @@ def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
     for l in range(degree + 1):  # noqa: E741 (l and m are the names in the literature)
         for m in range(-l, l + 1):
             k = abs(m)
-            norm = np.sqrt((2 * l + 1) / (4 * np.pi) * factorial(l - k) / factorial(l + k))
-            # Without the Condon-Shortley sign of lpmv: degree 1 is then (x, y, -z).
-            legendre = norm * (np.sqrt(2) if k else 1) * (-1) ** k * lpmv(k, l, cos_theta)  # [h]
+            # Without the Condon-Shortley sign: degree 1 is then (x, y, -z).
+            legendre = (np.sqrt(2) if k else 1) * (-1) ** k * sph_harm_y(l, k, theta, 0).real  # [h]
             coefficients.append((legendre * weight) @ (rows_sin[k] if m < 0 else rows[k]))
     return np.stack(coefficients)
 
@@ -137,9 +136,8 @@ def resample_envmap(envmap: Array, height: int) -> Array:
         return envmap
     if height < h:
         return cv2.resize(envmap, (2 * height, height), interpolation=cv2.INTER_AREA)
-    pad = 1
-    wrapped = cv2.copyMakeBorder(envmap, 0, 0, pad, pad, cv2.BORDER_WRAP)
-    x = (np.arange(2 * height) + 0.5) * w / (2 * height) - 0.5 + pad
+    wrapped = cv2.copyMakeBorder(envmap, 0, 0, 1, 1, cv2.BORDER_WRAP)
+    x = (np.arange(2 * height) + 0.5) * w / (2 * height) + 0.5
     y = (np.arange(height) + 0.5) * h / height - 0.5
     grid_x, grid_y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
     return cv2.remap(wrapped, grid_x, grid_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -30,7 +30,7 @@ def score(predicted: Prediction, true: Prediction, *, mask: Array | None = None)
     surface = true.depth > 0 if mask is None else (true.depth > 0) & mask
     if surface.mean() < LEAST_SURFACE:
         return {}
-    found = {**_albedo(predicted.materials.albedo, true.materials.albedo, surface)}
+    found = _albedo(predicted.materials.albedo, true.materials.albedo, surface)
     for name in ("roughness", "metallic"):
         p, t = getattr(predicted.materials, name), getattr(true.materials, name)
         found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
@@ -39,10 +39,8 @@ def score(predicted: Prediction, true: Prediction, *, mask: Array | None = None)
     found |= depth_figures(predicted.depth, true.depth, surface)
     cosine = np.clip((predicted.normal * true.normal).sum(-1), -1, 1)[surface]
     found["normal_angle"] = float(np.degrees(np.arccos(cosine)).mean())
-    found["mask_iou"] = float(
-        ((predicted.depth > 0) & (true.depth > 0)).sum() / max(((predicted.depth > 0) | (true.depth > 0)).sum(), 1)
-    )
-    return found
+    p, t = predicted.depth > 0, true.depth > 0
+    return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
 
 
 def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
