@@ -16,6 +16,7 @@ from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.photo import HDR_CLIP, exposed, read_photo
+from materialist.metrics.residual import shading_residual
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
 from materialist.types import Array, FitReport, Photo, Prediction, Scene
@@ -147,6 +148,9 @@ def _report(
         metrics={
             "rerender_psnr_path": metrics.psnr_without_noise(halves[0], halves[1], picture.linear),
             "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
+            "rerender_psnr_residual": metrics.psnr(
+                rerender * shading_residual(picture.linear, rerender), picture.linear
+            ),
             **distance,
             "clipped_fraction": clipped,
             "poor_fraction": poor,

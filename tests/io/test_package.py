@@ -69,7 +69,7 @@ def test_the_files_of_the_contract(scene, tmp_path):
     root = tmp_path / "deep/down/a.scene"
     maps = ("albedo", "roughness", "metallic", "normal", "depth")
     expected = {"scene.json", "photo.exr", "photo.png", "original.png", "envmap.exr", "mesh.ply", "plane_label.png"}
-    expected |= {"rerender.exr", "rerender.png", "report.json", "overview.png"}
+    expected |= {"rerender.exr", "rerender.png", "report.json", "overview.png", "maps/shading_residual.exr"}
     expected |= {f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in maps}
     assert {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()} == expected
     assert os.listdir(tmp_path / "deep/down") == ["a.scene"]

@@ -23,6 +23,7 @@ _VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2
 _NAMES = {
     "rerender_psnr_path": ("Re-rendering, PSNR", "{:.2f} dB"),
     "rerender_ssim_path": ("Re-rendering, SSIM", "{:.3f}"),
+    "rerender_psnr_residual": ("Re-rendering times shading residual, PSNR", "{:.2f} dB"),
     "prior_l1_albedo": ("Albedo, distance from prior", "{:.3f}"),
     "prior_l1_roughness": ("Roughness, distance from prior", "{:.3f}"),
     "prior_l1_metallic": ("Metallic, distance from prior", "{:.3f}"),

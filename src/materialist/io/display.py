@@ -69,6 +69,11 @@ def error(photo: Array, rerender: Array) -> Array:
     return ramp(ERROR_GAIN * np.abs(linear_to_srgb(photo) - linear_to_srgb(rerender)).mean(-1))
 
 
+def factor(values: Array) -> Array:
+    """Factors [H, W, 3] by their logarithm: 1 is mid-grey, 1/4 black, 4 white."""
+    return to_bytes(0.5 + np.log2(np.maximum(values, 1e-6)) / 4)
+
+
 def strip(image: Array, *predictions: Prediction) -> Array:
     """The linear picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
     import cv2

@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from materialist.color import srgb_levels
 from materialist.io import display
+from materialist.metrics.residual import shading_residual
 from materialist.types import Array, Scene
 
 _WIDTH = 1600
@@ -58,9 +59,11 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
     continued = len(np.unique(geometry.plane_label[geometry.plane_label >= 0]))
     exposure = f"exposed by {photo.stops:+d} stops" if photo.stops else "as given"
     off = f"mean |difference| of sRGB x {display.ERROR_GAIN}"
+    residual = shading_residual(photo.linear, scene.rerender)
     pictures = [
         ("Photo", exposure, srgb_levels(photo.linear)),
         ("Re-rendering", score, srgb_levels(scene.rerender)),
+        ("Shading residual", "photo / re-rendering, grey is 1", display.factor(residual)),
         ("Error", off, display.error(photo.linear, scene.rerender)),
     ]
     maps = [

@@ -18,6 +18,7 @@ from materialist.io.image import write_png, write_png_bytes
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
+from materialist.metrics.residual import shading_residual
 from materialist.plain import is_utf8, plain
 from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 
@@ -48,11 +49,11 @@ def load_scene(path: str | Path) -> Scene:
             camera=camera,
             photo=_read_photo(folder, meta["photo"], shape),
             prior=Prediction(
-                *_read_maps(folder / "prior", shape),
+                *before,
                 prior["predictor"],
                 tuple(prior["warnings"]),
                 prior.get("sources", {}),
-            ),  # fmt: skip
+            ),
             materials=materials,
             normal=normal,
             depth=depth,
@@ -78,6 +79,7 @@ def _write(scene: Scene, folder: Path) -> None:
         (folder / name).mkdir()
         for key, array in {**vars(maps.materials), "normal": maps.normal, "depth": maps.depth}.items():
             write_exr(folder / name / f"{key}.exr", array)
+    write_exr(folder / "maps/shading_residual.exr", shading_residual(photo.linear, scene.rerender))
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
     # Labels -1 .. 126 become 0 .. 127, so that an image viewer shows them as grey levels.
