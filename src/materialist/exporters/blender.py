@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from materialist.edits.core.renderer import path_depth
 from materialist.errors import SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part
 from materialist.io.atomic import ensure_writable, whole_file
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
-from materialist.render.bodies import SMOOTH, is_glowing, is_transparent
-from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
+from materialist.render.bodies import LEAST_IOR, SMOOTH, is_glowing, is_transparent
 from materialist.types import Scene
 
 _MINUTES = 20
@@ -76,7 +76,7 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
         "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,
         "photo_width": native[1], "photo_height": native[0],
         "parts": {part.name: _look(part) for part in parts},
-        "bounces": (GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH) - 2,
+        "bounces": path_depth(scene) - 2,
         "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(_in_photo(scene)))],
         "lamps": [asdict(lamp) for lamp in scene.lamps],
     }  # fmt: skip
@@ -99,7 +99,7 @@ def _look(part: Part) -> dict:
     if surface is not None and is_transparent(surface):
         roughness = surface.interface_roughness
         look["glass"] = {
-            "share": float(surface.transmission), "ior": max(float(surface.ior), 1.0001),
+            "share": float(surface.transmission), "ior": max(float(surface.ior), LEAST_IOR),
             "roughness": 0.0 if roughness < SMOOTH else roughness,
             "tint": [float(c) for c in surface.tint],
         }  # fmt: skip

@@ -14,6 +14,8 @@ OUTSIDE = "materialist_outside"
 """Plugin name of a texture with one value outside of a body, and 1 seen from within."""
 SMOOTH = 0.03
 """Perceptual roughness below which a dielectric is taken as perfectly smooth."""
+LEAST_IOR = 1.0001
+"""Mitsuba takes no interface between equal media."""
 
 
 def is_transparent(surface: Surface) -> bool:
@@ -26,53 +28,46 @@ def is_glowing(surface: Surface) -> bool:
     return max(surface.emission) > 0
 
 
-def body_emitter(mi, surface: Surface):
-    """An area emitter of the surface's emission, None where it does not glow."""
+def body_emitter(surface: Surface) -> dict | None:
+    """Mitsuba's description of an emitter of the surface's emission, None where it does not glow."""
     if not is_glowing(surface):
         return None
-    return mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": [float(c) for c in surface.emission]}})
+    return {"type": "area", "radiance": {"type": "rgb", "value": [float(c) for c in surface.emission]}}
 
 
-def body_bsdf(mi, surface: Surface) -> dict:
-    """A Mitsuba description: T times a dielectric and (1 - T) times the opaque BRDF, T the transmission.
+def body_bsdf(surface: Surface, opaque: dict) -> dict:
+    """A Mitsuba description: T times a dielectric and (1 - T) times the `opaque` BRDF, T the transmission.
 
     The opaque share is a coat on the outside: light that has entered meets the dielectric alone. The tint is shared
     by the way in and the way out: each interface has its square root.
     """
     if not is_transparent(surface):
-        return _opaque(mi, surface)
-    glass = _dielectric(surface)
+        return opaque
+    tint = {"type": "rgb", "value": [float(np.sqrt(c)) for c in surface.tint]}
+    ior = max(float(surface.ior), LEAST_IOR)
+    glass: dict = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0, "specular_transmittance": tint}
+    if surface.interface_roughness >= SMOOTH:
+        rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": surface.interface_roughness**2}
+        glass = {"type": FROSTED, "interface": {**glass, **rough}}
     if surface.transmission >= 1:
         return glass
     weight = {"type": OUTSIDE, "value": float(surface.transmission)}
-    return {"type": "blendbsdf", "weight": weight, "opaque": _opaque(mi, surface), "glass": glass}
+    return {"type": "blendbsdf", "weight": weight, "opaque": opaque, "glass": glass}
 
 
-def _dielectric(surface: Surface) -> dict:
-    roughness = surface.interface_roughness
-    tint = [float(np.sqrt(c)) for c in surface.tint]
-    ior = max(float(surface.ior), 1.0001)  # Mitsuba takes no interface between equal media
-    glass = {
-        "int_ior": ior, "ext_ior": 1.0, "specular_transmittance": {"type": "rgb", "value": tint},
-    }  # fmt: skip
-    if roughness < SMOOTH:
-        return {"type": "dielectric", **glass}
-    rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": roughness**2, **glass}
-    return {"type": FROSTED, "interface": rough}
+def opaque_bsdf(mi, surface: Surface) -> dict:
+    """The scene's own BRDF with the surface's maps."""
+    maps = {"base_color": surface.albedo, "roughness": surface.roughness, "metallic": surface.metallic}
+    how = {"type": "bitmap", "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+    data = {name: tensor(mi, at_least_2x2(np.atleast_3d(values))) for name, values in maps.items()}
+    return {"type": "materialist_disney", **{name: {**how, "data": values} for name, values in data.items()}}
 
 
-def _opaque(mi, surface: Surface) -> dict:
-    texture = {
-        "base_color": surface.albedo, "roughness": surface.roughness[..., None],
-        "metallic": surface.metallic[..., None],
-    }  # fmt: skip
-    return {"type": "materialist_disney", **{name: _texture(mi, values) for name, values in texture.items()}}
-
-
-def _texture(mi, values: Array) -> dict:
-    """[h, w, C] as a bitmap texture; Mitsuba takes none below 2 x 2."""
-    grown = np.tile(values, (2 if values.shape[0] == 1 else 1, 2 if values.shape[1] == 1 else 1, 1))
-    return {"type": "bitmap", "data": tensor(mi, grown), "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+def at_least_2x2(values: Array) -> Array:
+    """A map [h, w, ...]; a single row or column is repeated, since Mitsuba takes no texture below 2 x 2."""
+    for axis in (0, 1):
+        values = np.repeat(values, 2, axis) if values.shape[axis] == 1 else values
+    return values
 
 
 def register() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.buffers import floats, integers, tensor
 from materialist.errors import InputError
-from materialist.render.bodies import body_bsdf, body_emitter
+from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, half_turn, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
@@ -55,10 +55,11 @@ class RenderScene:
         # A plane that no pixel lies on keeps the neutral material it starts with.
         self._members = {k: pixels for k, pixels in members.items() if len(pixels)}
         height, width = camera.height, camera.width
+        look_along = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
         description = {
             "type": "scene",
             "embree_use_robust_intersections": True,
-            "sensor": _sensor(mi, camera),
+            "sensor": sensor(camera, look_along),
             "light": {
                 "type": "envmap",
                 "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
@@ -69,9 +70,10 @@ class RenderScene:
         for k in self.planes:
             description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
         for k, body in enumerate(bodies):
-            description[f"body{k}"] = _shape(mi, body, body_bsdf(mi, body.surface), body_emitter(mi, body.surface))
+            bsdf = body_bsdf(body.surface, opaque_bsdf(mi, body.surface))
+            description[f"body{k}"] = _shape(mi, body, bsdf, body_emitter(body.surface))
         for k, lamp in enumerate(lamps):
-            description[f"lamp{k}"] = _sphere(lamp)
+            description[f"lamp{k}"] = sphere(lamp)
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
@@ -192,8 +194,8 @@ def _exchanged(name: str) -> bool:
     return name == "light.data" or (".bsdf." in name and name.endswith(".data"))
 
 
-def _sensor(mi, camera: Camera) -> dict:
-    transform = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
+def sensor(camera: Camera, transform) -> dict:
+    """Mitsuba's description of the photo's pinhole; its `to_world` looks along -Z, +Y up."""
     return {
         "type": "perspective", "fov": camera.fov, "fov_axis": "x", "to_world": transform,
         "near_clip": 1e-4, "far_clip": 1e7,
@@ -216,8 +218,8 @@ def _maps_bsdf(mi, height: int, width: int) -> dict:
     }  # fmt: skip
 
 
-def _sphere(lamp: Lamp) -> dict:
-    """A sphere whose radiant flux is the lamp's."""
+def sphere(lamp: Lamp) -> dict:
+    """Mitsuba's description of a black sphere whose radiant flux is the lamp's."""
     return {
         "type": "sphere", "center": [float(v) for v in lamp.position], "radius": float(lamp.radius),
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
@@ -233,11 +235,11 @@ def beside_u(normals: Array) -> Array:
     return np.where(along, beside, normals).astype(np.float32)
 
 
-def _shape(mi, mesh: Mesh | Body, bsdf: dict, emitter=None):
+def _shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None):
     props = mi.Properties()
     props["mesh_bsdf"] = mi.load_dict(bsdf)
     if emitter is not None:
-        props["mesh_emitter"] = emitter
+        props["mesh_emitter"] = mi.load_dict(emitter)
     shape = mi.Mesh(
         "part", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, has_vertex_texcoords=True, props=props
     )

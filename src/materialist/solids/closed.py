@@ -17,9 +17,6 @@ from materialist.errors import InputError
 from materialist.geometry.membrane import membrane, nearest
 from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in, window
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
-from materialist.solids.front import DEFAULT as FRONT
-from materialist.solids.front import smooth_front
-from materialist.solids.shell import DEFAULT as SHELL
 from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined, region
 from materialist.types import Array, Camera
 
@@ -34,6 +31,7 @@ class ClosedSettings:
     nearest: float = 0.995  # the back keeps before this part of the depth behind the object; tuned by eye
     thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
     least: float = 1e-4  # the same at the border, part of the depth
+    smooth: float = 0.01  # standard deviation of the blur of the normals, part of the object's size; tuned by eye
     grazing: float = 0.35  # least n.v by which a wall seen at a slant gets longer; tuned by eye
 
 
@@ -50,7 +48,7 @@ def closed_proxy(
 
     Args:
         depth: [H, W] planar depth of the front, scene units, 0 = none.
-        normal: [H, W, 3] unit; the front follows them (see `front.smooth_front`).
+        normal: [H, W, 3] unit.
         mask: [H, W] bool or weights. Its parts become bodies of their own, its holes stay open (unless a pixel wide).
         thickness: [H, W] length of the camera ray inside the solid object, scene units >= 0.
         wall: the object is hollow: thickness of its wall, scene units. A second surface is added inside.
@@ -69,12 +67,11 @@ def closed_proxy(
     if back is not None and back.shape != normal.shape:
         raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
     view = _window(depth, normal, inside, thickness, behind, back, camera)
-    front = smooth_front(view.depth, view.normal, view.inside, view.rays)
-    thick = _thickness(view, front)  # [h, w]
-    shell = _closed(view, front, thick, camera)
+    view = replace(view, thickness=_thickness(view))
+    shell = _closed(view, camera)
     if wall is None:
         return shell
-    inner = _cavity(view, front, thick, wall, camera)
+    inner = _cavity(view, wall, camera)
     return shell if inner is None else joined([shell, inside_out(inner)])
 
 
@@ -104,6 +101,11 @@ class _View:
         """[h, w] of the rays."""
         return np.linalg.norm(self.rays, axis=-1)
 
+    @property
+    def pixel(self) -> Array:
+        """[h, w] size of a pixel on the front, scene units."""
+        return self.depth * spacing(self.rays)
+
 
 def _check(normal: Array, thickness: Array, inside: Array) -> None:
     if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
@@ -130,36 +132,36 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
     )  # fmt: skip
 
 
-def _thickness(view: _View, front: Array) -> Array:
+def _thickness(view: _View) -> Array:
     """[h, w] along the ray, scene units: never behind what stands there, and never none."""
-    pixel = front * spacing(view.rays)  # scene units
-    least = DEFAULT.thin * view.size * np.median(pixel[view.inside])
-    thick = np.minimum(view.thickness.astype(np.float64), _room(view, front))
+    least = DEFAULT.thin * view.size * np.median(view.pixel[view.inside])
+    thick = np.minimum(view.thickness.astype(np.float64), _room(view))
     return np.where(view.inside, np.maximum(thick, least), 0)
 
 
-def _cavity(view: _View, front: Array, thick: Array, wall: float, camera: Camera) -> Shell | None:
+def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     facing = np.abs((view.normal * view.rays).sum(-1)) / view.length
     through = wall / np.clip(facing, DEFAULT.grazing, 1)  # [h, w] along the ray, of one wall
-    left = thick - 2 * through
-    pixel = front * spacing(view.rays)
-    room = view.inside & (left > DEFAULT.thin * view.size * pixel) & (border_distance(view.inside) * pixel > wall)
+    left = view.thickness - 2 * through
+    room = view.inside & (left > DEFAULT.thin * view.size * view.pixel)
+    room &= border_distance(view.inside) * view.pixel > wall
     if room.sum() < 16:
         return None
-    inner = replace(view, inside=room, thickness=left)  # its walls are parallel: the same normals
-    return _closed(inner, front + through / view.length, np.where(room, left, 0), camera)
+    # Its walls are parallel: the same normals.
+    front = view.depth + through / view.length
+    return _closed(replace(view, inside=room, depth=front, thickness=np.where(room, left, 0)), camera)
 
 
-def _closed(view: _View, front: Array, thick: Array, camera: Camera) -> Shell:
-    """Front and back, [h, w] planar depth and the way between them along the rays, over one triangulated region."""
+def _closed(view: _View, camera: Camera) -> Shell:
+    """Front and back over one triangulated region."""
     import cv2
 
-    known, length = view.inside, view.length
+    known, length, front, thick = view.inside, view.length, view.depth, view.thickness
     edge = silhouette_field(known)  # [h, w] pixels
     factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
-    within = cv2.resize((edge - SHELL.collar).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     found = region(_ended(within))
     if not len(found.faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
@@ -170,8 +172,8 @@ def _closed(view: _View, front: Array, thick: Array, camera: Camera) -> Shell:
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
     through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
     own = np.exp(at(middle)) - through / (2 * at(length))
-    through = np.maximum(np.minimum(through, at(_room(view, front))), DEFAULT.least * own)
-    sigma = FRONT.smooth * view.size
+    through = np.maximum(np.minimum(through, at(_room(view))), DEFAULT.least * own)
+    sigma = DEFAULT.smooth * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
@@ -190,10 +192,10 @@ def _between(normal: Array, known: Array, place: Array) -> Array:
     return unit(_sampled(normal[nearest(known)], place))
 
 
-def _room(view: _View, front: Array) -> Array:
+def _room(view: _View) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
     known = view.inside & (view.behind > 0)
-    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - front, 0) * view.length, NOTHING)
+    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - view.depth, 0) * view.length, NOTHING)
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -11,18 +9,8 @@ import numpy as np
 from materialist.camera import rays_through, unit
 from materialist.types import Array, Camera
 
-
-@dataclass(frozen=True)
-class ShellSettings:
-    """The region, and the wall between front and back."""
-
-    collar: float = 0.35  # pixels from the last vertices of front and back to the silhouette; tuned by eye
-    rings: int = 4  # rings of the wall from the front to the silhouette, and as many on the way back
-    clear: float = 0.04  # part of a cell's side that a crossing keeps from its corners: no two points in one place
-    edge: float = 0.03  # part of the wall over which normals turn from front or back to the wall's; tuned by eye
-
-
-DEFAULT = ShellSettings()
+CLEAR = 0.04
+"""Part of a cell's side that a crossing keeps from its corners: no two points in one place."""
 # Slots of a cell: corners 0 to 3 clockwise from the top left (y down), then the crossings of its top, right, bottom
 # and left side, 4 to 7. Triangles turn as top left, bottom left, bottom right do: counter-clockwise with y up.
 _POLYGONS: dict[int, tuple[tuple[int, ...], ...]] = {
@@ -112,7 +100,7 @@ def _crossings(field: Array, inside: Array, first: int) -> tuple[Array, Array]:
     number[crossed] = first + np.arange(crossed.sum())
     rows, columns = np.nonzero(crossed)
     left, right = field[rows, columns], field[rows, columns + 1]
-    part = np.clip(left / (left - right), DEFAULT.clear, 1 - DEFAULT.clear)
+    part = np.clip(left / (left - right), CLEAR, 1 - CLEAR)
     return number, np.stack([columns + part, rows], -1).astype(np.float64)
 
 
@@ -134,25 +122,16 @@ class Sheets(NamedTuple):
 
 
 def closed(region: MeshedRegion, sheets: Sheets, camera: Camera) -> Shell:
-    """The closed surface; its wall bulges by the collar, and looks across the rays: it is a silhouette."""
-    count, place = len(sheets.place), sheets.place
-    number = np.full(count, -1, np.int64)
-    rim = np.unique(region.border)
-    number[rim] = np.arange(len(rim))
-    edges = number[region.border]  # [B, 2] in vertices of the rim
-    steps = np.linspace(1, -1, 2 * DEFAULT.rings + 1)[1:-1]  # 1 at the front's last vertices, 0 at the silhouette
-    turns = np.concatenate([[1 - DEFAULT.edge], steps, [DEFAULT.edge - 1]])
-    wall = place[rim] + DEFAULT.collar * (1 - turns[:, None, None] ** 2) * _outward(place[rim], edges)  # [R, B, 2]
-    depth_in = ((1 - turns)[:, None] * sheets.thick[rim] / 2).ravel()
-    everywhere = np.concatenate([place, place, wall.reshape(-1, 2)])
-    front = np.concatenate([sheets.front, sheets.front, np.tile(sheets.front[rim], len(turns))])
-    vertices, uv = _in_space(everywhere, front, np.concatenate([np.zeros(count), sheets.thick, depth_in]), camera)
-    # Rings in order, from the front's own vertices to the back's.
-    rings = [rim, *(2 * count + k * len(rim) + np.arange(len(rim)) for k in range(len(turns))), rim + count]
-    strips = [_strip(one, two, edges) for one, two in pairwise(rings)]
-    faces = np.concatenate([region.faces, region.faces[:, ::-1] + count, *strips])
-    side = np.tile(_across(vertices[rim], sheets.outward[rim]), (len(turns), 1))
-    normals = np.concatenate([sheets.front_normal, sheets.back_normal, side])
+    """The closed surface; its wall has vertices of its own, which look across the rays: it is a silhouette."""
+    count, rim = len(sheets.place), np.unique(region.border)
+    index = np.concatenate([np.arange(count), np.arange(count), rim, rim])  # front, back, the wall's two sides
+    beyond = np.concatenate([np.zeros(count), sheets.thick, np.zeros(len(rim)), sheets.thick[rim]])
+    vertices, uv = _in_space(sheets.place[index], sheets.front[index], beyond, camera)
+    a, b = 2 * count + np.searchsorted(rim, region.border).T
+    wall = [np.stack([b, a, a + len(rim)], -1), np.stack([b, a + len(rim), b + len(rim)], -1)]
+    faces = np.concatenate([region.faces, region.faces[:, ::-1] + count, *wall])
+    side = _across(vertices[rim], sheets.outward[rim])
+    normals = np.concatenate([sheets.front_normal, sheets.back_normal, side, side])
     return Shell(vertices.astype(np.float32), faces.astype(np.int32), normals.astype(np.float32), uv)
 
 
@@ -161,23 +140,6 @@ def _across(points: Array, outward: Array) -> Array:
     ray = unit(points)
     side = np.stack([outward[:, 0], -outward[:, 1], np.zeros(len(outward))], -1)
     return unit(side - (side * ray).sum(-1, keepdims=True) * ray)
-
-
-def _strip(one: Array, two: Array, edges: Array) -> Array:
-    """[2B, 3] faces between two rings (vertex numbers), along edges [B, 2] of the sheet that `one` ends."""
-    a, b = edges.T
-    return np.concatenate([np.stack([one[b], one[a], two[a]], -1), np.stack([one[b], two[a], two[b]], -1)])
-
-
-def _outward(points: Array, edges: Array) -> Array:
-    """[R, 2] unit directions (y down) away from the region at its border's points [R, 2]."""
-    along = points[edges[:, 1]] - points[edges[:, 0]]
-    # The region lies to the left of its edges seen with y up: outside is to the right.
-    side = unit(np.stack([-along[:, 1], along[:, 0]], -1))
-    total = np.zeros_like(points)
-    for k in range(2):
-        np.add.at(total, edges[:, k], side)
-    return unit(total)
 
 
 def _in_space(place: Array, front: Array, beyond: Array, camera: Camera) -> tuple[Array, Array]:

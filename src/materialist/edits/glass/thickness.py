@@ -14,7 +14,6 @@ from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
 from materialist.predict.refraction import best_thickness, thickness
 from materialist.solids.finder import upright
-from materialist.solids.front import smooth_front
 from materialist.solids.revolution import Revolution
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
@@ -90,8 +89,7 @@ def object_thickness(
         given = _given(method, inside)
         return ObjectThickness(np.where(inside, given, 0).astype(np.float32), WALL.usual * size, "given")
     if method == "symmetry":
-        front = smooth_front(scene.depth, scene.normal, inside, rays)
-        mirrored = symmetric_thickness(front, scene.normal, inside, scene.camera)
+        mirrored = symmetric_thickness(scene.depth, scene.normal, inside, scene.camera)
         return ObjectThickness(mirrored, WALL.usual * size, "symmetry")
     if method == "network":
         found = thickness(photo, inside, *maps)
