@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from materialist import __version__
+from materialist.camera import unit
 from materialist.color import srgb_levels
-from materialist.edits.core.topology import edge_faults, volume
+from materialist.edits.core.topology import edge_faults
 from materialist.errors import OutputError
 from materialist.exporters.parts import Part, one_roughness
 from materialist.io.display import encoded, to_bytes
@@ -107,7 +108,7 @@ class _Document:
         mesh = part.mesh
         attributes = {
             "POSITION": self._accessor(mesh.vertices.astype("<f4"), "VEC3", bounds=True),
-            "NORMAL": self._accessor(_unit(mesh.normals).astype("<f4"), "VEC3"),
+            "NORMAL": self._accessor(unit(mesh.normals).astype("<f4"), "VEC3"),
             "TEXCOORD_0": self._accessor(mesh.uv.astype("<f4"), "VEC2"),
         }
         indices = self._accessor(mesh.faces.astype("<u4").ravel(), "SCALAR", indices=True)
@@ -183,19 +184,13 @@ def _camera(camera: Camera, parts: list[Part]) -> dict:
     return {"name": "photo", "type": "perspective", "perspective": perspective}
 
 
-def _unit(normals: Array) -> Array:
-    """[V, 3] unit to float32 rounding; straight to the viewer where there is none."""
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0, 0, 1], np.float32))
-
-
 def _mean_chord(part: Part) -> float:
     """Mean way through a closed part, scene units: 4 volume / area (Cauchy); 0 for an open one."""
-    mesh = part.mesh
-    open_edges, _ = edge_faults(mesh.vertices, mesh.faces)
-    a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(np.float64) for k in range(3))
-    area = float(np.linalg.norm(np.cross(b - a, c - a), axis=-1).sum() / 2)
-    return 0.0 if open_edges or area == 0 else 4 * abs(volume(mesh.vertices, mesh.faces)) / area
+    from trimesh import Trimesh
+
+    open_edges, _ = edge_faults(part.mesh.vertices, part.mesh.faces)
+    mesh = Trimesh(part.mesh.vertices, part.mesh.faces, process=False)
+    return 0.0 if open_edges or mesh.area == 0 else float(4 * abs(mesh.volume) / mesh.area)
 
 
 def passing(part: Part) -> Materials:

@@ -103,12 +103,9 @@ def _mean(materials: Materials, members: Array) -> Materials:
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
     """Geometry of a coarser depth map with at most `most` triangles, and the maps at its size."""
-    from materialist.geometry.build import build_geometry, completion_of
-    from materialist.geometry.extents import read_extents
+    from materialist.geometry.build import rebuilt
 
     camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
-    completion = completion_of(scene.geometry, scene.provenance.get("completion"))
-    tau, ends = float(scene.provenance.get("tau", 6.0)), read_extents(scene.provenance)
     for _ in range(12):
         width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))
         rows = ((np.arange(height) + 0.5) * camera.height / height).astype(int)
@@ -117,9 +114,7 @@ def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
         coarse = Camera(width, height, camera.fov)
         if not (scene.depth[pick] > 0).any():
             break
-        geometry = build_geometry(
-            scene.depth[pick], scene.normal[pick], coarse, tau=tau, completion=completion, extents=ends
-        )
+        geometry = rebuilt(scene, scene.depth[pick], scene.normal[pick], coarse)
         if len(geometry.mesh.faces) <= most:
             m = scene.materials
             maps = Materials(m.albedo[pick], m.roughness[pick], m.metallic[pick])

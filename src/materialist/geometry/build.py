@@ -11,9 +11,9 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.geometry.boundary import QUAD, depth_to_mesh, face_camera
 from materialist.geometry.completion import complete
-from materialist.geometry.extents import PlaneExtent
+from materialist.geometry.extents import PlaneExtent, read_extents
 from materialist.geometry.planes import find_planes
-from materialist.types import Array, Camera, Geometry, Mesh
+from materialist.types import Array, Camera, Geometry, Mesh, Scene
 
 COMPLETIONS = ("planes", "floors", "none")
 """What can be added to what the picture shows: the dominant planes continued, the same with walls (planes that do not
@@ -40,7 +40,9 @@ def build_geometry(
     completion: one of `COMPLETIONS` or `SYNONYMS`. extents: where continued walls end, if that is known.
     Raises InputError for maps or options that cannot be used.
     """
-    completion = completion_named(completion)
+    completion = SYNONYMS.get(completion, completion)
+    if completion not in COMPLETIONS:
+        raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W] plane of each pixel
     if completion != "none":
@@ -51,20 +53,16 @@ def build_geometry(
     return Geometry(split_creases(mesh, depth, normal), label)
 
 
-def completion_named(name: str) -> str:
-    """One of `COMPLETIONS` for its name or a synonym of it; InputError for any other name."""
-    found = SYNONYMS.get(name, name)
-    if found not in COMPLETIONS:
-        raise InputError(f"Completion is '{name}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
-    return found
-
-
-def completion_of(geometry: Geometry, told: str | None = None) -> str:
-    """The completion a geometry was built with: what a scene's provenance has `told`, else read off its mesh."""
-    found = SYNONYMS.get(told or "", told)
-    if found in COMPLETIONS:
-        return found
-    return "planes" if (geometry.mesh.face_plane >= 0).any() else "none"
+def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geometry:
+    """The geometry of other maps, built as the scene's own: as its provenance says, else as its mesh looks."""
+    told = scene.provenance
+    completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
+    if told.get("completion") in (*COMPLETIONS, *SYNONYMS):
+        completion = told["completion"]
+    return build_geometry(
+        depth, normal, camera, tau=float(told.get("tau", 6.0)), completion=completion, extents=read_extents(told),
+        seed=int(told.get("seed", 0) or 0),
+    )  # fmt: skip
 
 
 def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CREASE) -> Mesh:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.types import Array
 
@@ -35,7 +36,7 @@ def check_envmap(envmap: Array) -> None:
     """Raise InputError unless the map is [h, 2h, 3] with h >= 4, finite and >= 0."""
     shape = np.shape(envmap)
     if len(shape) != 3 or shape[2] != 3 or shape[0] < 4 or shape[1] != 2 * shape[0]:
-        raise InputError(f"The environment map is {shape}; it must be [h, 2h, 3] with h of at least 4.")
+        raise InputError(f"The environment map is {shape}; it must be twice as wide as high, RGB, and 4 rows or more.")
     low, high = float(np.min(envmap)), float(np.max(envmap))
     if not (low >= 0 and np.isfinite(high)):
         raise InputError(f"The environment map has values from {low:g} to {high:g}; they must be finite and >= 0.")
@@ -43,8 +44,5 @@ def check_envmap(envmap: Array) -> None:
 
 def is_peaked(envmap: Array) -> bool:
     """Whether the light of [h, 2h, 3] is hard: mean squared over squared mean luminance over the sphere."""
-    luma = envmap.mean(-1)
-    h, w = luma.shape
-    area = np.sin(np.pi * (np.arange(h) + 0.5) / h)[:, None]
-    share = np.broadcast_to(area / (area.sum() * w), (h, w))
+    luma, share = envmap.mean(-1), row_solid_angle(len(envmap))[:, None] / (4 * np.pi)
     return float((luma**2 * share).sum()) > PEAKED * max(float((luma * share).sum()) ** 2, 1e-30)

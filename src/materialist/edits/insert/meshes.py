@@ -18,15 +18,8 @@ import numpy as np
 from materialist.camera import unit
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import uniform_surface
-from materialist.edits.core.topology import edge_faults, volume
-from materialist.edits.insert.mesh_material import (
-    GREY,
-    Textures,
-    coloured,
-    gltf_left_out,
-    gltf_surface,
-    mtl_surface,
-)
+from materialist.edits.core.topology import edge_faults
+from materialist.edits.insert.mesh_material import GREY, Textures, coloured, gltf_left_out, gltf_surface, mtl_surface
 from materialist.errors import InputError
 from materialist.option_kinds import parse_colour
 from materialist.types import Array, Body, Surface
@@ -102,7 +95,10 @@ def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMIT
     if up == "z" or (up == "auto" and path.suffix.lower() == ".stl"):
         turned = lambda v: np.stack([v[:, 0], v[:, 2], -v[:, 1]], -1)  # noqa: E731
         parts = [replace(part, vertices=turned(part.vertices), normals=turned(part.normals)) for part in parts]
-    return _checked(parts, path, [*reader.notes, *_file_notes(path, folder, reader)])
+    lacking = [f"{name} is missing" for name in folder.missing] + ["a texture cannot be read"] * reader.textures.damaged
+    return _checked(
+        parts, path, reader.notes + [f"{path.name}: {what}; a constant takes its place." for what in lacking]
+    )
 
 
 def files_beside(path: Path) -> list[Path]:
@@ -205,7 +201,7 @@ def _gltf_materials(path: Path, data: bytes) -> dict[str | None, dict[str, Any]]
 
 
 class MeshFolder:
-    """The files beside a mesh, as trimesh asks for them (its `Resolver` interface).
+    """The files beside a mesh, as trimesh asks for them (as much of its `Resolver` as its readers use).
 
     trimesh swallows the errors of a resolver, so this keeps them: `refused` are references that lead outside of the
     folder by a path, a link or an address, and are never opened; `missing` are files that are not there.
@@ -234,33 +230,15 @@ class MeshFolder:
 
     def _inside(self, name: str) -> Path | None:
         """The path of a reference, None when it leads outside. glTF's percent-encoding is decoded."""
-        path = None
-        for spelled in dict.fromkeys((name, unquote(name))):
-            plain = spelled.replace("\\", "/")
-            path = (self.folder / plain).resolve()
-            outside = ":" in plain.split("/", 1)[0] or plain.startswith("/") or "\0" in plain
-            if outside or not path.is_relative_to(self.folder):
-                return None
-            if path.is_file():
-                break
-        return path
+        spelled = [one.replace("\\", "/") for one in (name, unquote(name))]
+        if any(":" in one.split("/", 1)[0] or one.startswith("/") or "\0" in one for one in spelled):
+            return None
+        paths = [(self.folder / one).resolve() for one in spelled]
+        if not all(path.is_relative_to(self.folder) for path in paths):
+            return None
+        return paths[0] if paths[0].is_file() else paths[1]
 
     __getitem__ = get
-
-    def keys(self) -> list[str]:
-        """Names of the files, as trimesh asks for them."""
-        return [path.name for path in self.folder.iterdir() if path.is_file()]
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.keys()
-
-    def namespaced(self, namespace: str) -> MeshFolder:
-        """The same folder: no other is ever opened."""
-        return self
-
-    def write(self, name: str, data: bytes) -> None:
-        """Nothing is written beside a mesh."""
-        raise InputError("A mesh's folder is only read.")
 
 
 class _Reader:
@@ -359,13 +337,10 @@ def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
     return _unit(normals)
 
 
-def _file_notes(path: Path, folder: MeshFolder, reader: _Reader) -> list[str]:
-    notes = [f"{path.name}: {name} is missing; a constant takes its place." for name in folder.missing]
-    return notes + [f"{path.name}: a texture cannot be read; a constant takes its place."] * reader.textures.damaged
-
-
 def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
     """The model with its base at the origin, its faces to the outside, and warnings of what is wrong with it."""
+    from trimesh import Trimesh
+
     corners = np.cumsum([0, *(len(part.vertices) for part in parts)])
     vertices = np.concatenate([part.vertices for part in parts])
     faces = np.concatenate([part.faces + first for part, first in zip(parts, corners)])
@@ -374,7 +349,7 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
     base = np.array([0, vertices[:, 1].min(), 0], np.float32)
     parts = [replace(part, vertices=part.vertices - base) for part in parts]
-    if not open_edges and not crowded and volume(vertices, faces) < 0:
+    if not open_edges and not crowded and Trimesh(vertices, faces, process=False).volume < 0:
         parts = [
             replace(part, faces=np.ascontiguousarray(part.faces[:, ::-1]), normals=-part.normals) for part in parts
         ]

@@ -17,6 +17,7 @@ from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Relight
+from materialist.render.envmap import check_envmap, is_peaked
 from materialist.types import Array, Lamp, Scene
 
 
@@ -131,13 +132,9 @@ def kelvin_colour(kelvin: float) -> Array:
 
 
 def checked_envmap(envmap: Array) -> Array:
-    """float32 [h, 2h, 3]. Raises InputError for another shape, or values that are not finite and >= 0."""
-    shape = np.shape(envmap)
-    if len(shape) != 3 or shape[2] != 3 or shape[1] != 2 * shape[0] or shape[0] < 4:
-        raise InputError(f"The environment map is {shape}; it must be twice as wide as high, RGB, and 4 rows or more.")
+    """float32 [h, 2h, 3]. Raises InputError for another shape, values that are not finite and >= 0, or no light."""
     envmap = np.asarray(envmap, np.float32)
-    if not (np.isfinite(envmap).all() and envmap.min() >= 0):
-        raise InputError("The environment map has values that are NaN, infinite or negative; repair the file.")
+    check_envmap(envmap)
     if not envmap.any():
         raise InputError("The environment map is entirely black; there is no light in it.")
     return envmap
@@ -211,8 +208,6 @@ def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
 
 def _warnings(scene: Scene) -> list[str]:
     """What relighting may show of the photo's own light (paper, failure cases)."""
-    from materialist.render.envmap import is_peaked
-
     notes: list[str] = []
     if is_peaked(scene.envmap):
         notes.append(

@@ -11,12 +11,12 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import given_picture, matched, with_picture
-from materialist.edits.remove.behind import HiddenGeometry, behind
+from materialist.edits.remove.behind import behind
 from materialist.edits.remove.filling import find_filling
 from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.native import with_hole
 from materialist.options import Removal
-from materialist.types import Array, Geometry, Scene
+from materialist.types import Array, Scene
 
 
 def remove(
@@ -36,6 +36,8 @@ def remove(
         InputError: an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all of the
             photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
     """
+    from materialist.geometry.build import rebuilt
+
     options, fitted = Removal.given(options, **values), fitted or scene
     photographed = replace(scene, bodies=fitted.bodies)  # the photo does not show what edits since then put there
     bodies = body_coverage(photographed) > 0 if photographed.bodies else np.zeros(scene.depth.shape, bool)
@@ -54,9 +56,10 @@ def remove(
         materials = filling.materials(scene.materials)
         photo = with_hole(scene.photo, filling.radiance(scene.photo.linear), hole.painted, filling.source)
         rerender = filling.radiance(shown)
+    geometry = rebuilt(scene, found.depth, found.normal, scene.camera)
     removed = replace(
-        scene, materials=materials, depth=found.depth, normal=found.normal, geometry=_geometry(scene, found),
-        photo=photo, rerender=rerender,
+        scene, materials=materials, depth=found.depth, normal=found.normal, geometry=geometry, photo=photo,
+        rerender=rerender,
     )  # fmt: skip
     if picture is not None:
         removed = matched(removed, hole.painted, picture, fitted)
@@ -66,16 +69,3 @@ def remove(
         "shadow": "auto" if options.shadow is None else options.shadow,
     }  # fmt: skip
     return noted(warned(removed, *warnings), "remove", what)
-
-
-def _geometry(scene: Scene, found: HiddenGeometry) -> Geometry:
-    """The scene's geometry, built anew from what is behind the object."""
-    from materialist.geometry.build import build_geometry, completion_of
-    from materialist.geometry.extents import read_extents
-
-    options = scene.provenance
-    return build_geometry(
-        found.depth, found.normal, scene.camera, tau=float(options.get("tau", 6.0)),
-        completion=completion_of(scene.geometry, options.get("completion")), extents=read_extents(options),
-        seed=int(options.get("seed", 0) or 0),
-    )  # fmt: skip
