@@ -83,18 +83,25 @@ def material(name, look, additive):
     if "glass" in look:
         result = add_glass(nodes, links, look["glass"], result)
     if "emission" in look:
-        glow, both = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
+        glow = nodes.new("ShaderNodeEmission")
         glow.inputs["Color"].default_value = (*look["emission"], 1)
         glow.inputs["Strength"].default_value = 1
-        links.new(result, both.inputs[0])
-        links.new(glow.outputs["Emission"], both.inputs[1])
-        both.location, result = (450, 0), both.outputs["Shader"]
+        result = added(nodes, links, result, glow.outputs["Emission"])
     links.new(result, output.inputs["Surface"])
     for row, (key, sockets) in enumerate(slots.items()):
         source = add_texture(nodes, look, key, (-700, 300 - 300 * row))
         for socket in sockets:
             links.new(source, socket)
     return made
+
+
+def added(nodes, links, one, other):
+    """The sum of two shaders."""
+    both = nodes.new("ShaderNodeAddShader")
+    both.location = (300, 0)
+    links.new(one, both.inputs[0])
+    links.new(other, both.inputs[1])
+    return both.outputs["Shader"]
 
 
 def add_principled(nodes, links):
@@ -112,28 +119,22 @@ def add_lobes(nodes, links):
     Principled takes from the diffuse lobe what the specular one reflects, so it is darker, most of all at grazing
     angles; the fit does not. The metallic node with a white edge tint is Schlick's formula.
     """
-    both, diffuse = nodes.new("ShaderNodeAddShader"), nodes.new("ShaderNodeBsdfDiffuse")
-    specular = nodes.new("ShaderNodeBsdfMetallic")
+    diffuse, specular = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeBsdfMetallic")
     specular.distribution, specular.fresnel_type = "GGX", "F82"
     specular.inputs["Edge Tint"].default_value = (1, 1, 1, 1)
     colours, shares = [], []
-    for lobe, slot, dielectric, metal in ((diffuse, "Color", None, 0.0), (specular, "Base Color", 0.04, None)):
+    # Each lobe's colour goes from metallic 0 to 1: one end is the albedo, the other a grey.
+    for lobe, slot, albedo_at, grey in ((diffuse, "Color", 0, 0.0), (specular, "Base Color", 1, 0.04)):
         mix = nodes.new("ShaderNodeMix")
         mix.data_type = "RGBA"
-        factor = next(socket for socket in mix.inputs if socket.name == "Factor" and socket.type == "VALUE")
-        ends = [socket for socket in mix.inputs if socket.type == "RGBA"]  # at metallic 0, at metallic 1
-        for end, value in zip(ends, (dielectric, metal)):
-            if value is None:
-                colours.append(end)
-            else:
-                end.default_value = (value, value, value, 1)
-        shares.append(factor)
+        ends = [socket for socket in mix.inputs if socket.type == "RGBA"]
+        ends[1 - albedo_at].default_value = (grey, grey, grey, 1)
+        colours.append(ends[albedo_at])
+        shares.append(next(socket for socket in mix.inputs if socket.name == "Factor" and socket.type == "VALUE"))
         links.new(next(socket for socket in mix.outputs if socket.type == "RGBA"), lobe.inputs[slot])
         mix.location = (-300, 200 - 300 * len(shares))
-    links.new(diffuse.outputs["BSDF"], both.inputs[0])
-    links.new(specular.outputs["BSDF"], both.inputs[1])
-    both.location = (300, 0)
-    return both.outputs["Shader"], {"albedo": colours, "metallic": shares, "roughness": [specular.inputs["Roughness"]]}
+    both = added(nodes, links, diffuse.outputs["BSDF"], specular.outputs["BSDF"])
+    return both, {"albedo": colours, "metallic": shares, "roughness": [specular.inputs["Roughness"]]}
 
 
 def add_glass(nodes, links, glass, opaque):

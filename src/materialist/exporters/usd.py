@@ -13,6 +13,7 @@ from materialist.errors import SetupError
 from materialist.exporters.parts import Part, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
+from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Camera, Lamp, Scene
 
 _APERTURE = 36.0
@@ -79,40 +80,37 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
 
     path = f"/Scene/Materials/{part.name}"
     material = UsdShade.Material.Define(stage, path)
-    surface = UsdShade.Shader.Define(stage, f"{path}/surface")
-    surface.CreateIdAttr("UsdPreviewSurface")
-    surface.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.5)
+    kinds = Sdf.ValueTypeNames
+
+    def shader(name: str, kind: str, **inputs: Any) -> Any:
+        """A node and its inputs, each (type, value)."""
+        made = UsdShade.Shader.Define(stage, f"{path}/{name}")
+        made.CreateIdAttr(kind)
+        for socket, (type_, value) in inputs.items():
+            made.CreateInput(socket, type_).Set(value)
+        return made
+
+    body, m = part.surface, one_roughness(part)
+    look: dict[str, tuple] = {"ior": (kinds.Float, 1.5)}
+    if body is not None and is_glowing(body):
+        look["emissiveColor"] = (kinds.Color3f, tuple(float(c) for c in body.emission))
+    if body is not None and is_transparent(body):
+        look |= {"ior": (kinds.Float, float(body.ior)), "opacity": (kinds.Float, 1 - float(body.transmission))}
+    surface = shader("surface", "UsdPreviewSurface", **look)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
-    m = one_roughness(part)
-    base = surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
-    roughness = surface.CreateInput("roughness", Sdf.ValueTypeNames.Float)
-    metallic = surface.CreateInput("metallic", Sdf.ValueTypeNames.Float)
-    if part.surface is not None and max(part.surface.emission) > 0:
-        glow = surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f)
-        glow.Set(tuple(float(c) for c in part.surface.emission))
-    if part.surface is not None and part.surface.transmission > 0:
-        surface.GetInput("ior").Set(float(part.surface.ior))
-        surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(1 - float(part.surface.transmission))
-    wrap = "clamp" if part.surface is None else "repeat"
-    reader = UsdShade.Shader.Define(stage, f"{path}/st")
-    reader.CreateIdAttr("UsdPrimvarReader_float2")
-    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-    for socket, name, pixels, space, output in (
-        (base, "base_color", srgb_levels(m.albedo), "sRGB", "rgb"),
-        (roughness, "roughness", to_bytes(m.roughness), "raw", "r"),
-        (metallic, "metallic", to_bytes(m.metallic), "raw", "r"),
+    reader = shader("st", "UsdPrimvarReader_float2", varname=(kinds.String, "st"))
+    wrap = (kinds.Token, "clamp" if body is None else "repeat")
+    for socket, type_, name, pixels, space, output in (
+        ("diffuseColor", kinds.Color3f, "base_color", srgb_levels(m.albedo), "sRGB", "rgb"),
+        ("roughness", kinds.Float, "roughness", to_bytes(m.roughness), "raw", "r"),
+        ("metallic", kinds.Float, "metallic", to_bytes(m.metallic), "raw", "r"),
     ):
         file = f"{part.prefix}{name}.png"
         (folder / file).write_bytes(encoded(pixels))
-        texture = UsdShade.Shader.Define(stage, f"{path}/{name}")
-        texture.CreateIdAttr("UsdUVTexture")
-        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(f"./{file}")
-        texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
-        for axis in ("wrapS", "wrapT"):
-            texture.CreateInput(axis, Sdf.ValueTypeNames.Token).Set(wrap)
-        st = texture.CreateInput("st", Sdf.ValueTypeNames.Float2)
-        st.ConnectToSource(reader.ConnectableAPI(), "result")
-        socket.ConnectToSource(texture.ConnectableAPI(), output)
+        asset, where = (kinds.Asset, f"./{file}"), (kinds.Token, space)
+        texture = shader(name, "UsdUVTexture", file=asset, sourceColorSpace=where, wrapS=wrap, wrapT=wrap)
+        texture.CreateInput("st", kinds.Float2).ConnectToSource(reader.ConnectableAPI(), "result")
+        surface.CreateInput(socket, type_).ConnectToSource(texture.ConnectableAPI(), output)
     return material
 
 

@@ -57,12 +57,15 @@ def composite(
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
-    spp = spp or paths_for(scene, edited)
     renderer = EditRenderer(compared(scene, edited), device=device)
-    if not full_render:
-        return _in_photo(renderer, scene, edited, spp=spp, seed=seed, denoise=denoise, progress=progress)
-    picture = full_rendering(renderer, edited, spp=spp, seed=seed, denoise=denoise)
-    return picture if upscale is None else _upscaled(picture, scene.photo.original.shape, upscale)
+    picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise, progress)
+    if upscale is None:
+        return picture
+    shape = scene.photo.original.shape
+    large = np.asarray(upscale(picture, (shape[0], shape[1])), np.float32)
+    if large.shape != shape or not np.isfinite(large).all():
+        raise InputError(f"upscale gave {large.shape}, not {shape} (finite, linear); resize what it returns.")
+    return np.maximum(large, 0)
 
 
 def pictures(
@@ -83,11 +86,7 @@ def pictures(
         if edited is not before:
             if before is None or not _same_base(scene, before, edited):
                 renderer = EditRenderer(compared(scene, edited), device=device)
-            paths = spp or paths_for(scene, edited)
-            if full_render:
-                picture = full_rendering(renderer, edited, spp=paths, seed=seed, denoise=denoise)
-            else:
-                picture = _in_photo(renderer, scene, edited, spp=paths, seed=seed, denoise=denoise)
+            picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise)
         before = edited
         yield picture
     tick("frames", total, total)
@@ -123,10 +122,17 @@ def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
     return one.photo is scene.photo or (one.geometry is other.geometry and one.materials is other.materials)
 
 
-def _in_photo(
-    renderer: EditRenderer, scene: Scene, edited: Scene, *, spp: int, seed: int, denoise: bool, progress=None
-) -> Array:
-    """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims."""
+def _picture(
+    renderer: EditRenderer, scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool,
+    progress=None,
+) -> Array:  # fmt: skip
+    """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
+    spp = spp or paths_for(scene, edited)
+    if full_render:
+        if is_pictured(edited):
+            raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
+        picture = renderer.pair(edited)[1](spp, seed)
+        return denoised(picture, *renderer.guides(edited)) if denoise else picture
     layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
     photo, dimmed = renderer.scene.photo, dimmed_emitters(scene, edited)
     picture = into_photo(photo, layers)
@@ -134,25 +140,6 @@ def _in_photo(
         return picture
     before = None if layers.native is None else layers.native.share
     return in_photo(picture, photo, renderer.emitter_pixels(edited), dimmed, before)
-
-
-def full_rendering(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int = 0, denoise: bool = True) -> Array:
-    """[H, W, 3] the path-traced picture of the edited scene, as in the paper, and nothing of the photo.
-
-    Raises InputError for glass of the two-interface model, which only the photo shows.
-    """
-    if is_pictured(edited):
-        raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
-    picture = renderer.pair(edited)[1](spp, seed)
-    return denoised(picture, *renderer.guides(edited)) if denoise else picture
-
-
-def _upscaled(picture: Array, shape: tuple[int, ...], upscale: Upscale) -> Array:
-    """[H0, W0, 3] the result of the caller's function."""
-    large = np.asarray(upscale(picture, (shape[0], shape[1])), np.float32)
-    if large.shape != shape or not np.isfinite(large).all():
-        raise InputError(f"upscale gave {large.shape}, not {shape} (finite, linear); resize what it returns.")
-    return np.maximum(large, 0)
 
 
 def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto") -> Scene:
