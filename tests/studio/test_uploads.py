@@ -5,13 +5,14 @@ import zipfile
 import numpy as np
 import pytest
 from made_png import png_header
-from studio_scenes import package
+from studio_scenes import named, package
 
-from materialist.errors import InputError
+from materialist.errors import InputError, SceneError
 from materialist.io.decode import image_size
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
-from materialist.studio import StudioSettings, archives, uploads
+from materialist.studio import StudioSettings, archives, tab_open, uploads
+from materialist.studio.session import Session
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,7 @@ def test_bombs_are_refused_by_their_header(tmp_path, size, message):
     ("name", "content", "message"),
     [
         ("a.exe", b"MZ", "not a photo"), ("a.svg", b"<svg/>", "not a photo"), ("a.png", b"hello", "not an image"),
-        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "not an image"),
+        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "not a readable EXR"),
         ("a.hdr", b"#?RADIANCE\n\n", "no size"), ("noending", b"x", "not a photo"),
     ],
 )  # fmt: skip
@@ -71,6 +72,18 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
     archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
     assert load_scene(tmp_path / "target").camera.width == 64
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
+
+
+def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_path, monkeypatch):
+    scene = package(tmp_path)
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
+        for file in scene.rglob("*"):
+            pack.write(file, file.relative_to(scene))
+    before = studio.work.projects()
+    monkeypatch.setattr(tab_open, "SETTINGS", StudioSettings(decoded_bytes=100_000))
+    with pytest.raises(SceneError, match="GB of memory") as error:
+        tab_open._unpack(named(studio), Session("me"), tmp_path / "a.zip")
+    assert studio.work.projects() == before and str(studio.work.root) not in str(error.value)
 
 
 def test_zips_that_are_none(tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from materialist.io.bitmap import (
     read_float_tiff,
 )  # fmt: skip
 from materialist.io.exif import file_tags
-from materialist.io.exr import read_exr
+from materialist.io.exr import exr_headers, exr_size, read_exr
 
 RAW_SUFFIXES = frozenset(
     f".{name}"
@@ -46,8 +47,7 @@ def image_size(path: Path) -> tuple[int, int]:
     with path.open("rb") as file:
         head = file.read(65536)
     if head.startswith(_EXR):
-        low, high = (np.asarray(corner) for corner in _exr_header(path)["dataWindow"])
-        return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+        return max((exr_size(header) for header in exr_headers(path)), key=math.prod)
     if head.startswith(_RADIANCE):
         size = re.search(rb"\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n", head)
         if size is None:
@@ -95,17 +95,10 @@ def decode(path: Path) -> Decoded:
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
 
 
-def _exr_header(path: Path) -> dict[str, Any]:
-    import OpenEXR
-
-    with OpenEXR.File(str(path), header_only=True) as file:
-        return dict(file.header())
-
-
 def _exr(path: Path) -> Decoded:
     """OpenEXR; alpha is premultiplied there."""
     warnings: list[str] = []
-    header = _exr_header(path)
+    header = exr_headers(path)[0]
     low, high = (np.asarray(corner) for corner in header["dataWindow"])
     first, last = (np.asarray(corner) for corner in header.get("displayWindow", (low, high)))
     if (low != first).any() or (high != last).any():

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,25 +28,44 @@ def read_exr(path: str | Path, *, photo: bool = False) -> Array:
     Half and float pixels are both returned as float32; values are as stored (linear, unclipped, NaN kept).
     Raises InputError when the file is missing, is not an EXR, is damaged, or holds no picture we know how to read.
     """
+    path = Path(path)
+    with _opened(path, separate_channels=True) as file:
+        parts = [
+            {name: channel.pixels for name, channel in file.channels(k).items()}
+            for k in range(len(file.parts) if photo else 1)
+        ]
+    chosen = next((part for part in parts if _coloured(_layers(part))), parts[0])
+    return np.ascontiguousarray(_pick(chosen, path, photo), np.float32)
+
+
+@contextmanager
+def _opened(path: Path, **how: bool) -> Iterator[Any]:
+    """An open EXR. Raises InputError, also for what goes wrong within."""
     import OpenEXR
 
-    path = Path(path)
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
     if not is_utf8(str(path)):
         raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            parts = [
-                {name: channel.pixels for name, channel in file.channels(k).items()}
-                for k in range(len(file.parts) if photo else 1)
-            ]
+        with OpenEXR.File(str(path), **how) as file:
+            yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(
             f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
         ) from error
-    chosen = next((part for part in parts if _coloured(_layers(part))), parts[0])
-    return np.ascontiguousarray(_pick(chosen, path, photo), np.float32)
+
+
+def exr_headers(path: Path) -> list[dict[str, Any]]:
+    """The header of each part of an EXR, without its pixels. Raises InputError."""
+    with _opened(path, header_only=True) as file:
+        return [dict(part.header) for part in file.parts]
+
+
+def exr_size(header: dict[str, Any]) -> tuple[int, int]:
+    """(width, height) of a part."""
+    low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
+    return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
 
 
 def write_exr(path: str | Path, array: Array, half: bool = False) -> None:

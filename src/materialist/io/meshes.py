@@ -6,6 +6,7 @@ and the plane of each face.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -59,18 +60,25 @@ def read_ply(path: str | Path) -> Mesh:
     """Read a mesh that `write_ply` wrote. Raises SceneError for a missing, damaged or foreign PLY."""
     path = Path(path)
     try:
-        data = path.read_bytes()
+        with path.open("rb") as file:
+            head, mark, _ = file.read(2048).partition(b"end_header\n")
+            found = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
+            counts = [int(count) for count in found]
+            if len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
+                raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
+            split = counts[0] * 32  # bytes of eight floats
+            if path.stat().st_size != len(head + mark) + split + counts[1] * _FACE.itemsize:
+                raise SceneError(f"The mesh {path} is truncated; save the scene again.")
+            file.seek(len(head + mark))
+            vertices = np.frombuffer(file.read(split), "<f4").reshape(-1, 8)
+            faces = np.frombuffer(file.read(), _FACE)
     except OSError as error:
         raise SceneError(f"The mesh {path} cannot be read: {error.strerror}.") from error
-    head, mark, body = data.partition(b"end_header\n")
-    counts = [int(line.split()[-1]) for line in head.decode("latin1").splitlines() if line.startswith("element")]
-    if not mark or len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
-        raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
-    split = counts[0] * 32  # bytes of eight floats
-    if len(body) != split + counts[1] * _FACE.itemsize:
-        raise SceneError(f"The mesh {path} is truncated; save the scene again.")
-    vertices = np.frombuffer(body[:split], "<f4").reshape(-1, 8)
-    faces = np.frombuffer(body[split:], _FACE)
+    corners = faces["vertex_indices"]
+    if (faces["count"] != 3).any() or not np.isfinite(vertices).all():
+        raise SceneError(f"The mesh {path} has faces that are no triangles, or vertices that are NaN; it is damaged.")
+    if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
+        raise SceneError(f"The mesh {path} has faces of vertices that do not exist; it is damaged.")
     place, normals, uv = (np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1))
     return Mesh(
         place, faces["vertex_indices"].astype(np.int32), normals, uv, faces["pixel"].astype(np.int32),
@@ -104,8 +112,17 @@ def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
         )
     except InputError as error:
         raise SceneError(f"{error} Save the scene again.") from error
-    told: dict[str, Any] = {
-        key: tuple(v) if isinstance(v := entry[key], list) else v for key in _OF_GLASS if key in entry
-    }
+    finite = all(np.isfinite(one).all() for one in (albedo, roughness, metallic))
+    if not finite or (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
+        raise SceneError(f"The maps of body {number} have values that are NaN, or are no maps; it is damaged.")
+    told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}
     surface = Surface(albedo, roughness, metallic, **told)
     return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))
+
+
+def _told(value: Any) -> float | tuple[float, float, float]:
+    """A number, or a colour."""
+    if not isinstance(value, list):
+        return float(value)
+    r, g, b = (float(one) for one in value)
+    return r, g, b

@@ -15,6 +15,7 @@ from materialist.errors import InputError, MaterialistError, SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
+from materialist.io.manifest import MOST, check_files
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -24,6 +25,7 @@ from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Material
 
 FORMAT = "materialist-scene"
 VERSION = 1
+_JSON_BYTES = 64_000_000
 
 
 def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
@@ -36,24 +38,23 @@ def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
         _write(scene, folder)
 
 
-def load_scene(path: str | Path) -> Scene:
-    """Read a scene package. Raises SceneError when it is missing, incomplete, damaged or of an unknown version."""
+def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
+    """Read a scene package of at most `most` bytes once decoded, by the headers of its files.
+
+    Raises SceneError when it is missing, incomplete, damaged, too large or of an unknown version.
+    """
     folder = Path(path)
     meta = _read_meta(folder)
     try:
         camera, prior = Camera(**meta["camera"]), meta["prior"]
+        check_files(folder, camera, Path(meta["photo"]["original"]).name, len(meta.get("bodies", ())), most)
         shape = (camera.height, camera.width)
         before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
         label = _read_labels(folder / "plane_label.png", shape)
         return Scene(
             camera=camera,
             photo=_read_photo(folder, meta["photo"], shape),
-            prior=Prediction(
-                *before,
-                prior["predictor"],
-                tuple(prior["warnings"]),
-                prior.get("sources", {}),
-            ),
+            prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {})),
             materials=materials,
             normal=normal,
             depth=depth,
@@ -65,7 +66,9 @@ def load_scene(path: str | Path) -> Scene:
             lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
             bodies=read_bodies(folder, meta.get("bodies", [])),
         )
-    except (InputError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+    except SceneError:
+        raise
+    except (InputError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise SceneError(f"{folder / MARKER} is incomplete or damaged ({error}); save the scene again.") from error
 
 
@@ -166,6 +169,8 @@ def _exr(path: Path, shape: tuple[int, ...] | None) -> Array:
         raise SceneError(f"The scene package is damaged: {error}") from error
     if shape is not None and array.shape != shape:
         raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
+    if not np.isfinite(array).all():
+        raise SceneError(f"{path} has values that are NaN or infinite; the package is damaged.")
     return array
 
 
@@ -208,7 +213,9 @@ def _read_meta(folder: Path) -> dict[str, Any]:
 
 def _read_json(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_text("utf-8"))
+        if path.stat().st_size > _JSON_BYTES:
+            raise SceneError(f"{path} has more than {_JSON_BYTES / 1e6:g} MB; the scene package is damaged.")
+        content = json.loads(path.read_text("utf-8"), parse_float=_finite, parse_constant=_finite)
     except OSError as error:
         raise SceneError(f"{path} is missing; this is not a whole scene package.") from error
     except (ValueError, RecursionError) as error:
@@ -216,6 +223,13 @@ def _read_json(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise SceneError(f"{path} is damaged (not an object); save the scene again.")
     return content
+
+
+def _finite(text: str) -> float:
+    """A number of a JSON file. Raises ValueError for NaN, and for what is too large."""
+    if not math.isfinite(number := float(text)):
+        raise ValueError(f"{text} is not a finite number")
+    return number
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

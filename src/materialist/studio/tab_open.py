@@ -12,7 +12,7 @@ import gradio as gr
 from materialist.errors import InputError
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
-from materialist.studio import archives, tasks, uploads
+from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box, follow, handler
@@ -147,7 +147,7 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     try:
         archives.unpack_scene(file, project.scene, file.name)
         with uploads.without_folders(project.scene, file.name):
-            load_scene(project.scene)
+            load_scene(project.scene, most=SETTINGS.decoded_bytes)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise

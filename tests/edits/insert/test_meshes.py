@@ -152,6 +152,9 @@ def test_bad_meshes_have_a_sentence_each(tmp_path):
         (write(tmp_path / "h.obj", obj.replace("1 2 3", "-3 -2 -1")), "backwards"),
         (write(tmp_path / "i.stl", b"\0" * 80 + (10**7).to_bytes(4, "little") + b"\0" * 100), "mesh|readable|tri"),
         (gltf_file(tmp_path, "gone.bin"), r"gone\.bin"),
+        (write(tmp_path / "k.stl", b"solid \xff\xfe\x80" * 20), "STL mesh .damaged"),
+        (write(tmp_path / "l.glb", b"glTF" + np.uint32([2, 500_020, 500_000]).tobytes() + b"JSON" + b'{"a":' * 100_000),
+         "not a readable GLB"),
         (tetrahedron_glb(tmp_path / "j.glb", None, ("KHR_draco_mesh_compression",)), "KHR_draco_mesh_compression"),
     ]  # fmt: skip
     for path, sentence in bad:

@@ -171,6 +171,8 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
         if folder.missing:
             raise InputError(f"{path} needs {folder.missing[0]}, which is not beside it; add that file.") from error
         reason = " ".join(str(error).split())[:120] or type(error).__name__
+        if isinstance(error, ImportError | RecursionError):  # of what trimesh tries with bytes that it does not know
+            reason = "damaged"
         raise InputError(f"{path} is not a readable {path.suffix[1:].upper()} mesh ({reason}).") from error
     finally:
         quiet.setLevel(level)
@@ -190,7 +192,7 @@ def _gltf_materials(path: Path, data: bytes) -> dict[str | None, dict[str, Any]]
         header = json.loads(data)
         unread = [name for name in header.get("extensionsRequired", []) if not name.startswith(READ)]
         materials = {material.get("name"): material for material in reversed(header.get("materials", []))}
-    except (ValueError, TypeError, AttributeError, struct.error):
+    except (ValueError, TypeError, AttributeError, RecursionError, struct.error):
         return {}
     if unread:
         raise InputError(
