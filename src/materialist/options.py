@@ -181,11 +181,11 @@ class InvertOptions(OperationOptions):
     envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
     """(width, height), with width = 2 * height."""
     completion: str = option(
-        "auto", "Continue planes beyond what is seen; auto: walls end where light tells; planes,backs means planes.",
+        "auto", "Continue planes beyond what is seen: floors, walls as well (planes), or none; auto: floors, with "
+        "the paper's preset none.",
         kind="word", choices=("auto", "planes", "floors", "none", "planes,backs", "floors,backs"))
-    """`planes` continues dominant planes beyond what the photo shows, `floors` ends walls at the frame, `none` adds
-    nothing; `planes,backs` and `floors,backs` are accepted for `planes` and `floors`. `auto` is `planes` with walls
-    that end where light explains the photo best."""
+    """`floors` continues planes behind what the photo shows, and floors and table tops beyond the frame; `planes` walls
+    and ceilings as well, `none` adds nothing. `planes,backs` and `floors,backs` mean `planes` and `floors`."""
     tau: float = option(
         6.0, "Grazing angle below which the surface is cut, degrees.", low=0, high=90, ends="()", unit="degrees")
     mask: Array | str | Path | None = option(

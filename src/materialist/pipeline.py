@@ -64,27 +64,27 @@ def invert(
 
     setup(wanted.device)
     from materialist.fit import invert as fitting
-    from materialist.fit.invert import AUTO, FULL, FitSetup
+    from materialist.fit.invert import FitSetup
     from materialist.fit.settings import preset as named
     from materialist.geometry.build import SYNONYMS
 
     settings = wanted.settings or named(preset, hdr=picture.hdr)
-    completion = SYNONYMS.get(wanted.completion, wanted.completion)
+    completion = "none" if (wanted.completion, preset) == ("auto", "paper") else wanted.completion
     fit_setup = FitSetup(
-        picture, prior, settings, FULL if completion == AUTO and preset == "paper" else completion, wanted.engine,
+        picture, prior, settings, SYNONYMS.get(completion, completion), wanted.engine,
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
         device=wanted.device, spp=wanted.spp,
     )  # fmt: skip
     best = fitting.invert(fit_setup, progress=progress, found=tell)
     prepared = best.prepared
-    report = _report(picture, prior, best, (*stages, *best.stages), prepared.notes, start)
+    report = _report(picture, prior, best, (*stages, *best.stages), start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
         depth=prior.depth, geometry=prepared.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": wanted.engine, "preset": preset,
-            "completion": prepared.completion, "completion_asked": wanted.completion,
-            "ends": [asdict(e) for e in prepared.ends], "tau": wanted.tau, "strategy": wanted.strategy,
+            "completion": fit_setup.completion, "completion_asked": wanted.completion,
+            "tau": wanted.tau, "strategy": wanted.strategy,
             "mask": _named(mask), "settings": asdict(settings) if wanted.settings else None, "seed": wanted.seed,
             "spp": best.spp, "size": wanted.size, "envmap_size": list(wanted.envmap_size), "fov": picture.camera.fov,
             "fov_source": picture.fov_source,
@@ -118,9 +118,7 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return rendered(scene, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
-def _report(
-    picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], told: tuple[str, ...], start: float
-) -> FitReport:
+def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], start: float) -> FitReport:
     materials, halves = found.materials, [np.nan_to_num(half, posinf=0) for half in found.halves]
     rerender = (halves[0] + halves[1]) / 2
     surface = prior.depth > 0
@@ -131,7 +129,7 @@ def _report(
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
     white = HDR_CLIP if picture.hdr else 0.99
     clipped = float((picture.linear >= white).any(-1).mean())
-    notes = [*picture.warnings, *prior.warnings, *told]
+    notes = [*picture.warnings, *prior.warnings]
     if lost := int((~np.isfinite(found.rerender).all(-1)).sum()):
         notes.append(
             f"{lost} pixels of the re-rendering are no numbers; look for wild values in the depth and normals."

@@ -39,18 +39,3 @@ def test_fewer_triangles_on_the_same_frame(most):
     assert np.abs(pixels.min(0)).max() < 0.01 and np.abs(pixels.max(0) - (64, 40)).max() < 0.01
     distance = np.abs(pixels - surface.uv * (64, 40)).max(1)
     assert np.median(distance) < 0.01
-
-
-def test_fewer_triangles_keep_the_ends_of_walls():
-    from dataclasses import asdict, replace
-
-    from materialist.geometry.completion import continued_walls
-    from materialist.geometry.planes import find_planes
-
-    scene = room()
-    (wall,) = continued_walls(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
-    ends = replace(wall.usual, up=wall.seen.up + 5.0)
-    told = replace(scene, provenance={**scene.provenance, "ends": [asdict(ends)]})
-    tops = [max(float(part.mesh.vertices[:, 1].max()) for part in scene_parts(s, 3000)[1:]) for s in (scene, told)]
-    # The coarse picture is a little less square, and its mesh is stretched back onto the frame.
-    assert tops[0] < tops[1] - 1 and tops[1] == pytest.approx(ends.up, rel=0.04)

@@ -1,4 +1,4 @@
-"""From the prior to the re-rendering: which extents walls get, and what a result holds."""
+"""From the prior to the re-rendering: what a result holds."""
 
 from dataclasses import replace
 
@@ -7,14 +7,10 @@ import pytest
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist.fit import invert
-from materialist.fit.invert import AUTO, FULL, FitResult, FitSetup, prepare
-from materialist.fit.plane_extents import FoundExtents
+from materialist.fit.invert import FitResult, FitSetup
 from materialist.fit.settings import PAPER, Schedule
-from materialist.geometry.extents import PlaneExtent
 from materialist.render.scene import RenderScene
 from materialist.types import Photo, Prediction
-
-END = PlaneExtent((0.0, 0.0, 1.0), -3.0, -1.0, 1.0, -1.0, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -32,19 +28,6 @@ def setup():
     settings = replace(PAPER, light=light, materials=replace(PAPER.materials, stages=stages))
     prior = Prediction(truth, normal, depth)
     return FitSetup(Photo(linear, camera, linear), prior, settings, envmap_height=16, device="cpu", spp=4)
-
-
-@pytest.mark.parametrize(
-    ("completion", "found", "ends"),
-    [(AUTO, FoundExtents((END,), 0.03, 0.05), (END,)), (AUTO, None, ()), (FULL, FoundExtents((END,), 0.03, 0.05), ())],
-)
-def test_only_auto_asks_the_light_for_extents(setup, monkeypatch, completion, found, ends):
-    monkeypatch.setattr(invert, "find_extents", lambda *_, **__: found)
-    prepared = prepare(replace(setup, completion=completion))
-    assert (prepared.completion, prepared.ends) == (FULL, ends)
-    assert bool(prepared.notes) == bool(ends)
-    if ends:
-        assert "error 0.030, not 0.050" in prepared.notes[0] and f"--completion {FULL}" in prepared.notes[0]
 
 
 def test_a_result_has_two_independent_halves(setup):

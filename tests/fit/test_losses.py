@@ -7,7 +7,15 @@ import pytest
 import torch
 
 from materialist.color import linear_to_srgb
-from materialist.fit.losses import CLIPPED, consistency, encode, log_total_variation, rendering_loss, residual
+from materialist.fit.losses import (
+    CLIPPED,
+    consistency,
+    encode,
+    log_chroma,
+    log_total_variation,
+    rendering_loss,
+    residual,
+)
 from materialist.fit.settings import DEFAULT, PAPER
 
 
@@ -54,3 +62,16 @@ def test_log_total_variation_equals_a_loop():
         abs(float(log_map[i, (j + 1) % 8, c] - log_map[i, j, c])) for i in range(4) for j in range(8) for c in range(3)
     ]
     assert float(log_total_variation(log_map)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
+
+
+def test_chroma_spares_white_most_and_warm_and_cool_more_than_red_and_green():
+    cost = {
+        name: float(log_chroma(torch.tensor(colour).log()))
+        for name, colour in {
+            "white": (2.0, 2.0, 2.0), "warm": (2.0, 1.0, 0.5), "cool": (0.5, 1.0, 2.0), "green": (1.0, 4.0, 1.0),
+            "red": (4.0, 1.0, 1.0),
+        }.items()
+    }  # fmt: skip
+    assert cost["white"] == 0
+    assert cost["warm"] == pytest.approx(cost["cool"])
+    assert 0 < cost["warm"] < 0.5 * min(cost["green"], cost["red"])

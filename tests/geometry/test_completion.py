@@ -15,7 +15,7 @@ CAMERA = Camera(64, 48, 60.0)
 def furnished():
     """The room, built with its planes: geometry, and which label is floor, wall."""
     depth, normal, label = room(CAMERA)
-    geometry = build_geometry(depth, normal, CAMERA)
+    geometry = build_geometry(depth, normal, CAMERA, completion="planes")
     floor, wall = (np.bincount(geometry.plane_label[(label == k)] + 1).argmax() - 1 for k in (0, 1))
     assert floor >= 0 and wall >= 0 and floor != wall
     return geometry, depth, label, floor, wall

@@ -24,7 +24,7 @@ from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.fit.engine import prepared_envmap
-from materialist.fit.invert import FULL, FitSetup, prepare
+from materialist.fit.invert import FitSetup, prepare
 from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
@@ -106,7 +106,7 @@ class _Photo:
         """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
         height, seed = self.sample.envmap.shape[0], self.bench.seed
         shared: dict[str, Any] = {"envmap_height": height, "seed": seed, "device": self.bench.device}
-        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, FULL, **shared))
+        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, "planes", **shared))
         engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=seed)
         engine.cache.trace()
         fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=seed)
@@ -206,7 +206,7 @@ def _fov(photo: _Photo) -> Iterator[Row]:
     relit = sample.render(photo.other, spp=bench.spp, seed=bench.seed + 3)
     for factor in bench.fovs:
         camera = replace(photo.camera, fov=factor * photo.camera.fov)
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion=FULL, seed=bench.seed)
+        geometry = build_geometry(truth.depth, truth.normal, camera, completion="planes", seed=bench.seed)
         mesh = RenderScene(geometry, camera, device=bench.device)
         mesh.set_materials(truth.materials)
         mesh.set_envmap(sample.envmap)

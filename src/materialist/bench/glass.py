@@ -12,10 +12,9 @@ is mean absolute over mean true thickness. `noise` multiplies the predicted d by
 a draw. `background alone` shows the background without any refraction. `ceiling, true mesh` is the object's own mesh
 before the background that the closed proxy stands before, `ceiling, truth again` the truth with other noise and as few
 paths as the predictions, not denoised. The inpainted background is that of `materialist glass`: patterns that go on and
-patches of the photo, on the continued planes of floor and wall, which end beyond the picture where `materialist invert`
-ends them, given the true maps. LPIPS only where the package and its weights are installed. sheet.png, from the left:
-photo, true glass, two_interface by true and by predicted d, closed by predicted d, before the true and the inpainted
-background.
+patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights are
+installed. sheet.png, from the left: photo, true glass, two_interface by true and by predicted d, closed by predicted d,
+before the true and the inpainted background.
 """
 
 from __future__ import annotations
@@ -104,10 +103,9 @@ class GlassBench(Benchmark):
                 room = scene.render(envmap, "room", spp=self.reference, seed=1)
                 photo = scene.render(envmap, "diffuse", spp=self.reference, seed=2)
                 gain = scenes.exposure(room)
-                ends = models.wall_ends(scene, np.clip(photo * gain, 0, 1))
                 behind = {
-                    "true": models.true_background(scene, room, envmap, ends),
-                    "inpainted": models.inpainted_background(scene, photo, envmap, gain, ends),
+                    "true": models.true_background(scene, room, envmap),
+                    "inpainted": models.inpainted_background(scene, photo, envmap, gain),
                 }
                 for ior in iors:
                     truth = scene.render(envmap, "glass", ior=ior, spp=self.reference, seed=3)

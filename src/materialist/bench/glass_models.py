@@ -14,7 +14,6 @@ import numpy as np
 
 from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted, window
 from materialist.errors import SetupError, WeightsError
-from materialist.geometry.extents import PlaneExtent
 from materialist.predict.refraction.thickness import Thickness
 from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.types import Array
@@ -50,19 +49,15 @@ class Background:
     """[H, W, 3] unit."""
     albedo: Array
     """[H, W, 3] linear, in [0, 1], with which a rendering under the scene's light shows `picture`."""
-    ends: tuple[PlaneExtent, ...] = ()
-    """Where its walls end beyond the picture, if light tells."""
 
 
-def true_background(scene: GlassScene, room: Array, envmap: Array, ends: tuple[PlaneExtent, ...] = ()) -> Background:
+def true_background(scene: GlassScene, room: Array, envmap: Array) -> Background:
     """The room as it is, its picture [H, W, 3] rendered without the object."""
     depth, normal = scene.behind.depth, scene.behind.normal
-    return Background(room, depth, normal, _albedo(scene, depth, normal, room, envmap, ends), ends)
+    return Background(room, depth, normal, _albedo(scene, depth, normal, room, envmap))
 
 
-def inpainted_background(
-    scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0, ends: tuple[PlaneExtent, ...] = ()
-) -> Background:
+def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0) -> Background:
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edits.remove` does.
 
     Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
@@ -83,33 +78,14 @@ def inpainted_background(
         depth, normal, label = continued.depth, continued.normal, continued.label
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
         things = {"object": mitsuba_mesh(_body(scene, found, depth), painted(scene.item.albedo))}
-    albedo = _albedo(scene, depth, normal, photo, envmap, ends, things)
+    albedo = _albedo(scene, depth, normal, photo, envmap, things)
     filling = find_filling(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
     exposed, albedo = filling.radiance(photo * gain), filling.radiance(albedo)
-    return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo, ends)
-
-
-def wall_ends(scene: GlassScene, photo: Array) -> tuple[PlaneExtent, ...]:
-    """Where walls end as `invert` finds it from the exposed photo [H, W, 3] linear in [0, 1] and the true maps."""
-    from materialist.fit.plane_extents import find_extents
-    from materialist.fit.settings import preset
-    from materialist.types import Materials, Prediction
-
-    there, flat = scene.mask[..., None], np.ones(scene.mask.shape, np.float32)
-    truth = Prediction(
-        Materials(scene.albedo, flat, 0 * flat),
-        np.where(there, scene.front.normal, scene.behind.normal).astype(np.float32),
-        np.where(scene.mask, scene.front.depth, scene.behind.depth).astype(np.float32),
-        "truth",
-    )
-    if not (truth.depth > 0).any():
-        return ()
-    found = find_extents(photo, truth, scene.camera, preset("default"))
-    return found.ends if found else ()
+    return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo)
 
 
 def _albedo(
-    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array, ends: tuple[PlaneExtent, ...],
+    scene: GlassScene, depth: Array, normal: Array, picture: Array, envmap: Array,
     things: dict[str, Any] | None = None,
 ) -> Array:  # fmt: skip
     """[H, W, 3] diffuse albedo with which the surfaces of the maps, path-traced under envmap, look like `picture`.
@@ -120,7 +96,7 @@ def _albedo(
 
     albedo = np.full(picture.shape, 0.5, np.float32)
     for _ in range(PROTOCOL.albedo_rounds if depth.any() else 0):
-        surfaces = Background(picture, depth, normal, albedo, ends)
+        surfaces = Background(picture, depth, normal, albedo)
         seen = lit(scene, surfaces, envmap, things, length=PROTOCOL.diffuse_length, spp=PROTOCOL.albedo_spp)
         with suppress(SetupError):
             seen = denoise(seen, albedo=albedo, normal=normal)
@@ -144,7 +120,7 @@ def lit(
 
     shapes: dict[str, Any] = {}
     if behind.depth.any():
-        geometry = build_geometry(behind.depth, behind.normal, scene.camera, extents=behind.ends)
+        geometry = build_geometry(behind.depth, behind.normal, scene.camera)
         for k in np.unique(geometry.mesh.face_plane):
             mean = behind.albedo[geometry.plane_label == k].mean(0) if k >= 0 else None
             paint = behind.albedo if mean is None else np.broadcast_to(mean, (2, 2, 3))

@@ -32,7 +32,6 @@ NATIVE = 512
 """Longer side of the synthetic photo; larger working sizes enlarge it."""
 STAGES = {
     "predict": "prior",
-    "walls": "walls",
     "geometry": "mesh",
     "scene": "scene",
     "engine": "cache",

@@ -8,13 +8,12 @@ with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; M
 figures compare the true scene under the fitted light with the photograph, `mesh` the depth mesh under it with the
 photograph, `relit` the depth mesh under another light with the true picture of it. `ceiling` is the depth mesh with the
 true maps and the true light: what no fit on this mesh can beat. `inversion` is the whole inversion by the default
-preset, light and materials, with the true maps as its prior; it and `default` end walls where light explains the
-photograph best (`--completion auto`), the ceiling does not. `w/o planes`: without continued planes (`--completion
-none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given instead of the true maps. Seconds are those of the
-light fit and its ray tracing, the choice of completion included, and for `inversion` those of all of it; CPU seconds
-add up all processors and hardly depend on what else the computer does. The first sample's hold the compilation of
-kernels that the computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that size inside the
-fit instead of 512x256, which makes its steps cheaper.
+preset, light and materials, with the true maps as its prior. `with walls`: walls and ceilings are continued, too
+(`--completion planes`); `w/o planes`: nothing is (`none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given
+instead of the true maps. Seconds are those of the light fit and its ray tracing and for `inversion` those of all of it;
+CPU seconds add up all processors and hardly depend on what else the computer does. The first sample's hold the
+compilation of kernels that the computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that
+size inside the fit instead of 512x256, which makes its steps cheaper.
 """
 
 from __future__ import annotations
@@ -98,7 +97,7 @@ class LightBench(Benchmark):
     lights: int = option(2, "Lights of each view; the paper has 10.", **COUNT)
     size: int = option(96, "Width and height of the photos.", **SIZE)
     methods: str = option("default,paper", "Names of METHODS, with commas.", kind="name")
-    completion: str = option("auto", "That of `invert`; for the paper's methods, `auto` is `planes`.", kind="name")
+    completion: str = option("auto", "That of `invert`.", kind="name")
     relight: bool = option(True, "Relight whole inversions, with and without continued planes.", kind="switch")
     spp: int = option(256, "Samples a pixel of all pictures that are compared.", **COUNT)
 
@@ -117,7 +116,7 @@ class LightBench(Benchmark):
                 yield {**row, "sample": sample.name}
 
 
-COMPLETIONS = {"auto": "", "none": " w/o planes"}
+COMPLETIONS = {"auto": "", "planes": " with walls", "none": " w/o planes"}
 """`--completion` of the relit rows, and how their names end."""
 
 
@@ -131,13 +130,12 @@ class _Stage:
         self.relit_photo = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
 
     def mesh(self, completion: str) -> Any:
-        """The RenderScene of the true depth; where nothing speaks against them, `auto` adds planes."""
+        """The RenderScene of the true depth; `auto` continues floors."""
         from materialist.geometry.build import build_geometry
         from materialist.render.scene import RenderScene
 
         camera, truth = self.sample.photo.camera, self.sample.truth
-        named = "planes" if completion == "auto" else completion
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion=named, seed=self.bench.seed)
+        geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=self.bench.seed)
         return RenderScene(geometry, camera, device=self.bench.device)
 
     def relit(self) -> Iterator[Row]:
@@ -162,8 +160,6 @@ class _Stage:
         for name in methods:
             method, completion = METHODS[name], bench.completion
             mesh = self.mesh(completion) if method.engine == "path" else None
-            if method.preset == "paper" and completion == "auto":
-                completion = "planes"
             options: dict[str, Any] = {"mesh": mesh, "seed": bench.seed, "device": bench.device}
             (envmap, steps, mesh), cost = timed(fit, self.sample, method, completion, **options)
             seen = self._on(mesh, self.sample.truth.materials, envmap)["mesh_psnr"]

@@ -62,6 +62,7 @@ class PhotoAloneBench(Benchmark):
     size: int = option(256, "Their width and height.", **SIZE)
     kinds: str = option(",".join(KINDS), "Edits, with commas.", kind="name")
     predictor: str = option("bundled", "Where the maps come from.", kind="name")
+    completion: str = option("auto", "That of `invert`.", kind="name")
     decompose: bool = option(False, "Adds the rows that are given a part of the truth.", kind="switch")
     spp: int = option(128, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(256, "Paths a pixel of the truth.", **COUNT)
@@ -91,7 +92,7 @@ class PhotoAloneBench(Benchmark):
         """Names of rows, their scenes, and figures of those that are inversions."""
         from materialist import pipeline
 
-        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
+        shared: dict[str, Any] = {"completion": self.completion, "seed": self.seed, "device": self.device}
 
         def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
             found, cost = timed(pipeline.invert, sample.photo, **shared, **how)

@@ -12,15 +12,10 @@ import numpy as np
 from materialist.fit.engine import Engine, PathEngine, TransportEngine
 from materialist.fit.inversion import Fit
 from materialist.fit.optimise import Progress
-from materialist.fit.plane_extents import FoundExtents, find_extents
 from materialist.fit.settings import FitSettings
 from materialist.geometry.build import build_geometry
-from materialist.geometry.extents import PlaneExtent
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
-
-AUTO, FULL = "auto", "planes"
-"""Names of completions: planes with the extents that explain the photo best, and with the usual ones."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +25,7 @@ class FitSetup:
     photo: Photo
     prior: Prediction
     settings: FitSettings
-    completion: str = AUTO
+    completion: str = "floors"
     engine: str = "transport"
     envmap_height: int = 256
     tau: float = 6.0
@@ -46,15 +41,10 @@ class FitSetup:
 class PreparedFit:
     """A mesh, its path tracer, and a fit that has not run."""
 
-    completion: str
-    ends: tuple[PlaneExtent, ...]
-    """Where walls end beyond the picture; empty: the usual extents."""
     geometry: Geometry
     renderer: RenderScene
     fit: Fit
     stages: tuple[dict, ...]
-    notes: tuple[str, ...] = ()
-    """What a report should say."""
 
     def render(self, materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
         """[H, W, 3] linear, path traced."""
@@ -84,21 +74,13 @@ class FitResult:
 
 
 def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
-    """The mesh, with walls that end where the light says if completion is `auto`, and an engine on it."""
+    """The mesh and an engine on it."""
     tick, stages = progress or (lambda *_: None), list[dict]()
     photo, prior = setup.photo, setup.prior
-    ends, notes = tuple[PlaneExtent, ...](), tuple[str, ...]()
-    if setup.completion == AUTO:
-        tick("walls", 0, 1)
-        found = timed(stages, "walls", lambda: find_extents(
-            photo.linear, prior, photo.camera, setup.settings, tau=setup.tau, seed=setup.seed
-        ))  # fmt: skip
-        if found is not None:
-            ends, notes = found.ends, (_note(found),)
-    completion = FULL if setup.completion == AUTO else setup.completion
     tick("geometry", 0, 1)
     geometry = timed(stages, "geometry", lambda: build_geometry(
-        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=completion, extents=ends, seed=setup.seed
+        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=setup.completion,
+        seed=setup.seed,
     ))  # fmt: skip
     renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
@@ -107,7 +89,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
         photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height, mask=setup.mask,
         strategy=setup.strategy, seed=setup.seed, progress=progress,
     )  # fmt: skip
-    return PreparedFit(completion, ends, geometry, renderer, fit, tuple(stages), notes)
+    return PreparedFit(geometry, renderer, fit, tuple(stages))
 
 
 def invert(
@@ -135,13 +117,6 @@ def invert(
         prepared.render(materials, state.envmap, each, seed + k) for k in (1, 2)
     ])  # fmt: skip
     return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
-
-
-def _note(found: FoundExtents) -> str:
-    return (
-        f"Walls beyond the picture end where light explains the photo best with the predicted materials (error "
-        f"{found.error:.3f}, not {found.usual:.3f}); --completion {FULL} ends them all alike."
-    )
 
 
 def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress: Progress | None) -> Engine:

@@ -40,7 +40,7 @@ class LightSettings:
     smooth: float = 0.0  # weight of the total variation of log radiance
     free_from: float = 0.5  # share of a texel's light that must arrive for it to be as free as others; tuned by eye
     hidden_weight: float = 3.0  # largest factor on the smoothness of hidden texels; tuned on 5 synthetic scenes
-    chroma: float = 0.0  # weight of the colourfulness of log radiance
+    chroma: float = 0.0  # weight of the colourfulness of log radiance; larger: whiter; tuned on 5 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
 
@@ -70,23 +70,11 @@ class MaterialSettings:
 
 
 @dataclass(frozen=True)
-class ExtentSettings:
-    """Search for the extents of planes beyond the picture (`fit.plane_extents`)."""
-
-    side: int = 96  # longer side, in pixels, at which the search looks at the photo; more is slower; tuned by eye
-    pixels: int = 512  # of that, pixels whose light is looked at; tuned by eye
-    levels: tuple[float, ...] = (0.0, 0.5, 1.0, 2.0)  # how far a side goes on, in the wall's visible size
-    schedule: Schedule = Schedule(learning_rate=0.05, max_steps=60, patience=0)  # of each light fit; tuned by eye
-    gain: float = 0.04  # least relative gain in error for which a side moves; tuned on 8 synthetic scenes
-
-
-@dataclass(frozen=True)
 class FitSettings:
     """Everything that a preset fixes."""
 
     light: LightSettings
     materials: MaterialSettings
-    extents: ExtentSettings = dataclasses.field(default_factory=ExtentSettings)
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
 
@@ -112,7 +100,7 @@ DEFAULT = FitSettings(
         clipped=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
-        chroma=0.05,
+        chroma=0.1,
     ),
     materials=MaterialSettings(
         field="maps",

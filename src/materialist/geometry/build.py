@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -11,15 +10,14 @@ import numpy as np
 from materialist.errors import InputError
 from materialist.geometry.boundary import QUAD, depth_to_mesh, face_camera
 from materialist.geometry.completion import complete
-from materialist.geometry.extents import PlaneExtent, read_extents
 from materialist.geometry.planes import find_planes
 from materialist.types import Array, Camera, Geometry, Mesh, Scene
 
 COMPLETIONS = ("planes", "floors", "none")
 """What can be added to what the picture shows: the dominant planes continued, the same with walls (planes that do not
 face up) ending at the frame, nothing."""
-SYNONYMS = {"planes,backs": "planes", "floors,backs": "floors"}
-"""Names of older scenes and scripts, whose objects had backs."""
+SYNONYMS = {"auto": "floors", "planes,backs": "planes", "floors,backs": "floors"}
+"""The usual completion, and names of older scenes and scripts, whose objects had backs."""
 CREASE = 40.0
 """Angle between the normals of two pixels, degrees, from which neither has a part in the other's shading; by eye."""
 
@@ -30,14 +28,13 @@ def build_geometry(
     camera: Camera,
     *,
     tau: float = 6.0,
-    completion: str = "planes",
-    extents: Sequence[PlaneExtent] = (),
+    completion: str = "floors",
     seed: int = 0,
 ) -> Geometry:
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
-    completion: one of `COMPLETIONS` or `SYNONYMS`. extents: where continued walls end, if that is known.
+    completion: one of `COMPLETIONS` or `SYNONYMS`.
     Raises InputError for maps or options that cannot be used.
     """
     completion = SYNONYMS.get(completion, completion)
@@ -49,7 +46,7 @@ def build_geometry(
         planes = find_planes(depth, normal, camera, seed=seed)
         for k, plane in enumerate(planes):
             label[plane.mask] = k
-        mesh = complete(mesh, planes, depth, camera, walls=completion == "planes", extents=extents)
+        mesh = complete(mesh, planes, depth, camera, walls=completion == "planes")
     return Geometry(split_creases(mesh, depth, normal), label)
 
 
@@ -60,7 +57,7 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
     if told.get("completion") in (*COMPLETIONS, *SYNONYMS):
         completion = told["completion"]
     return build_geometry(
-        depth, normal, camera, tau=float(told.get("tau", 6.0)), completion=completion, extents=read_extents(told),
+        depth, normal, camera, tau=float(told.get("tau", 6.0)), completion=completion,
         seed=int(told.get("seed", 0) or 0),
     )  # fmt: skip
 

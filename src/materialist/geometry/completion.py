@@ -6,7 +6,6 @@ where the picture shows open sky nothing is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +13,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import convex_hull_image
 
 from materialist.camera import rays_through, unproject
-from materialist.geometry.extents import PlaneExtent, axes, extent_of
-from materialist.geometry.planes import Plane
+from materialist.geometry.planes import Plane, axes
 from materialist.types import Array, Camera, Mesh
 
 
@@ -54,36 +52,10 @@ class _Sheet:
     bounding: bool
     touches: tuple[bool, ...]
     """[4] whether its pixels reach the frame's bottom, left, right, top."""
-    extent: PlaneExtent
-    """The rectangle it may fill beyond the picture."""
+    half: float
+    """Half a side of the square about its middle that it may fill beyond the picture, scene units."""
     behind: float
     """Radius about its middle within which it goes on behind what the picture shows, scene units."""
-
-
-@dataclass(frozen=True)
-class ContinuedWall:
-    """A plane that does not face up, and that `complete` continues."""
-
-    index: int
-    """Its number among the planes."""
-    usual: PlaneExtent
-    """Where it ends unless told otherwise."""
-    seen: PlaneExtent
-    """The smallest rectangle around what the picture shows of it."""
-    size: float
-    """The farthest that is seen of it from the middle of that, scene units."""
-
-
-def continued_walls(planes: list[Plane], depth: Array, camera: Camera) -> list[ContinuedWall]:
-    """The walls and ceilings that `complete` continues."""
-    found = []
-    for sheet in _sheets(planes, np.asarray(depth, np.float64), camera):
-        if sheet.plane.normal[1] < DEFAULT.upward:
-            place = sheet.points @ axes(sheet.plane.normal).T
-            (left, down), (right, up) = place.min(0), place.max(0)
-            seen = replace(sheet.extent, left=float(left), right=float(right), down=float(down), up=float(up))
-            found.append(ContinuedWall(sheet.index, sheet.extent, seen, _size(sheet.points)))
-    return found
 
 
 def complete(
@@ -92,21 +64,19 @@ def complete(
     depth: Array,
     camera: Camera,
     *,
-    walls: bool = True,
-    extents: Sequence[PlaneExtent] = (),
+    walls: bool = False,
 ) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
     walls: whether planes that do not face up go on beyond the picture, too, not only behind what it shows.
-    extents: where walls end beyond the picture, if that is known.
 
     The new faces have face_plane = k for planes[k], face_pixel = the plane's pixel nearest to the face, uv at that
     pixel's centre, and the plane's normal. Planes that intersect stop at each other. Planes that are neither bounds
     of the scene nor cross the frame (the flat side of an object) are left alone.
     """
     depth = np.asarray(depth, np.float64)
-    sheets = _sheets(planes, depth, camera, extents)
+    sheets = _sheets(planes, depth, camera)
     parts = [mesh]
     farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
@@ -118,7 +88,7 @@ def complete(
     return join(parts)
 
 
-def _sheets(planes: list[Plane], depth: Array, camera: Camera, extents: Sequence[PlaneExtent] = ()) -> list[_Sheet]:
+def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
     """The planes that are part of the scene's structure, measured."""
     surface = depth > 0
     points = unproject(depth, camera).astype(np.float64)
@@ -138,14 +108,9 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera, extents: Sequence
         own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
         outdoors = np.mean(~surface) > DEFAULT.sky_share and plane.normal[1] > DEFAULT.upward
         half = behind = (DEFAULT.ground_extent if outdoors else DEFAULT.extent) * radius
-        told = None
         if plane.normal[1] < DEFAULT.upward:
             half, behind = min(half, DEFAULT.wall_reach * _size(own)), min(behind, DEFAULT.wall_behind * _size(own))
-            told = extent_of(plane, extents)
-        x, y = (float(v) for v in axes(plane.normal) @ own.mean(0))
-        nx, ny, nz = (float(v) for v in plane.normal)
-        square = PlaneExtent((nx, ny, nz), float(plane.offset), x - half, x + half, y - half, y + half)
-        found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, told or square, behind))
+        found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
     return found
 
 
@@ -208,7 +173,7 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     """[T, 3, 3] triangles of the plane outside the view frustum, scene units."""
     basis = axes(sheet.plane.normal)  # [2, 3] right-handed with the normal: faces the camera
     origin = sheet.points.mean(0)
-    square = sheet.extent.corners() - basis @ origin
+    square = sheet.half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
     for wall in walls:
         square = clip(square, _line(wall, basis, origin))
     side_x, side_y = (camera.width / 2 + DEFAULT.rim) / camera.focal, (camera.height / 2 + DEFAULT.rim) / camera.focal

@@ -48,6 +48,13 @@ class Plane:
         return rays @ (self.normal / self.offset)
 
 
+def axes(normal: Array) -> Array:
+    """[2, 3] unit: to the right and up for one who faces a plane with this normal [3]; of a ceiling, any such pair."""
+    normal = np.asarray(normal, np.float64)
+    across = unit(np.cross([0.0, 1, 0] if abs(normal[1]) < 0.9 else [0.0, 0, 1], normal))
+    return np.stack([across, np.cross(normal, across)])
+
+
 def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, max_planes: int = 4) -> list[Plane]:
     """Find the dominant planes, largest first, by RANSAC on inverse depth (linear in screen space on a plane).
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import project, unit
-from materialist.geometry.extents import axes
+from materialist.geometry.planes import axes
 from materialist.geometry.silhouette import grown
 from materialist.solids.profile import Profile, fitted
 from materialist.solids.shell import Shell, inside_out, joined

@@ -1,6 +1,6 @@
 """Objects taken away: maps, depth and photo continue, and the composite shows it."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,19 +86,3 @@ def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
         remove(only_sky_behind, mask)
     with pytest.raises(InputError, match="covers 100% of what"):
         remove(scene, np.ones((36, 48), bool))
-
-
-def test_a_wall_ends_without_the_object_where_it_ended_with_it():
-    from materialist.geometry.build import build_geometry
-    from materialist.geometry.completion import continued_walls
-    from materialist.geometry.planes import find_planes
-
-    scene = flat_scene()
-    (wall, *_) = continued_walls(find_planes(scene.depth, scene.normal, scene.camera), scene.depth, scene.camera)
-    ends = replace(wall.usual, up=wall.seen.up + 4.0)
-    completed = build_geometry(scene.depth, scene.normal, scene.camera, extents=[ends])
-    provenance = {**scene.provenance, "completion": "planes", "ends": [asdict(ends)]}
-    empty = remove(replace(scene, geometry=completed, provenance=provenance), MASK)
-    assert float(empty.geometry.mesh.vertices[:, 1].max()) == pytest.approx(ends.up, abs=0.2)
-    usual = remove(replace(scene, geometry=completed, provenance={**provenance, "ends": []}), MASK)
-    assert float(usual.geometry.mesh.vertices[:, 1].max()) < ends.up - 1

@@ -19,7 +19,7 @@ from materialist.edits.insert.insert import moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.edits.insert.support import Support
 from materialist.errors import InputError
-from materialist.geometry.extents import axes
+from materialist.geometry.planes import axes
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
