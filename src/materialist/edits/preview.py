@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from materialist.transport.cache import Tables
 
+RAYS = (48, 12)
+"""Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
 LEAST_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
 
@@ -34,27 +36,21 @@ class Preview:
 
     Args:
         scene: the fitted scene.
-        diffuse_samples, specular_samples: rays a pixel, three quarters of the fit's: a new light is gathered sooner.
     """
 
-    def __init__(
-        self, scene: Scene, *, seed: int = 0, device: str = "auto", diffuse_samples: int = 48,
-        specular_samples: int = 12, progress=None,
-    ):  # fmt: skip
+    def __init__(self, scene: Scene):
         from materialist.render.variant import setup
 
-        setup(device)
+        setup()
         from materialist.fit.engine import TransportEngine
         from materialist.transport.cache import CacheSettings, TransportCache
         from materialist.transport.filter import taps
 
         self.scene = scene
-        self._engine = TransportEngine(
-            scene.geometry, scene.camera, scene.rerender, seed=seed,
-            cache=CacheSettings(diffuse_samples, specular_samples), progress=progress,
-        )  # fmt: skip
+        rays = CacheSettings(*RAYS)
+        self._engine = TransportEngine(scene.geometry, scene.camera, scene.rerender, seed=0, cache=rays)
         # A few rays a pixel are enough for what surfaces pass on: it is averaged again where it arrives.
-        self._quick = TransportCache(scene.geometry, scene.camera, CacheSettings(8, 1), seed=seed)
+        self._quick = TransportCache(scene.geometry, scene.camera, CacheSettings(8, 1))
         self._tables = self._engine.tables(scene.envmap)
         self._taps = list(taps(self._engine.guide))
         self._other: tuple[Array, Tables] | None = None

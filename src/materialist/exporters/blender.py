@@ -17,7 +17,7 @@ import numpy as np
 from materialist.edits.core.renderer import path_depth
 from materialist.errors import SetupError
 from materialist.exporters.exported import Exported, export_folder
-from materialist.exporters.parts import Part
+from materialist.exporters.parts import Part, farthest
 from materialist.io.atomic import ensure_writable, whole_file
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
@@ -70,7 +70,7 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     np.savez_compressed(folder / "meshes.npz", **arrays)  # type: ignore[arg-type]
     write_exr(folder / "envmap.exr", scene.envmap)
     write_png(folder / "photo.png", scene.photo.original)
-    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    reach = farthest(parts)
     camera, native = scene.camera, scene.photo.original.shape
     facts = {
         "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,

@@ -19,8 +19,7 @@ from materialist import __version__
 from materialist.camera import unit
 from materialist.color import srgb_levels
 from materialist.edits.core.topology import edge_faults
-from materialist.errors import OutputError
-from materialist.exporters.parts import Part, one_roughness
+from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface
 
@@ -34,9 +33,12 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     """One self-contained file: header, JSON chunk, binary chunk (glTF 2.0 specification, section 4)."""
     document = _Document()
     meshes = [document.add_part(part) for part in parts]
-    nodes = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
+    nodes: list[dict] = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
     nodes.append({"name": "camera", "camera": 0})
-    nodes += _lamps(scene, document)
+    punctual = "KHR_lights_punctual"
+    for k, lamp in enumerate(scene.lamps):
+        place, which = [float(c) for c in lamp.position], {punctual: {"light": k}}
+        nodes.append({"name": f"lamp{k}", "translation": place, "extensions": which})
     camera = scene.camera
     content = {
         "asset": {"version": "2.0", "generator": f"materialist {__version__}"},
@@ -49,7 +51,8 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
         "extras": {"photo": {"width": camera.width, "height": camera.height, "horizontal_fov_degrees": camera.fov}},
     }
     if scene.lamps:
-        content["extensions"] = {"KHR_lights_punctual": {"lights": [_light(lamp) for lamp in scene.lamps]}}
+        content["extensions"] = {punctual: {"lights": [_light(lamp) for lamp in scene.lamps]}}
+        document.extensions.add(punctual)
     if document.extensions:
         content["extensionsUsed"] = sorted(document.extensions)
     text = json.dumps(content, separators=(",", ":")).encode()
@@ -63,23 +66,7 @@ def write_hdr(path: Path, envmap: Array) -> None:
     """The light [h, 2h, 3] as a Radiance picture (8 bits of mantissa and a shared exponent), rows and columns as is."""
     import cv2
 
-    done, data = cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))
-    if not done:
-        raise OutputError(f"{path} cannot be written: the environment map {envmap.shape} was not taken.")
-    path.write_bytes(data.tobytes())
-
-
-def _lamps(scene: Scene, document: _Document) -> list[dict]:
-    """Nodes of the lamps, as KHR_lights_punctual has them."""
-    if scene.lamps:
-        document.extensions.add("KHR_lights_punctual")
-    return [
-        {
-            "name": f"lamp{k}", "translation": [float(c) for c in lamp.position],
-            "extensions": {"KHR_lights_punctual": {"light": k}},
-        }
-        for k, lamp in enumerate(scene.lamps)
-    ]  # fmt: skip
+    path.write_bytes(cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))[1].tobytes())
 
 
 def _light(lamp: Lamp) -> dict:
@@ -175,7 +162,7 @@ class _Document:
 
 def _camera(camera: Camera, parts: list[Part]) -> dict:
     """The photo's pinhole; near and far well outside of the scene."""
-    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    reach = farthest(parts)
     nearest = float(-parts[0].mesh.vertices[:, 2].max())  # the depth surface lies before the camera
     aspect = camera.width / camera.height
     vertical = 2 * math.atan(math.tan(math.radians(camera.fov) / 2) / aspect)

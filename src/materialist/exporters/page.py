@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import srgb_levels
-from materialist.exporters.parts import Part
+from materialist.exporters.parts import Part, farthest
 from materialist.io import display
 from materialist.types import Array, Camera, Scene
 
@@ -41,10 +41,14 @@ def page(scene: Scene, parts: list[Part]) -> str:
     Everything that came from outside is escaped, and a policy in the page forbids any request.
     """
     assets = files("materialist.exporters") / "assets"
-    camera, title = scene.camera, scene.photo.name
+    camera, title, native = scene.camera, scene.photo.name, scene.photo.original.shape
+    subtitle = (
+        f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
+        f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}"
+    )
     values = {
         "title": html.escape(title),
-        "subtitle": html.escape(_subtitle(scene)),
+        "subtitle": html.escape(subtitle),
         "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in scene.warnings),
         "width": str(camera.width),
         "height": str(camera.height),
@@ -77,14 +81,6 @@ def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
             yield key, " x ".join(map(str, value)) if plain and value else f"{len(value)} of them"
         elif value is not None and not isinstance(value, dict):
             yield key, value
-
-
-def _subtitle(scene: Scene) -> str:
-    camera, native = scene.camera, scene.photo.original.shape
-    return (
-        f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
-        f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}"
-    )
 
 
 def _maps(scene: Scene) -> str:
@@ -122,7 +118,8 @@ def _table(rows: Iterable[tuple[Any, Any]]) -> str:
 
 
 def _image(pixels: Array, quality: int = 90) -> str:
-    return "data:image/jpeg;base64," + _base64(display.encoded(pixels, "JPEG", quality=quality, subsampling=0))
+    data = display.encoded(pixels, "JPEG", quality=quality, subsampling=0)
+    return "data:image/jpeg;base64," + base64.b64encode(data).decode()
 
 
 def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
@@ -132,14 +129,12 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
     vertices = np.concatenate([_vertices(part) for part in parts])
     starts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
     indices = np.concatenate([part.mesh.faces + start for part, start in zip(parts, starts)]).astype("<u4")
-    reach = float(np.linalg.norm(vertices["position"], axis=1).max())
-    nearest = float(depth[depth > 0].min()) if (depth > 0).any() else 1.0
+    seen = depth[depth > 0]
     return {
         "vertices": _deflated(vertices), "indices": _deflated(indices),
         "surface": 3 * sum(len(part.mesh.faces) for part in shown), "all": indices.size,
         "tangent": math.tan(math.radians(camera.fov) / 2), "aspect": camera.width / camera.height,
-        "pivot": float(np.median(depth[depth > 0])) if (depth > 0).any() else 1.0,
-        "near": nearest * 0.05, "far": reach * 4,
+        "pivot": float(np.median(seen)), "near": float(seen.min()) * 0.05, "far": farthest(parts) * 4,
     }  # fmt: skip
 
 
@@ -160,8 +155,4 @@ def _vertices(part: Part) -> Array:
 
 
 def _deflated(array: Array) -> str:
-    return _base64(zlib.compress(array.tobytes(), 9))
-
-
-def _base64(data: bytes) -> str:
-    return base64.b64encode(data).decode()
+    return base64.b64encode(zlib.compress(array.tobytes(), 9)).decode()

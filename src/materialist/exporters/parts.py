@@ -70,6 +70,11 @@ def body_parts(scene: Scene) -> list[Part]:
     return [Part(f"body{k}", body.mesh, _one_size(body.surface), body.surface) for k, body in enumerate(scene.bodies)]
 
 
+def farthest(parts: list[Part]) -> float:
+    """Distance of the farthest vertex from the camera, scene units."""
+    return max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+
+
 def one_roughness(part: Part) -> Materials:
     """The part's maps for formats in which glass and the opaque share have one roughness: their mean, by share."""
     surface = part.surface

@@ -10,7 +10,7 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import SetupError
-from materialist.exporters.parts import Part, one_roughness
+from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
 from materialist.render.bodies import is_glowing, is_transparent
@@ -118,7 +118,7 @@ def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
     """The photo's pinhole at the origin, which looks down -Z in USD too."""
     from pxr import Gf, UsdGeom
 
-    reach = max(float(np.linalg.norm(part.mesh.vertices, axis=1).max()) for part in parts)
+    reach = farthest(parts)
     camera = UsdGeom.Camera.Define(stage, "/Scene/Photo")
     camera.CreateHorizontalApertureAttr(_APERTURE)
     camera.CreateVerticalApertureAttr(_APERTURE * photo.height / photo.width)

@@ -23,14 +23,8 @@ CREASE = 40.0
 
 
 def build_geometry(
-    depth: Array,
-    normal: Array,
-    camera: Camera,
-    *,
-    tau: float = 6.0,
-    completion: str = "floors",
-    seed: int = 0,
-) -> Geometry:
+    depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0, completion: str = "floors", seed: int = 0
+) -> Geometry:  # fmt: skip
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
@@ -62,13 +56,13 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
     )  # fmt: skip
 
 
-def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CREASE) -> Mesh:
+def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     """The mesh with a vertex for each normal where pixels of different normals meet; its points stay where they are.
 
     A normal that is the mean of a wall's and of the floor's below it belongs to neither, and lights the last row of the
     wall from above: a bright line along every crease, and around the foot of everything that stands on something.
     The corner of a pixel gets the mean normal of those pixels that have the vertex in common and whose normals are
-    within `crease` degrees of the pixel's own. Faces keep their order, everything but the visible pixels its normals.
+    within `CREASE` degrees of the pixel's own. Faces keep their order, everything but the visible pixels its normals.
 
     mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
     normal: [H, W, 3] unit, camera frame.
@@ -82,7 +76,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array, *, crease: float = CR
     place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
     around = np.full((len(mesh.vertices), 4), -1)
     around[vertex, place] = np.repeat(np.arange(len(own)), 4)  # [V, 4] pixels that meet in a vertex
-    cosine = np.cos(np.radians(crease))
+    cosine = np.cos(np.radians(CREASE))
     # Most vertices lie on no crease and stay as they are.
     flat = np.ones(len(around), bool)
     for i, j in combinations(range(4), 2):
@@ -118,8 +112,6 @@ def pixel_corners(mesh: Mesh, surface: Array) -> Array:
 
 def _tidy(mesh: Mesh) -> Mesh:
     """The mesh without vertices that no face has."""
-    used = np.zeros(len(mesh.vertices), bool)
-    used[mesh.faces] = True
-    number = np.cumsum(used) - 1
+    used, number = np.unique(mesh.faces, return_inverse=True)
     kept = {name: getattr(mesh, name)[used] for name in ("vertices", "normals", "uv")}
-    return replace(mesh, faces=number[mesh.faces].astype(np.int32), **kept)
+    return replace(mesh, faces=number.reshape(-1, 3).astype(np.int32), **kept)

@@ -25,6 +25,7 @@ class PlaneSettings:
     same_normal: float = np.cos(np.radians(25.0))  # normals of a plane's pixels agree with their mean
     flat: float = np.cos(np.radians(10.0))  # half of them even so: on a ball they spread evenly up to the bound above
     like_geometry: float = np.cos(np.radians(55.0))  # the mean agrees with the plane: networks' relief is not metric
+    most: int = 4  # planes that are reported
     least: float = 0.05  # least share of the pixels with a surface
     speck: float = 0.004  # connected patches below this share of the picture are chance agreement
 
@@ -55,7 +56,7 @@ def axes(normal: Array) -> Array:
     return np.stack([across, np.cross(normal, across)])
 
 
-def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, max_planes: int = 4) -> list[Plane]:
+def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -> list[Plane]:
     """Find the dominant planes, largest first, by RANSAC on inverse depth (linear in screen space on a plane).
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame.
@@ -71,8 +72,8 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0, m
     found: list[_Fit] = []
     free = small.depth > 0  # [h, w]
     least = DEFAULT.least * free.sum()
-    for _ in range(2 * max_planes):  # some of the candidates are unsound and only use up their pixels
-        if len(found) == max_planes or free.sum() < max(3.0, least):
+    for _ in range(2 * DEFAULT.most):  # some of the candidates are unsound and only use up their pixels
+        if len(found) == DEFAULT.most or free.sum() < max(3.0, least):
             break
         fit = _best_fit(small, free, rng)
         if fit is None:

@@ -93,12 +93,12 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     return found[..., 1] * spread, found[..., 2] * spread
 
 
-def continued(values: Array, known: Array, far: float = 1.5) -> Array:
-    """[H, W] float64: a map carried on along the planes of its last known pixels for `far` pixels, constant beyond."""
+def continued(values: Array, known: Array) -> Array:
+    """[H, W] float64: a map carried on along the planes of its last known pixels for 1.5 pixels, constant beyond."""
     right, down = depth_slopes(values, known)
     i, j = nearest(known)
     rows, columns = np.indices(known.shape)
-    part = np.minimum(1, far / np.maximum(np.hypot(rows - i, columns - j), 1e-9))
+    part = np.minimum(1, 1.5 / np.maximum(np.hypot(rows - i, columns - j), 1e-9))
     beyond = values[i, j] + part * (right[i, j] * (columns - j) + down[i, j] * (rows - i))
     return np.where(known, values, beyond).astype(np.float64)
 

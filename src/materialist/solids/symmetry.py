@@ -96,7 +96,7 @@ def _silhouette_plane(front: Array, normal: Array, rays: Array, border: Array, i
     return a + b * rays[..., 0] + c * rays[..., 1]
 
 
-def _robust_plane(x: Array, y: Array, values: Array, weight: Array, rounds: int = 12) -> tuple[float, float, float]:
+def _robust_plane(x: Array, y: Array, values: Array, weight: Array) -> tuple[float, float, float]:
     """Coefficients (a, b, c) of values [n] ~ a + b x + c y by weighted least absolute deviations."""
     centre = np.array([np.average(x, weights=weight), np.average(y, weights=weight)])
     basis = np.stack([np.ones_like(x), x - centre[0], y - centre[1]], -1)
@@ -104,7 +104,7 @@ def _robust_plane(x: Array, y: Array, values: Array, weight: Array, rounds: int 
     typical = float(np.average(values, weights=weight))
     w = weight / weight.sum()
     found = np.zeros(3)
-    for _ in range(rounds):
+    for _ in range(12):
         # A faint pull to a plane that faces the camera, for a silhouette that shows on one side only.
         pull = np.diag([0, 1, 1]) * (1e-3 * spread**2)
         found = np.linalg.solve(basis.T @ (basis * w[:, None]) + pull * w.sum(), basis.T @ (values * w))

@@ -77,13 +77,7 @@ class TransportCache:
     """
 
     def __init__(
-        self,
-        geometry: Geometry,
-        camera: Camera,
-        settings: CacheSettings | None = None,
-        *,
-        seed: int = 0,
-        progress=None,
+        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *, seed: int = 0, progress=None
     ):
         self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
         self.settings = settings or CacheSettings()
@@ -93,8 +87,6 @@ class TransportCache:
         self._primary()
         self._traced: list[mi.UInt32] = []
         self._progress = progress
-
-    # -- primary visibility ------------------------------------------------------------------------------------------
 
     def _primary(self) -> None:
         cam = self.camera
@@ -120,8 +112,6 @@ class TransportCache:
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
         dr.eval(self.position, self.geometric_normal, self.face, self.normal, self.frame, self.wo, self.shift)
 
-    # -- directions ----------------------------------------------------------------------------------------------------
-
     def _count(self, k: int) -> int:
         if k == 0:
             return self.settings.diffuse_samples
@@ -129,8 +119,6 @@ class TransportCache:
 
     def _alpha(self, k: int) -> float:
         return 1.0 if k == 0 else float(alpha_of(ROUGHNESS_LEVELS[k - 1]))
-
-    # -- tracing -------------------------------------------------------------------------------------------------------
 
     def _trace(self, k: int) -> mi.UInt32:
         """Hits of lobe `k` (0 diffuse, else roughness level k-1): [N * P] radiance slots, sample-major."""
@@ -159,8 +147,6 @@ class TransportCache:
     def _hits(self) -> list[mi.UInt32]:
         self.trace()
         return self._traced
-
-    # -- gathering -----------------------------------------------------------------------------------------------------
 
     def gather(self, envmap: Array, radiance: Array | None) -> Tables:
         """Tables for one light.
@@ -197,12 +183,10 @@ class TransportCache:
         flat = np.asarray(radiance, np.float32).reshape(size, 3)
         return np.concatenate([flat, flat[planes]])
 
-    # -- images --------------------------------------------------------------------------------------------------------
-
-    def image(self, values, fill: float = 0.0) -> Array:
-        """[H, W, C] image of per-surface-pixel values [P, C]."""
+    def image(self, values) -> Array:
+        """[H, W, C] image of per-surface-pixel values [P, C], 0 elsewhere."""
         values = np.asarray(values, np.float32)
-        out = np.full((self.camera.height * self.camera.width, values.shape[1]), fill, np.float32)
+        out = np.zeros((self.camera.height * self.camera.width, values.shape[1]), np.float32)
         out[self.pixels] = values
         return out.reshape(self.camera.height, self.camera.width, -1)
 

@@ -16,8 +16,8 @@ from materialist.transport.cache import ROUGHNESS_LEVELS, Tables, TransportCache
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
-
-
+_SHARPNESS = 32.0
+"""Power of the cosine between normals (by eye)."""
 Tap = tuple[int, int, torch.Tensor]
 """(rows, columns) to a neighbour, and the weight [H, W] that it has for each pixel."""
 
@@ -34,29 +34,26 @@ class Guide:
     """[H, W] size of a pixel on the surface, scene units."""
 
 
-def guide_weights(guide: Guide, dy: int, dx: int, sharpness: float) -> torch.Tensor:
+def guide_weights(guide: Guide, dy: int, dx: int) -> torch.Tensor:
     """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
     normal, position = _shifted(guide.normal, dy, dx), _shifted(guide.position, dy, dx)
     cosine = (guide.normal * normal).sum(-1).clamp(0, 1)
     away = (guide.normal * (position - guide.position)).sum(-1).abs() / (guide.scale * (1 + dy * dy + dx * dx) ** 0.5)
-    return cosine.pow(sharpness) * torch.exp(-0.5 * away * away)
+    return cosine.pow(_SHARPNESS) * torch.exp(-0.5 * away * away)
 
 
-def taps(guide: Guide, *, sharpness: float = 32.0, step: int = 1) -> Iterator[Tap]:
-    """5 x 5 neighbours `step` pixels apart and their weights; `list` them to filter more than once."""
-    for i, wy in enumerate(_TAPS):
-        for j, wx in enumerate(_TAPS):
-            dy, dx = (i - 2) * step, (j - 2) * step
-            yield dy, dx, wy * wx * guide_weights(guide, dy, dx, sharpness)
+def taps(guide: Guide) -> Iterator[Tap]:
+    """5 x 5 neighbours and their weights; `list` them to filter more than once."""
+    for dy, wy in enumerate(_TAPS, -2):
+        for dx, wx in enumerate(_TAPS, -2):
+            yield dy, dx, wy * wx * guide_weights(guide, dy, dx)
 
 
-def joint_filter(
-    values: torch.Tensor, guide: Guide, *, sharpness: float = 32.0, step: int = 1, known: list[Tap] | None = None
-) -> torch.Tensor:
+def joint_filter(values: torch.Tensor, guide: Guide, known: list[Tap] | None = None) -> torch.Tensor:
     """Average `values` [H, W, C] over neighbours (`taps`, unless `known`) that lie on the same surface."""
     total = torch.zeros_like(values)
     norm = torch.zeros_like(guide.scale)
-    for dy, dx, weight in known or taps(guide, sharpness=sharpness, step=step):
+    for dy, dx, weight in known or taps(guide):
         total.addcmul_(_shifted(values, dy, dx), weight[..., None])
         norm += weight
     return total / norm.clamp_min(1e-6)[..., None]

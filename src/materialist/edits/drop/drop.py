@@ -38,9 +38,14 @@ class DropSettings:
 DEFAULT = DropSettings()
 
 
+Mesh = str | Path | MeshModel
+"""A file, or what `meshes.read_model` made of it."""
+Places = tuple[float, float] | Sequence[tuple[float, float]]
+"""(x, y) at working size above which all fall, one over the other, or a place for each."""
+
+
 def drop(
-    scene: Scene, meshes: str | Path | MeshModel | Sequence[str | Path | MeshModel],
-    at: tuple[float, float] | Sequence[tuple[float, float]], options: Drop | None = None, *, frames: int = 48,
+    scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: Drop | None = None, *, frames: int = 48,
     fps: float = 24.0, **values: Any,
 ) -> list[Scene]:  # fmt: skip
     """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
@@ -51,8 +56,6 @@ def drop(
     -Y.
 
     Args:
-        meshes: files, or what `meshes.read_model` made of them.
-        at: (x, y) at working size above which all fall, one over the other, or a place for each.
         options, values: see `options.Drop`; `values` are fields of it, as in `drop(scene, meshes, at, height=2)`.
         frames, fps: length of the film in frames, 2 to 3600, and frames a second.
 
@@ -65,7 +68,7 @@ def drop(
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
     if not 1 <= fps <= 240:
         raise InputError(f"The frame rate is {fps:g}; it must lie in [1, 240].")
-    falling = prepared(scene, meshes, at, wanted)
+    falling = _prepared(scene, meshes, at, wanted)
     film, last = [], scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
@@ -75,10 +78,7 @@ def drop(
     return film
 
 
-def settle(
-    scene: Scene, meshes: Sequence[str | Path | MeshModel], at: tuple[float, float] | Sequence[tuple[float, float]],
-    options: Drop | None = None, **values: Any,
-) -> Scene:  # fmt: skip
+def settle(scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | None = None, **values: Any) -> Scene:
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
 
     Everything is as in `drop`, of which this is the last frame, however long that takes: things are at rest
@@ -89,7 +89,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
-    falling = prepared(scene, meshes, at, Drop.given(options, **values))
+    falling = _prepared(scene, meshes, at, Drop.given(options, **values))
     poses, gone, rests = _rested(falling)
     names = falling.what["meshes"]
     if len(gone) == len(names):
@@ -102,10 +102,12 @@ def settle(
         notes.append(
             f"After {DEFAULT.longest:g} seconds not everything that fell is at rest; it stays where it is then."
         )
-    edited = falling.at(poses, tuple(notes), gone)
-    if not any(_in_view(scene, body) for body in edited.bodies[len(scene.bodies) :]):
-        return falling.at(poses, (*notes, "What fell came to rest where the camera does not look."), gone)
-    return edited
+    edited = falling.at(poses, gone)
+    size = scene.camera.width, scene.camera.height
+    seen = (project(body.vertices, scene.camera) for body in edited.bodies[len(scene.bodies) :])
+    if not any(((depth > 0) & ((place > 0) & (place < size)).all(-1)).any() for place, depth in seen):
+        notes.append("What fell came to rest where the camera does not look.")
+    return warned(edited, *notes)
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class Falling:
     what: dict[str, Any]
     """For the provenance."""
 
-    def at(self, poses: list[Pose], notes: tuple[str, ...] = (), gone: frozenset[int] = frozenset()) -> Scene:
+    def at(self, poses: list[Pose], gone: frozenset[int] = frozenset()) -> Scene:
         """The scene with the things in these poses, without those of the numbers `gone`."""
         placed = tuple(
             _posed(body, self.to_up, self.factor, shift, thing, pose)
@@ -135,15 +137,10 @@ class Falling:
             if k not in gone
         )
         dropped = replace(self.scene, bodies=(*self.scene.bodies, *placed))
-        return noted(warned(dropped, *self.notes, *notes), "drop", self.what)
+        return noted(warned(dropped, *self.notes), "drop", self.what)
 
 
-def prepared(
-    scene: Scene,
-    meshes: str | Path | MeshModel | Sequence[str | Path | MeshModel],
-    at: tuple[float, float] | Sequence[tuple[float, float]],
-    wanted: Drop,
-) -> Falling:
+def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: Drop) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
     load()
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
@@ -281,11 +278,6 @@ def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
         if not recent[-1] or (len(recent) > DEFAULT.still and _still(list(recent), falling.what["metres"])):
             return poses, gone, True
     return poses, gone, False
-
-
-def _in_view(scene: Scene, body: Body) -> bool:
-    place, depth = project(body.vertices, scene.camera)
-    return bool(((depth > 0) & (place > 0).all(-1) & (place < (scene.camera.width, scene.camera.height)).all(-1)).any())
 
 
 def _still(recent: list[list[Pose]], metres: float) -> bool:

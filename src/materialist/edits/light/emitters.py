@@ -72,8 +72,7 @@ def visible_lights(scene: Scene) -> list[Array]:
 
 
 def dimmed(
-    scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None, seed: int = 0,
-    device: str = "auto",
+    scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None
 ) -> Scene:  # fmt: skip
     """The scene with its in-photo emitters as surfaces of `dim` times their radiance; the photo's is 1.
 
@@ -109,7 +108,7 @@ def dimmed(
     colours, radiance = _looks(known.photo, masks)
     patches = [_patch(scene, mask, f"{PHOTO_LIGHT} {k}") for k, mask in enumerate(masks)]
     shining = tuple(emitting(body, colour) for body, colour in zip(patches, colours))
-    ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance, seed, device)
+    ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance)
     emission = [[radiance * c for c in colour] for colour in colours]
     found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": emission}
     bodies = [emitting(body, [dim * c for c in own]) for body, own in zip(patches, emission)]
@@ -153,7 +152,7 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
 
 
 def _estimated(
-    scene: Scene, emitters: tuple[Body, ...], masked: Array, radiance: float | None, seed: int, device: str
+    scene: Scene, emitters: tuple[Body, ...], masked: Array, radiance: float | None
 ) -> tuple[float, float, float]:  # fmt: skip
     """(factor on the environment map, radiance of the emitters) that together give the photo, and the emitters' share.
 
@@ -165,10 +164,10 @@ def _estimated(
 
     from materialist.render.scene import RenderScene
 
-    target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters), device=device)
+    target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters))
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), OFF, np.float32))
-    by_emitters = target.render(spp=DEFAULT.spp, seed=seed)  # [H, W, 3] of emitters of radiance 1 alone
+    by_emitters = target.render(spp=DEFAULT.spp)  # [H, W, 3] of emitters of radiance 1 alone
     photo = scene.photo.linear
     seen = (scene.depth > 0) & ~masked & (photo.max(-1) < DEFAULT.clipped)
     if not seen.any():

@@ -25,6 +25,7 @@ from materialist.types import Array, Lamp, Scene
 class AddedLightSettings:
     """Sizes of added lights."""
 
+    map_rows: int = 256  # of the largest map; derived: memory
     sun_radius: float = 1.5  # angular radius of an added sun, degrees: six real ones, as a map of 512 x 256 needs
     lamp_unit: float = 0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
     lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
@@ -140,14 +141,14 @@ def checked_envmap(envmap: Array) -> Array:
     return envmap
 
 
-def read_envmap(path: str | Path, *, rows: int = 256) -> Array:
-    """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `rows` rows. Raises InputError."""
+def read_envmap(path: str | Path) -> Array:
+    """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `map_rows` rows. Raises InputError."""
     import cv2
 
     from materialist.io.photo import decode_photo
 
     envmap = checked_envmap(decode_photo(Path(path)).linear)
-    if envmap.shape[0] > rows:
+    if len(envmap) > (rows := SETTINGS.map_rows):
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
     return envmap
 

@@ -74,7 +74,7 @@ def with_picture(scene: Scene, filling: Filling, picture: Array) -> tuple[Materi
     return Materials(albedo, rough, metal), replace(scene.photo, linear=linear, original=original), linear
 
 
-def matched(removed: Scene, hole: Array, picture: Array, fitted: Scene, *, spp: int = 24) -> Scene:
+def matched(removed: Scene, hole: Array, picture: Array, fitted: Scene) -> Scene:
     """The scene with the albedo in a hole [H, W] bool that makes it look like a picture [h, w, 3] in the fitted light.
 
     A rendering says how far a guess is off; for a matt surface the radiance goes with the albedo.
@@ -83,7 +83,7 @@ def matched(removed: Scene, hole: Array, picture: Array, fitted: Scene, *, spp: 
     wanted = resized(picture, hole.shape)
     for _ in range(3):
         render, _ = EditRenderer(known).pair(known)
-        seen = denoised(render(spp, 1), removed.materials.albedo, removed.normal)
+        seen = denoised(render(24, 1), removed.materials.albedo, removed.normal)
         factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.1, 10)
         albedo = np.where(hole[..., None], known.materials.albedo * factor, known.materials.albedo)
         albedo = np.clip(albedo, 0.005, 1).astype(np.float32)

@@ -55,14 +55,9 @@ def make_hole(
     gone = grown(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
     if (gone & surface).sum() > SETTINGS.most * surface.sum() or (gone | ~surface).all():
-        if own.mean() < 0.5 and (~gone & ~surface).sum() > (~gone & surface).sum():
-            raise InputError(
-                "Nearly everything around the mask is sky, so that no scene would be left without it; mark a thing "
-                "that stands on something."
-            )
         raise InputError(
-            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of what the photo shows, so that nothing tells "
-            "what stands behind; mark one object only."
+            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of the photo's surfaces (sky is none), so that "
+            "nothing tells what stands behind; mark one object only, which stands on something."
         )
     plane = scene.geometry.plane_label
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)

@@ -34,17 +34,14 @@ def laid(picture: Array, share: Array, photo: Array) -> Array:
     return np.where(over > 0, over * picture + (1 - over) * photo, photo).astype(np.float32)
 
 
-def outline(mask: Array, native: tuple[int, int], blur: float = 1.0) -> Array:
-    """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards.
-
-    `blur`: standard deviation of that smoothing, working pixels.
-    """
+def outline(mask: Array, native: tuple[int, int]) -> Array:
+    """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
     import cv2
 
     hard = cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
     if native == mask.shape:
         return hard.astype(np.float32)
-    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), blur)
+    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
     thin = mask & (cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0)
     thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
