@@ -14,7 +14,8 @@ from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.remove.remove import remove
 from materialist.edits.select.select import select
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
+from materialist.io.atomic import whole_file
 from materialist.option_kinds import OFF, ON, OperationOptions, beside, declarations, numbers, several
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 from materialist.types import Array, Scene
@@ -108,13 +109,11 @@ def _step(entry: Any, number: int, path: Path) -> Step:
 def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
     """The step with `use(option, value)` in place of each file that it names; words such as `auto` stay."""
     known = declarations(OPTIONS[step.kind])
-    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"}
-    words |= {"mask": (), "mesh": ()}
+    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"} | {"mask": (), "mesh": ()}
     options = dict(step.options)
-    for name in [name for name in options if name in words]:
-        given = options[name]
-        put = [one if one in words[name] else use(name, one) for one in (given if isinstance(given, list) else [given])]
-        options[name] = put if isinstance(given, list) else put[0]
+    for name in words.keys() & options:
+        put = [one if one in words[name] else use(name, one) for one in _listed(options[name])]
+        options[name] = put if isinstance(options[name], list) else put[0]
     return replace(step, options=options)
 
 
@@ -122,15 +121,10 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
     import yaml
 
-    path = Path(path)
     entries = [{step.kind: _plain(step.options)} for step in steps]
     text = yaml.safe_dump(entries, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        temporary.write_text(text, "utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written: {error.strerror or error}.") from error
+    with whole_file(path, force=True) as file:
+        file.write_text(text, "utf-8")
 
 
 def _plain(value: Any) -> Any:
@@ -189,10 +183,6 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
     return region & ~gone
 
 
-def _edit(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return edit(edited, _left(scene, edited, region_of(scene, step)), _options(step))
-
-
 def _options(step: Step) -> Any:
     """The dataclass of the step's options, of what the file says beside its region or place."""
     kind = OPTIONS[step.kind]
@@ -222,7 +212,8 @@ def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
 
 def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
     _needs(step, "drop: {mesh: [mug.glb, ball.ply], at: [310, 220]}")
-    return settle(edited, _files(step, "mesh"), _places(step), _options(step))
+    meshes = [beside(step.folder, "mesh", one) for one in _listed(step.options["mesh"])]
+    return settle(edited, meshes, _places(step), _options(step))
 
 
 def _needs(step: Step, example: str) -> None:
@@ -250,7 +241,8 @@ def glass_arguments(scene: Scene, step: Step) -> tuple[Array, Glass]:
 
 
 _MAKERS = {
-    "edit": _edit, "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
+    "edit": lambda scene, edited, step: edit(edited, _left(scene, edited, region_of(scene, step)), _options(step)),
+    "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
 }  # fmt: skip
 """Kind of step -> (original scene, scene so far, step) -> scene."""
 
@@ -259,7 +251,6 @@ def _file(step: Step, name: str) -> Path:
     return beside(step.folder, name, step.options[name])
 
 
-def _files(step: Step, name: str) -> list[Path]:
-    """One file name, or a list of them."""
-    value = step.options[name]
-    return [beside(step.folder, name, one) for one in (value if isinstance(value, list) and value else [value])]
+def _listed(value: Any) -> list[Any]:
+    """One file name, or a list of them, as a list."""
+    return value if isinstance(value, list) and value else [value]

@@ -56,7 +56,7 @@ def first_hits(
 
     Args:
         scene: a Mitsuba scene (`RenderScene.mi_scene`).
-        bodies: by the names of their shapes; None: its albedo is not asked for.
+        bodies: by the names of their shapes; None for one without a material, as lamps, which is taken as white.
         size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
     rows, columns = box or (slice(0, size[0]), slice(0, size[1]))
@@ -83,7 +83,7 @@ def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple
         for name, body in bodies.items():
             if name in shapes:
                 hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
-                albedo = np.zeros((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
+                albedo = np.ones((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
                 total[hit] += np.concatenate([np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1)
     total[:, 1:] /= np.maximum(total[:, :1], 1)
     total[:, 0] /= GRID**2

@@ -9,10 +9,10 @@ import numpy as np
 
 from materialist.edits.composite.upsample import matte
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
-from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT, uniform_surface
+from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import area, grown, window
-from materialist.types import Array, Body, Scene
+from materialist.types import Array, Scene
 
 if TYPE_CHECKING:
     from materialist.render.coverage import Box
@@ -33,9 +33,6 @@ class NativeSettings:
 
 
 SETTINGS = NativeSettings()
-NOWHERE = np.zeros((0, 3), np.float32)
-LAMP = Body(NOWHERE, NOWHERE.astype(np.int32), NOWHERE, NOWHERE[:, :2], uniform_surface(1.0, 1.0, 0.0), "lamp")
-"""What stands for a lamp where its albedo is asked for."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +77,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     target = renderer.render_scene(renderer.lit(edited, edited))
     camera, native, working = scene.camera, scene.photo.original.shape[:2], scene.depth.shape
     shapes = {f"body{k}": body for k, body in enumerate(edited.bodies)}
-    chosen = {name: shapes.get(name, LAMP) for name in names}
+    chosen = {name: shapes.get(name) for name in names}
     small = first_hits(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
@@ -100,7 +97,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
     share[there] = _behind_things(sight, alone, scene, there, gap)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
-    if lamps or any(max(body.surface.emission) > 1 for body in chosen.values()):
+    if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
         small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
     return NativeLayer(small, share, whole)
