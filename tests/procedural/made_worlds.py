@@ -6,10 +6,10 @@ import numpy as np
 
 from materialist.procedural import materials as m
 from materialist.procedural.objects import shapes as s
-from materialist.procedural.synthetic import sensor
 from materialist.procedural.walls import Opening, RoomWall, surface
 from materialist.procedural.world import Portal, ScenePart, World, block, look, moved
 from materialist.render.envmap import half_turn, on_mitsuba_grid
+from materialist.render.scene import look_along, sensor, shape
 from materialist.types import Camera
 
 X, Y, Z = np.eye(3)
@@ -72,7 +72,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
             light = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
         place, normals = (part.solid.vertices - origin) @ rotation, part.solid.normals @ rotation
         solid = replace(part.solid, vertices=place, normals=normals)
-        description[f"part{k}"] = s.mitsuba_mesh(solid, bsdf, f"part{k}", light)
+        description[f"part{k}"] = shape(mi, solid, bsdf, light)
     grid = on_mitsuba_grid(world.envmap, np)
     to_camera = np.eye(4)
     to_camera[:3, :3] = rotation.T
@@ -80,7 +80,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
         "type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
         "to_world": mi.ScalarTransform4f(to_camera) @ half_turn(mi),
     }  # fmt: skip
-    description["sensor"] = sensor(Camera(size, size, world.view.fov))
+    description["sensor"] = sensor(Camera(size, size, world.view.fov), look_along(mi))
     scene = mi.load_dict(description)
     params = mi.traverse(scene)
     params["sky.data"] = mi.TensorXf(grid)

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted, window
+from materialist.bench.glass_scenes import PROTOCOL, GlassScene, mesh, painted
 from materialist.errors import SetupError, WeightsError
+from materialist.geometry.silhouette import window
 from materialist.predict.refraction.thickness import Thickness
-from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.types import Array
 
 
@@ -77,7 +77,7 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
-        things = {"object": mitsuba_mesh(_body(scene, found, depth), painted(scene.item.albedo))}
+        things = {"object": mesh(_body(scene, found, depth), painted(scene.item.albedo))}
     albedo = _albedo(scene, depth, normal, photo, envmap, things)
     filling = find_filling(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
     exposed, albedo = filling.radiance(photo * gain), filling.radiance(albedo)
@@ -126,7 +126,7 @@ def lit(
             paint = behind.albedo if mean is None else np.broadcast_to(mean, (2, 2, 3))
             texture = {"type": "bitmap", "data": tensor(mi, paint), "raw": True, "wrap_mode": "clamp"}
             surface = {"type": "diffuse", "reflectance": texture}
-            shapes[f"backdrop{int(k) + 1}"] = mitsuba_mesh(part(geometry.mesh, int(k)), surface)
+            shapes[f"backdrop{int(k) + 1}"] = mesh(part(geometry.mesh, int(k)), surface)
     return scene.trace({**shapes, **(things or {})}, envmap, length=length, spp=spp, seed=seed, cropped=cropped)
 
 
@@ -163,7 +163,7 @@ def before(case: Case, body: Any, behind: Background) -> Array:
     from materialist.render.denoise import denoise
 
     scene = case.scene
-    things = {"object": mitsuba_mesh(body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
+    things = {"object": mesh(body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
     length = PROTOCOL.glass_length
     picture = lit(scene, behind, case.envmap, things, length=length, spp=case.spp, cropped=True)
     box = window(scene.mask)

@@ -13,12 +13,12 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.color import luminance
 from materialist.errors import InputError
+from materialist.geometry.silhouette import window
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.glassware import KINDS, make_shape
-from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
-from materialist.procedural.synthetic import sensor
+from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array, Camera
 
@@ -148,7 +148,7 @@ class GlassScene:
     @cached_property
     def albedo(self) -> Array:
         """[H, W, 3] linear: of what the camera sees first, the object grey."""
-        things = {**self._room(), "object": mitsuba_mesh(self.item.solid, painted(self.item.albedo))}
+        things = {**self._room(), "object": mesh(self.item.solid, painted(self.item.albedo))}
         return self.trace(things, None, spp=64, integrator={"type": "aov", "aovs": "albedo:albedo"})
 
     def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
@@ -159,12 +159,12 @@ class GlassScene:
         things = self._room()
         glass = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
         if what != "room":
-            things["object"] = mitsuba_mesh(self.item.solid, glass if what == "glass" else painted(self.item.albedo))
+            things["object"] = mesh(self.item.solid, glass if what == "glass" else painted(self.item.albedo))
         length = PROTOCOL.glass_length if what == "glass" else PROTOCOL.diffuse_length
         return self.trace(things, envmap, length=length, spp=spp, seed=seed, cropped=what == "glass")
 
     def _room(self) -> dict[str, Any]:
-        return {f"room{k}": mitsuba_mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
+        return {f"room{k}": mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
 
     def trace(
         self, things: dict[str, Any], envmap: Array | None, *, spp: int, length: int = 0, seed: int = 0,
@@ -175,8 +175,9 @@ class GlassScene:
         import mitsuba as mi
 
         from materialist.render.envmap import half_turn, on_mitsuba_grid
+        from materialist.render.scene import look_along, sensor
 
-        camera = sensor(self.camera)
+        camera = sensor(self.camera, look_along(mi))
         box = window(self.mask) if cropped else np.s_[:, :]
         if cropped:
             for side, axis, part in zip(("width", "height"), "xy", reversed(box), strict=True):
@@ -195,10 +196,13 @@ class GlassScene:
         return whole
 
 
-def window(mask: Array) -> tuple[slice, slice]:
-    """The rectangle around a mask [H, W] bool, as slices of rows and columns."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+def mesh(solid: Any, bsdf: dict[str, Any]) -> Any:
+    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
+    import mitsuba as mi
+
+    from materialist.render.scene import shape
+
+    return shape(mi, solid, bsdf)
 
 
 def painted(albedo: Array) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from materialist.bench.edits import true_scene
 from materialist.bench.report import Column, Report
 from materialist.edits.select.objects import Box
 from materialist.errors import InputError
+from materialist.geometry.silhouette import window
 from materialist.option_kinds import option
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import make_sample
@@ -100,11 +101,7 @@ def _scores(scene: Scene, mask: Array, **how: Any) -> dict[str, float]:
 
 def boxes(mask: Array, loose: float) -> dict[str, Box]:
     """The boxes around a mask [H, W] bool: exact, and larger by `loose` of its shorter side on every side."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    exact = int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
-    more = max(1, round(loose * min(exact[2] - exact[0], exact[3] - exact[1])))
-    around = (
-        max(exact[0] - more, 0), max(exact[1] - more, 0),
-        min(exact[2] + more, mask.shape[1]), min(exact[3] + more, mask.shape[0]),
-    )  # fmt: skip
-    return {"exact box": exact, "loose box": around}
+    rows, columns = window(mask)
+    more = max(1, round(loose * min(rows.stop - rows.start, columns.stop - columns.start)))
+    sides = {"exact box": (rows, columns), "loose box": window(mask, margin=more)}
+    return {name: (x.start, y.start, x.stop, y.stop) for name, (y, x) in sides.items()}

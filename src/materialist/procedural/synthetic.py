@@ -16,7 +16,6 @@ import numpy as np
 from materialist.buffers import floats, tensor
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
-from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.procedural.world import Viewpoint
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
@@ -97,11 +96,16 @@ class TrueScene:
     def __init__(self, items: list[scenes.Item], view: Viewpoint, height: int, width: int):
         import mitsuba as mi
 
+        from materialist.render.envmap import emitter
+        from materialist.render.scene import look_along, sensor
+
         self.view = view
         self.camera = Camera(width, height, view.fov)
         self.items = items
-        shapes = {f"item{k:02d}": _mesh(item, k) for k, item in enumerate(items)}
-        self._scene = mi.load_dict({"type": "scene", "sensor": sensor(self.camera), "light": _emitter(), **shapes})
+        shapes = {f"item{k:02d}": _mesh(item) for k, item in enumerate(items)}
+        # Which paths a photo has, and so its noise, depends on where its rays begin.
+        light, eye = emitter(mi), sensor(self.camera, look_along(mi)) | {"near_clip": 1e-3, "far_clip": 1e3}
+        self._scene = mi.load_dict({"type": "scene", "sensor": eye, "light": light, **shapes})
         self._params = mi.traverse(self._scene)
         self._params.keep(["light.data"])
         self._item_of_shape = _registry(list(shapes.values()))
@@ -213,43 +217,18 @@ def _registry(meshes: list[Any]) -> Array:
     return table
 
 
-def _mesh(item: scenes.Item, number: int) -> Any:
+def _mesh(item: scenes.Item) -> Any:
     """A Mitsuba mesh with the item's material."""
     import mitsuba as mi
+
+    from materialist.render.scene import shape
 
     def texture(values: Array) -> dict[str, Any]:
         bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat"}
 
     if item.transparent:
-        return mitsuba_mesh(item.solid, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}, f"item{number:02d}")
+        return shape(mi, item.solid, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0})
     maps = {"base_color": texture(item.albedo)}
     maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
-    return mitsuba_mesh(item.solid, {"type": "materialist_disney", **maps}, f"item{number:02d}")
-
-
-def sensor(camera: Camera) -> dict[str, Any]:
-    """Pinhole at the origin looking along -Z; every pixel is the mean over its own square."""
-    import mitsuba as mi
-
-    film = {"type": "hdrfilm", "width": camera.width, "height": camera.height, "rfilter": {"type": "box"}}
-    return {
-        "type": "perspective",
-        "fov": camera.fov,
-        "fov_axis": "x",
-        "near_clip": 1e-3,
-        "far_clip": 1e3,
-        "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0]),
-        "film": film | {"pixel_format": "rgb"},
-        # Stratified samples: 3 to 5 dB less noise than independent ones at the same count.
-        "sampler": {"type": "multijitter"},
-    }
-
-
-def _emitter() -> dict[str, Any]:
-    """An envmap emitter whose centre column looks along -Z; Mitsuba's own convention has it along +Z."""
-    import mitsuba as mi
-
-    from materialist.render.envmap import half_turn
-
-    return {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": half_turn(mi)}
+    return shape(mi, item.solid, {"type": "materialist_disney", **maps})

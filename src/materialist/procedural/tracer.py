@@ -18,9 +18,9 @@ import numpy as np
 from materialist.buffers import floats, integers
 from materialist.errors import InputError
 from materialist.procedural import shading, tiles
-from materialist.procedural.objects.shapes import mitsuba_mesh
 from materialist.procedural.packing import Packed
 from materialist.procedural.shading import Hit, Lights, Surfaces
+from materialist.render.scene import shape
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 
@@ -56,7 +56,7 @@ class SampleTracer:
             dr.eval(copy)
             return copy
 
-        self.scene = mi.load_dict({"type": "scene", "mesh": mitsuba_mesh(packed)})
+        self.scene = mi.load_dict({"type": "scene", "mesh": shape(mi, packed)})
         self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank())
         rows, columns = packed.env.shape[:2]
         sizes = dr.opaque(mi.Float, float(rows)), dr.opaque(mi.Float, float(columns))

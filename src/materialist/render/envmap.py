@@ -32,6 +32,11 @@ def half_turn(mi):
     return mi.ScalarTransform4f().rotate([0, 1, 0], 180)
 
 
+def emitter(mi) -> dict:
+    """A grey emitter whose `data` is exchanged for `on_mitsuba_grid` of a map."""
+    return {"type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)), "to_world": half_turn(mi)}
+
+
 def check_envmap(envmap: Array) -> None:
     """Raise InputError unless the map is [h, 2h, 3] with h >= 4, finite and >= 0."""
     shape = np.shape(envmap)

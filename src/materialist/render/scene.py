@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from materialist.buffers import floats, integers, tensor
 from materialist.errors import InputError
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
-from materialist.render.envmap import check_envmap, half_turn, on_mitsuba_grid
+from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
 
@@ -55,23 +58,18 @@ class RenderScene:
         # A plane that no pixel lies on keeps the neutral material it starts with.
         self._members = {k: pixels for k, pixels in members.items() if len(pixels)}
         height, width = camera.height, camera.width
-        look_along = mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
         description = {
             "type": "scene",
             "embree_use_robust_intersections": True,
-            "sensor": sensor(camera, look_along),
-            "light": {
-                "type": "envmap",
-                "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
-                "to_world": half_turn(mi),
-            },
-            "surface": _shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
+            "sensor": sensor(camera, look_along(mi)),
+            "light": emitter(mi),
+            "surface": _sound(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
         for k in self.planes:
-            description[f"plane{k}"] = _shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
+            description[f"plane{k}"] = _sound(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
         for k, body in enumerate(bodies):
             bsdf = body_bsdf(body.surface, opaque_bsdf(mi, body.surface))
-            description[f"body{k}"] = _shape(mi, body, bsdf, body_emitter(body.surface))
+            description[f"body{k}"] = _sound(mi, body, bsdf, body_emitter(body.surface))
         for k, lamp in enumerate(lamps):
             description[f"lamp{k}"] = sphere(lamp)
         self.mi_scene = mi.load_dict(description)
@@ -194,6 +192,11 @@ def _exchanged(name: str) -> bool:
     return name == "light.data" or (".bsdf." in name and name.endswith(".data"))
 
 
+def look_along(mi) -> Any:
+    """The `to_world` of the photo's camera: from the origin along -Z, +Y up."""
+    return mi.ScalarTransform4f().look_at(origin=[0, 0, 0], target=[0, 0, -1], up=[0, 1, 0])
+
+
 def sensor(camera: Camera, transform) -> dict:
     """Mitsuba's description of the photo's pinhole; its `to_world` looks along -Z, +Y up."""
     return {
@@ -235,18 +238,21 @@ def beside_u(normals: Array) -> Array:
     return np.where(along, beside, normals).astype(np.float32)
 
 
-def _shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None):
-    props = mi.Properties()
-    props["mesh_bsdf"] = mi.load_dict(bsdf)
-    if emitter is not None:
-        props["mesh_emitter"] = mi.load_dict(emitter)
-    shape = mi.Mesh(
-        "part", len(mesh.vertices), len(mesh.faces), has_vertex_normals=True, has_vertex_texcoords=True, props=props
-    )
-    params = mi.traverse(shape)
-    params["vertex_positions"] = floats(mi, mesh.vertices)
-    params["vertex_normals"] = floats(mi, beside_u(mesh.normals))
-    params["vertex_texcoords"] = floats(mi, mesh.uv)
-    params["faces"] = integers(mi, mesh.faces)
+def _sound(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
+    return shape(mi, replace(mesh, normals=beside_u(mesh.normals)), bsdf, emitter)
+
+
+def shape(mi, mesh: Any, bsdf: dict | None = None, emitter: dict | None = None) -> Any:
+    """A Mitsuba mesh of anything with vertices and faces, and, for a BSDF, shading normals and uv."""
+    props, seen = mi.Properties(), bsdf is not None
+    for name, plugin in (("mesh_bsdf", bsdf), ("mesh_emitter", emitter)):
+        if plugin is not None:
+            props[name] = mi.load_dict(plugin)
+    count = len(mesh.vertices), len(mesh.faces)
+    made = mi.Mesh("part", *count, has_vertex_normals=seen, has_vertex_texcoords=seen, props=props)
+    params = mi.traverse(made)
+    params["vertex_positions"], params["faces"] = floats(mi, mesh.vertices), integers(mi, mesh.faces)
+    if seen:
+        params["vertex_normals"], params["vertex_texcoords"] = floats(mi, mesh.normals), floats(mi, mesh.uv)
     params.update()
-    return shape
+    return made

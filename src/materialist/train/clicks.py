@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.samples import SampleFolder, claim, read_arrays, read_sample, write_arrays
@@ -122,7 +123,7 @@ def draw_click(
     thing = scaled(view.thing, cv2.INTER_NEAREST)
     depth = scaled(view.depth.astype(np.float32), cv2.INTER_NEAREST)
     rgb = scaled(view.rgb.astype(np.float32), smooth) / 255
-    normal = _unit(scaled(view.normal.astype(np.float32), smooth))
+    normal = unit(scaled(view.normal.astype(np.float32), smooth))
     if rng.random() < 0.5:
         thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
         normal = normal[:, ::-1] * [-1, 1, 1]
@@ -156,12 +157,7 @@ def worse(normal: Array, depth: Array, rng: np.random.Generator, settings: Click
     waves = waves * (rng.uniform(0, settings.waves) / max(float(waves.std()), 1e-6))
     spread = float(even[known].std()) if known.any() else 0.0
     bent = np.where(known, np.exp(even + waves[..., 3] * spread), 0).astype(np.float32)
-    return _unit(blur(normal * known[..., None], sigma) / share[..., None] + waves[..., :3]), bent
-
-
-def _unit(normal: Array) -> Array:
-    """[H, W, 3] of length 1."""
-    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    return unit(blur(normal * known[..., None], sigma) / share[..., None] + waves[..., :3]), bent
 
 
 def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int, int] | None:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from materialist.camera import unit
 from materialist.errors import WeightsError
 from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
@@ -106,9 +107,8 @@ class PaperTask(MapsTask):
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
         assert isinstance(network, MatNet)
         maps = infer(network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape)))
-        normal = maps["normal"] / np.maximum(np.linalg.norm(maps["normal"], axis=-1, keepdims=True), 1e-6)
-        unit = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
-        return Prediction(Materials(**unit), normal, np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
+        materials = Materials(**{name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")})
+        return Prediction(materials, unit(maps["normal"]), np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
 
 
 def freeze(network: MatNet) -> None:

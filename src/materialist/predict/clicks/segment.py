@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.predict.clicks.features import NORMAL_X, features
 from materialist.types import Array
@@ -52,9 +53,8 @@ def object_at(photo: ClickMaps, clicks: Sequence[tuple[int, int]], *, weights: s
     whole = ClickMaps(*(np.ascontiguousarray(v, np.float32) for v in photo))
     rgb, normal = (np.asarray(cv2.resize(v, size, interpolation=way)) for v in (whole.rgb, whole.normal))
     depth = np.asarray(cv2.resize(whole.depth, size, interpolation=cv2.INTER_NEAREST))
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     places = [(min(int((x + 0.5) * scale), size[0] - 1), min(int((y + 0.5) * scale), size[1] - 1)) for x, y in clicks]
-    maps = features(rgb, normal, depth, places)
+    maps = features(rgb, unit(normal), depth, places)
     below, beside = -maps.shape[1] % STRIDE, -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
     mirrored = padded.flip(-1)

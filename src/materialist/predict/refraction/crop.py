@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.color import linear_to_srgb
-from materialist.geometry.silhouette import border_distance, object_size, spacing
+from materialist.geometry.silhouette import border_distance, object_size, spacing, window
 from materialist.solids.symmetry import mirrored
 from materialist.types import Array
 
@@ -51,8 +52,7 @@ class Window:
     @classmethod
     def around(cls, inside: Array) -> Window:
         """The window around a mask [H, W] bool, which it frames to the fraction of a pixel as the training views do."""
-        rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
-        (top, bottom), (left, right) = ((float(k[0]), float(k[-1]) + 1) for k in (rows, columns))
+        (top, bottom), (left, right) = ((k.start, k.stop) for k in window(inside))
         side = max(bottom - top, right - left) * (1 + 2 * MARGIN)
         return cls((left + right - side) / 2, (top + bottom - side) / 2, side)
 
@@ -69,9 +69,8 @@ class Window:
         seen = share > 0.5
         if not seen.any():
             seen = share >= share.max()
-        small = mean(normal.astype(np.float32))
-        small = small / np.maximum(np.linalg.norm(small, axis=-1, keepdims=True), 1e-6)
-        return View(mean(photo.astype(np.float32)), seen, small, mean(depth.astype(np.float32)), self._rays(rays))
+        photo, normal, depth = (mean(x.astype(np.float32)) for x in (photo, normal, depth))
+        return View(photo, seen, unit(normal), depth, self._rays(rays))
 
     def put_back(self, values: Array, seen: Array, inside: Array) -> Array:
         """[H, W] float32: values [S, S] known where `seen`, brought back to the mask `inside` [H, W], 0 outside."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.camera import pixel_rays
+from materialist.camera import pixel_rays, unit
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.silhouette import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
@@ -70,8 +70,7 @@ def thickness(
     found = np.mean(answers, axis=0)  # [H, W, 5]
     if not np.isfinite(found).all():
         raise WeightsError(f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS}).")
-    solid, hollow, back = found[..., 0], found[..., 1], found[..., BACK_X:]
-    back = back / np.maximum(np.linalg.norm(back, axis=-1, keepdims=True), 1e-6)
+    solid, hollow, back = found[..., 0], found[..., 1], unit(found[..., BACK_X:])
     return Thickness(solid, np.minimum(hollow, solid), back)
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from materialist.buffers import floats, integers
 from materialist.types import Array
 
 
@@ -110,26 +108,6 @@ def load(path: Path) -> Solid:
     uv = np.stack([u, corners[..., 1]], -1).reshape(-1, 2)
     own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
     return Solid(corners.reshape(-1, 3), own, normals[faces].reshape(-1, 3), uv)
-
-
-def mitsuba_mesh(
-    solid: Any, bsdf: dict[str, Any] | None = None, name: str = "mesh", emitter: dict[str, Any] | None = None
-) -> Any:
-    """A Mitsuba mesh of anything with vertices and faces, and, for a BSDF, shading normals and uv."""
-    import mitsuba as mi
-
-    props, seen = mi.Properties(), bsdf is not None
-    for key, plugin in (("bsdf", bsdf), ("emitter", emitter)):
-        if plugin is not None:
-            props[key] = mi.load_dict(plugin)
-    vertices, faces = solid.vertices, solid.faces
-    mesh = mi.Mesh(name, len(vertices), len(faces), props=props, has_vertex_normals=seen, has_vertex_texcoords=seen)
-    params = mi.traverse(mesh)
-    params["vertex_positions"], params["faces"] = floats(mi, vertices), integers(mi, faces)
-    if seen:
-        params["vertex_normals"], params["vertex_texcoords"] = floats(mi, solid.normals), floats(mi, solid.uv)
-    params.update()
-    return mesh
 
 
 def placed(solid: Solid, *, scale: float = 1.0, turn: float = 0.0, at: tuple[float, float] = (0.0, 0.0)) -> Solid:

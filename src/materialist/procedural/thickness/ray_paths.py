@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.buffers import floats
-from materialist.procedural.objects.shapes import Solid, mitsuba_mesh
+from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
 MOST = 24
@@ -50,10 +50,11 @@ class ShapeTracer:
     """One mesh to be shot at."""
 
     def __init__(self, solid: Solid):
+        from materialist.render.scene import shape
         from materialist.render.variant import setup
 
         self._mi = mi = setup()
-        mesh = mitsuba_mesh(solid)
+        mesh = shape(mi, solid)
         self._scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "shape": mesh})
         self._faces, self._normals = solid.faces, solid.normals
         corners = solid.vertices[solid.faces]
