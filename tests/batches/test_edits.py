@@ -52,5 +52,5 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     (recipe.parent / "m").mkdir()
     (recipe.parent / "m/one.png").write_bytes(b"no picture")
     outcome = batch(source, runs, resume=True, progress=said.append, **options)
-    assert said[0].urgent and said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
+    assert said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
     assert "m/two.png for two.png" in said[0].news and outcome.count("failed") == 2 and (runs / "two.scene").is_dir()

@@ -55,7 +55,7 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
     with pytest.raises(OutputError, match="--force"):
         claim(tmp_path)
     assert claim(tmp_path, force=True) == tmp_path
-    with pytest.raises(OutputError, match="cannot be made"):
+    with pytest.raises(OutputError, match="cannot be written"):
         claim(tmp_path / "file" / "below")
 
 

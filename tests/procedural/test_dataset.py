@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.procedural.dataset import produce, read_description, sample_path
+from materialist.procedural.dataset import identity, produce, sample_path
 from materialist.procedural.objects import things
 from materialist.procedural.options import HELD_OUT, DataSetOptions
 from materialist.procedural.sample import make_sample
@@ -88,13 +88,13 @@ def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
     with pytest.raises(InputError, match="seed 11, not 12"):
         produce(made, replace(options, seed=12), count=6, resume=True)
     (tmp_path / "set").mkdir()
-    told = read_description(made)
+    told = identity(made)
     assert (told["format"], told["size"], told["seed"], told["options"]["spp"]) == (1, SIZE, 11, 4)
     (tmp_path / "set" / "dataset.json").write_text(json.dumps({**told, "content": told["content"] - 1}))
     with pytest.raises(InputError, match="begun with content"):
         produce(tmp_path / "set", options, count=2, resume=True)
     with pytest.raises(InputError, match=r"dataset\.json"):
-        read_description(made / "samples")
+        identity(made / "samples")
 
 
 def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():

@@ -49,7 +49,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     for seed, data in enumerate(sets):
         produce_set(data, DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
     views = tmp_path / "run" / "views"
-    assert produce_views(sets[0], views) == 1
+    produce_views(sets[0], views)
     (made,) = load_views(views)
     assert made.rgb.shape == (64, 64, 3) and made.rgb.dtype == np.uint8
     length = np.linalg.norm(made.normal.astype(float) / 127, axis=-1)
@@ -57,7 +57,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     assert 1 in np.sign(made.thing)
     before = (views / "0000000.npz").stat().st_mtime_ns
     shutil.move(sets[0], tmp_path / "elsewhere")
-    assert produce_views(tmp_path / "elsewhere", views) == 1, "a set may move"
+    produce_views(tmp_path / "elsewhere", views)  # a set may move
     with pytest.raises(InputError, match="seed 11, not 12"):
         produce_views(sets[1], views)
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"

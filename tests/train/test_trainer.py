@@ -130,7 +130,7 @@ def test_a_run_is_not_overwritten_nor_mixed_up(run, data, tasks, tmp_path):
             made_runs.trainer(tasks[kind](), folder, steps=1, resume=True)
     (tmp_path / "file").write_text("")
     for place in ("file", "file/run"):
-        with pytest.raises(OutputError, match="cannot be made"):
+        with pytest.raises(OutputError, match="cannot be written"):
             made_runs.trainer(tasks["clicks"](), tmp_path / place, steps=1)
 
 

@@ -45,7 +45,6 @@ class Outcome:
         return [row for row in self.rows if row["status"] == status]
 
     def count(self, status: str) -> int:
-        """How many photos are `done`, `failed` or `open`."""
         return len(self.of(status))
 
     @property
@@ -73,8 +72,6 @@ class Status:
     """Name -> stage, of photos at work."""
     news: str | None = None
     """A line to show; most are about a photo that has just ended."""
-    urgent: bool = False
-    """Whether the line reports a failure."""
 
 
 def write_summary(outcome: Outcome) -> None:

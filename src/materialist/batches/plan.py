@@ -16,17 +16,16 @@ from materialist.batches.results import file_hash, package_size
 from materialist.batches.task import PhotoTask
 from materialist.errors import InputError
 from materialist.options import InvertOptions
-from materialist.predict import CHOICES
+from materialist.predict.protocol import MAPS
+from materialist.predict.registry import parsed
 
 
 def check_options(options: dict[str, Any]) -> None:
     """Refuse options that would fail every photo in the same way. Raises InputError."""
     InvertOptions.given(**options)
-    known = {choice.partition("[")[0].partition(":")[0] for choice in CHOICES.split(", ")}
-    for part in ("predictor", "albedo", "roughness", "metallic", "normal", "depth"):
-        spec = options.get(part)
-        if spec is not None and str(spec).partition(":")[0] not in known:
-            raise InputError(f"There is no predictor '{spec}'; choose one of {CHOICES}.")
+    for part in ("predictor", *MAPS):
+        if options.get(part) is not None:
+            parsed(str(options[part]))
     try:
         json.dumps(options)
     except TypeError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -69,7 +68,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
         run = _Run(folder, photos, ledger, tasks, len(finished), asked, progress or (lambda _: None))
         run.start = start
         if how.recipe is not None and (notice := _lacking(how.recipe, tasks)):
-            run.tell(notice, urgent=True)
+            run.tell(notice)
         if tasks:
             run.work(_pool(how, len(tasks), asked["device"], asked["size"]))
         return run.outcome()
@@ -99,12 +98,8 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
     import psutil
 
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker_mb(size))))
-
-
-def worker_mb(size: int) -> float:
-    """Memory to count on for a worker at a working size, MB: measured were 1.5 GB at 512 and 3.7 GB at 1024."""
-    return 720 + 2.9e-3 * size**2
+    worker = 720 + 2.9e-3 * size**2  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))
 
 
 def visible_gpus() -> list[str]:
@@ -116,11 +111,9 @@ def visible_gpus() -> list[str]:
     chosen = os.environ.get("CUDA_VISIBLE_DEVICES")
     if chosen is not None:
         return [name.strip() for name in chosen.split(",") if name.strip()]
-    import ctypes
+    import torch
 
-    count = ctypes.c_int()
-    ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1").cuDeviceGetCount(ctypes.byref(count))
-    return [str(k) for k in range(count.value)]
+    return [str(k) for k in range(torch.cuda.device_count())]
 
 
 def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
@@ -167,12 +160,10 @@ class _Run:
             pool.close()
 
     def outcome(self) -> Outcome:
-        """The state of all photos."""
         rows = tuple(self._row(photo) for photo in self._photos)
         return Outcome(self._runs, rows, self._kept, time.monotonic() - self.start, self._options)
 
     def write(self) -> None:
-        """Write the summary and the page."""
         outcome = self.outcome()
         write_summary(outcome)
         write_page(outcome)
@@ -216,19 +207,18 @@ class _Run:
         else:
             quality = f", {facts['psnr']:.1f} dB" if facts.get("psnr") is not None else ""
             line = f"done in {facts['seconds']:.1f} s{quality}"
-        self.tell(f"{task.id}: {line}", urgent=event == FAILED)
+        self.tell(f"{task.id}: {line}")
 
     def _known(self, task: PhotoTask) -> dict[str, Any]:
         """Facts of a scene that is kept while its edit is made again; the ledger's last entry has them always."""
         before = self._ledger.last.get(task.id, {}) if task.inverted else {}
         return {key: before[key] for key in _OF_THE_SCENE if key in before}
 
-    def tell(self, news: str | None, urgent: bool = False) -> None:
-        """Report the state, and what has happened."""
+    def tell(self, news: str | None) -> None:
         total, failed = len(self._photos), list(self._ended.values()).count(FAILED)
         over = self._kept + len(self._ended)
         running = {self._tasks[id].name: stage for id, stage in self._stages.items()}
-        self._watch(Status(total, over - failed, failed, running, news, urgent))
+        self._watch(Status(total, over - failed, failed, running, news))
 
     def _row(self, photo: Listed) -> Row:
         entry, task = self._ledger.last.get(photo.id, {}), self._tasks.get(photo.id)

@@ -6,7 +6,6 @@ import gc
 import hashlib
 import resource
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +22,7 @@ from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable
 from materialist.io.display import encoded
+from materialist.io.samples import Progress
 from materialist.types import Array, Scene
 
 SINGLE_THREAD = {
@@ -34,8 +34,6 @@ thread a photo's result does not depend on how many workers there are, and sever
 
 THUMBNAIL = (240, 150)
 """Largest width and height of a small picture, pixels."""
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -62,16 +60,13 @@ class PhotoTask:
 
     @property
     def scene(self) -> Path:
-        """The scene package."""
         return results.scene_path(self.runs, self.name)
 
     @property
     def picture(self) -> Path:
-        """The edited photo."""
         return results.picture_path(self.runs, self.name)
 
     def named_options(self) -> dict[str, Any]:
-        """The options of the inversion, for this photo."""
         return {k: v.replace("{name}", self.name) if isinstance(v, str) else v for k, v in self.options.items()}
 
 

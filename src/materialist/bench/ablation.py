@@ -95,7 +95,6 @@ class _Photo:
 
     @cached_property
     def prior(self) -> Prediction:
-        """What the predictor says of the photo."""
         if self.bench.predictor == "truth":
             return self.sample.truth
         predictor: Any = get_predictor(self.bench.predictor, device=self.bench.device)

@@ -1,15 +1,11 @@
 """`bench edit`: the fidelity of edits on synthetic photographs whose true edited picture is known.
 
 Synthetic photographs are fitted, edited and compared with the true scene, rendered after the same edit; PSNR on
-sRGB-encoded, clipped pictures. `hue` turns the largest object's albedo by 120 degrees, `metal` makes it copper
-(roughness 0.3), `relight` shows the photo under another light, `insert` puts a cup on the floor. Inside is the edited
-object; for `insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all.
-`ceiling` is the same edit path-traced with the true maps and the true light on the mesh of the true depth, no photo in
-it; `ceiling, composite` the same brought into the photo. `edit` is fitted with the true maps as prior, composited
-(`bench photo-alone` has predicted ones). `untouched` is the photo as it was. `preview` rows: seconds of one preview by
-cached transport, `final` those of the composite at 256 paths, both at the latency size, and of bringing it into a photo
-of 24 megapixels (without the paths); CPU seconds hardly depend on what else the computer does. sheet.png, from the
-left: photo, truth, ceiling, edit.
+sRGB-encoded, clipped pictures; docs/benchmarks.md says what the edits and rows are. Inside is the edited object; for
+`insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all. `preview` rows:
+seconds of one preview by cached transport, `final` those of the composite at 256 paths, both at the latency size, and
+of bringing it into a photo of 24 megapixels (without the paths); CPU seconds hardly depend on what else the computer
+does. sheet.png, from the left: photo, truth, ceiling, edit.
 """
 
 from __future__ import annotations
@@ -92,7 +88,6 @@ class EditBench(Benchmark):
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
-        """How long previews and a final edit take."""
         import cv2
 
         from materialist.edits.composite.composite import composite

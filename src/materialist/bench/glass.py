@@ -5,16 +5,12 @@ object is seen; its glass is predicted from what is seen of it, and compared wit
 object's mask, on sRGB-encoded pictures at the exposure of the photo. Symmetric and asymmetric objects, the true
 background or one inpainted.
 
-`frame` spreads the same squared error over all pixels of the picture, as a metric does that is computed after
-everything outside the mask was made black. True depth and normals of the visible side, true light. `d` says where the
-thickness comes from: `predicted` is what `materialist glass` takes by itself, `network` RefractionNet alone; its error
-is mean absolute over mean true thickness. `noise` multiplies the predicted d by 1 + e, e uniform in [-0.5, 0.5], one e
-a draw. `background alone` shows the background without any refraction. `ceiling, true mesh` is the object's own mesh
-before the background that the closed proxy stands before, `ceiling, truth again` the truth with other noise and as few
-paths as the predictions, not denoised. The inpainted background is that of `materialist glass`: patterns that go on and
-patches of the photo, on the continued planes of floor and wall. LPIPS only where the package and its weights are
-installed. sheet.png, from the left: photo, true glass, two_interface by true and by predicted d, closed by predicted d,
-before the true and the inpainted background.
+docs/benchmarks.md says what the rows are. `frame` spreads the same squared error over all pixels of the picture, as a
+metric does that is computed after everything outside the mask was made black. The error of `d` is mean absolute over
+mean true thickness; `noise` multiplies the predicted d by 1 + e, e uniform in [-0.5, 0.5], one e a draw. The inpainted
+background is that of `materialist glass`. LPIPS only where the package and its weights are installed. sheet.png, from
+the left: photo, true glass, two_interface by true and by predicted d, closed by predicted d, before the true and the
+inpainted background.
 """
 
 from __future__ import annotations

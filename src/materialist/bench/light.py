@@ -3,17 +3,13 @@
 The paper's protocol (section "Environment Map Optimization", tables "Quantitative evaluation of envmap optimization"
 and "Ablation study on envmap settings"): scenes x viewpoints x lightings; full size 10 x 10 x 10.
 
-Light fitted to synthetic photographs whose materials, geometry and light are known. `envmap` figures compare the fitted
-with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure fitted; MSE linear and unclipped). `render`
-figures compare the true scene under the fitted light with the photograph, `mesh` the depth mesh under it with the
-photograph, `relit` the depth mesh under another light with the true picture of it. `ceiling` is the depth mesh with the
-true maps and the true light: what no fit on this mesh can beat. `inversion` is the whole inversion by the default
-preset, light and materials, with the true maps as its prior. `with walls`: walls and ceilings are continued, too
-(`--completion planes`); `w/o planes`: nothing is (`none`). `w/o mat`: albedo and roughness 0.5, metallic 0.1 were given
-instead of the true maps. Seconds are those of the light fit and its ray tracing and for `inversion` those of all of it;
-CPU seconds add up all processors and hardly depend on what else the computer does. The first sample's hold the
-compilation of kernels that the computer has not met before. `128x64`: the paper's MLP is evaluated on a map of that
-size inside the fit instead of 512x256, which makes its steps cheaper.
+Light fitted to synthetic photographs whose materials, geometry and light are known; docs/benchmarks.md says what the
+rows are. `envmap` figures compare the fitted with the true map (SSIM and PSNR sRGB-encoded and clipped, no exposure
+fitted; MSE linear and unclipped), `render` figures the true scene under the fitted light with the photograph, `mesh`
+the depth mesh under it with the photograph, `relit` the depth mesh under another light with the true picture of it.
+`with walls`: walls and ceilings are continued, too (`--completion planes`); `w/o planes`: nothing is (`none`). Seconds
+are those of the light fit and its ray tracing and for `inversion` those of all of it; CPU seconds add up all
+processors. The first sample's hold the compilation of kernels that the computer has not met before.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import numpy as np
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder, whole_file
+from materialist.io.atomic import make_folder, whole_file, writing
 from materialist.io.display import write_sheet
 from materialist.plain import plain
 from materialist.types import Array
@@ -58,12 +58,10 @@ def strip(*pictures: Array) -> Array:
 
 def claim(folder: Path, *, force: bool = False) -> Path:
     """Make the folder for a report; raises OutputError when it holds something, unless `force`."""
-    try:
+    with writing(folder):
         if folder.is_dir() and any(folder.iterdir()) and not force:
             raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")
         make_folder(folder)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be made: {error.strerror or error}.") from error
     return folder
 
 

@@ -198,11 +198,10 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
 
 
 def _answers(address: str) -> bool:
-    try:
+    with contextlib.suppress(OSError):
         urllib.request.urlopen(address, timeout=10).close()
-    except OSError:
-        return False
-    return True
+        return True
+    return False
 
 
 @contextlib.contextmanager

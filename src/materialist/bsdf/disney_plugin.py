@@ -122,5 +122,4 @@ def _define():
 
 
 def register() -> None:
-    """Make the plugin known to the active variant."""
     mi.register_bsdf(PLUGIN, _define())

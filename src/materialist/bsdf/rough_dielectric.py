@@ -49,7 +49,6 @@ def directional_albedo(ior: float, alpha: float) -> Array:
 
 
 def register() -> None:
-    """Make the plugin known to the active variant."""
     import drjit as dr
     import mitsuba as mi
 

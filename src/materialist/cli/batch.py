@@ -10,7 +10,7 @@ import typer
 from materialist.batches.options import BatchOptions
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import StageProgress
+from materialist.cli.progress import Progress, stage_progress
 from materialist.errors import Interrupted
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def batch(
     from materialist.batches.run import batch as run
 
     try:
-        with StageProgress(quiet=computing.as_json) as bars:
+        with stage_progress(quiet=computing.as_json) as bars:
             outcome = run(
                 source, output, **vars(how), predictor=predictor, size=size, fov=fov, seed=computing.seed,
                 device=computing.device, progress=lambda status: _told(bars, status, computing.as_json),
@@ -59,7 +59,7 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
     )  # fmt: skip
 
 
-def _told(bars: StageProgress, status: Status, quiet: bool) -> None:
+def _told(bars: Progress, status: Status, quiet: bool) -> None:
     """The state of the batch as a bar, and what has just happened as a line."""
     over = status.done + status.failed
     bars("photos", over, status.total)

@@ -54,7 +54,7 @@ def relight(
     else:
         if rendering.save is not None:
             raise InputError("--save writes one scene; leave out --frames.")
-        check_before(output, rendering, run, video=fps)
+        check_before(output, rendering, run, video=True)
     loaded = load_scene(scene)
     marked = chosen_region(loaded, lights, run) if lights.named else None
     wanted = Relight.given(options, sun_power=sun_power, lights=marked)
@@ -88,7 +88,7 @@ def drop(
     from materialist.edits.insert.meshes import read_model
     from materialist.io.package import load_scene
 
-    check_before(output, rendering, run, video=fps)
+    check_before(output, rendering, run, video=True)
     places: Any = [flag_numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = load_scene(scene)

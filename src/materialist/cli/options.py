@@ -19,7 +19,7 @@ def output_option(metavar: str, help: str) -> Any:
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
 PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
-FramesPerSecond = Annotated[int, typer.Option(help="Frames per second.")]
+FramesPerSecond = Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")]
 
 # fmt: off
 

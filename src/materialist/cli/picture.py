@@ -9,7 +9,7 @@ from typing import Any
 
 from materialist.cli.options import Place, Region, Rendering, Run
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import StageProgress
+from materialist.cli.progress import stage_progress
 from materialist.errors import InputError
 from materialist.option_kinds import numbers
 
@@ -45,8 +45,8 @@ def opened(scene: Path, output: Path, region: Place, rendering: Rendering, run: 
     return loaded, chosen_region(loaded, region, run)
 
 
-def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | None = None) -> None:
-    """Everything about the output that can be wrong, before the work starts; `video`: frames a second of a film.
+def check_before(output: Path, rendering: Rendering, run: Run, *, video: bool = False) -> None:
+    """Everything about the output that can be wrong, before the work starts.
 
     All renderings of the command are then done on its device, also those that ask for `auto`.
     """
@@ -64,9 +64,7 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | N
         if output.resolve().is_relative_to(save.resolve()):
             raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
         ensure_writable(save, run.force)
-    if video is not None and not 1 <= video <= 120:
-        raise InputError(f"--fps is a number from 1 to 120, not {video}.")
-    (ensure_image_writable if video is None else ensure_video_writable)(output, force=run.force)
+    (ensure_video_writable if video else ensure_image_writable)(output, force=run.force)
     if run.device != "auto":
         from materialist.render.variant import setup
 
@@ -76,13 +74,12 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: int | N
 def write_result(
     command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
-    """Render, composite, write, report."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.renderer import paths_for
 
     start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)
-    with StageProgress(quiet=run.as_json) as progress:
+    with stage_progress(quiet=run.as_json) as progress:
         picture = composite(
             scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
             denoise=rendering.denoise, device=run.device, progress=progress,
@@ -107,7 +104,7 @@ def write_film(
             last[name] = item
             yield item
 
-    with StageProgress(quiet=run.as_json) as progress:
+    with stage_progress(quiet=run.as_json) as progress:
         made = pictures(
             scene, kept("scene", film), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
             full_render=rendering.full_render, progress=progress, count=frames,

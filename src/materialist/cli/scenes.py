@@ -11,8 +11,7 @@ import typer
 
 from materialist.cli.options import Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import StageProgress
-from materialist.errors import InputError
+from materialist.cli.progress import stage_progress
 from materialist.options import InvertOptions
 
 
@@ -43,7 +42,7 @@ def invert(
     from materialist import pipeline
 
     start = time.monotonic()
-    with StageProgress(quiet=run.as_json) as progress:
+    with stage_progress(quiet=run.as_json) as progress:
         scene = pipeline.invert(picture, options, progress=progress)
     save_scene(scene, output, force=run.force)
     warnings = scene.warnings
@@ -64,7 +63,7 @@ def render(
     scene: SceneArgument,
     output: Annotated[Path, output_option("OUT", "A .png (sRGB) or .exr (linear).")],
     run: Run,
-    spp: Annotated[int, typer.Option(help="Samples per pixel.")] = 64,
+    spp: Annotated[int, typer.Option(min=1, max=1_000_000, help="Samples per pixel.")] = 64,
     denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
 ) -> None:
     """Path-trace a scene package."""
@@ -75,8 +74,6 @@ def render(
     from materialist.io.image import ensure_image_writable
     from materialist.io.package import load_scene
 
-    if not 1 <= spp <= 1_000_000:
-        raise InputError(f"--spp is a number of samples from 1 to 1000000, not {spp}.")
     ensure_image_writable(output, force=run.force)
     loaded = load_scene(scene)
     from materialist import pipeline

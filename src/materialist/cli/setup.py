@@ -69,13 +69,13 @@ def download_model(
     as_json: Json = False,
 ) -> None:
     """Fetch a model and check it against the hub's checksums; an interrupted download is taken up again."""
-    from materialist.cli.progress import StageProgress
+    from materialist.cli.progress import stage_progress
     from materialist.predict.models import adopt, download, hub_model
 
     if source is not None:
         folder = adopt(hub_model(name), source)
     else:
-        with StageProgress(quiet=as_json) as progress:
+        with stage_progress(quiet=as_json) as progress:
             folder = download(hub_model(name), force=force, progress=progress)
     report_success(
         "models download", as_json, [f"{name} lies in {folder}; its checksums are written"], folder=str(folder)

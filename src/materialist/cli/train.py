@@ -5,20 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from materialist.cli.options import Computing, Learning, Training, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import StageProgress
+from materialist.cli.progress import Progress, stage_progress
 from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
 from materialist.procedural.options import DataSetOptions
-
-if TYPE_CHECKING:
-    from materialist.train.trainer import Progress
-
 
 # fmt: off
 
@@ -68,7 +64,7 @@ def data(
         return
     from materialist.procedural.dataset import produce
 
-    with StageProgress(quiet=computing.as_json) as progress:
+    with stage_progress(quiet=computing.as_json) as progress:
         made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
     lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
     report_success(
@@ -171,7 +167,7 @@ def _train(
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
     checkpoint.resumed(output, kind, resume=training.resume)
-    with StageProgress(quiet=training.as_json) as progress:
+    with stage_progress(quiet=training.as_json) as progress:
         trainer = Trainer(
             make_task(init, progress), output, budget=budget, options=options, device=device, resume=training.resume,
             note=note,

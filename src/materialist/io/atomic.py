@@ -47,15 +47,12 @@ class FolderKind:
 
 
 def _is_scene_file(folder: Path, name: str) -> bool:
-    return SCENE_FILES.fullmatch(name) is not None or name == _original(folder)
-
-
-def _original(folder: Path) -> str:
-    """The name of the photo as it was given in a package."""
+    """Whether a file is one of a package's, or the photo as it was given."""
     try:
-        return str(json.loads((folder / MARKER).read_text("utf-8"))["photo"]["original"])
+        original = json.loads((folder / MARKER).read_text("utf-8"))["photo"]["original"]
     except (OSError, ValueError, KeyError, TypeError):
-        return "original.exr"
+        original = "original.exr"
+    return SCENE_FILES.fullmatch(name) is not None or name == original
 
 
 SCENE = FolderKind("a scene package", MARKER, _is_scene_file)

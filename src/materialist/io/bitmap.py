@@ -223,16 +223,9 @@ def _over_white(linear: Array, alpha: Array, warnings: list[str]) -> Array:
 
 def _upright(pixels: Array, orientation: int) -> Array:
     """Undo an EXIF orientation (1 .. 8)."""
-    turned = {
-        2: lambda p: p[:, ::-1],
-        3: lambda p: p[::-1, ::-1],
-        4: lambda p: p[::-1],
-        5: lambda p: p.swapaxes(0, 1),
-        6: lambda p: p.swapaxes(0, 1)[:, ::-1],
-        7: lambda p: p.swapaxes(0, 1)[::-1, ::-1],
-        8: lambda p: p.swapaxes(0, 1)[::-1],
-    }
-    return np.ascontiguousarray(turned[orientation](pixels)) if orientation in turned else pixels
+    pixels = pixels.swapaxes(0, 1) if orientation in (5, 6, 7, 8) else pixels
+    pixels = pixels[::-1] if orientation in (3, 4, 7, 8) else pixels
+    return np.ascontiguousarray(pixels[:, ::-1] if orientation in (2, 3, 6, 7) else pixels)
 
 
 @contextmanager

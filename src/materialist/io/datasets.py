@@ -80,7 +80,8 @@ class InteriorVerse(Source):
     def refresh(self) -> None:
         self.pictures, self.missing, self.bare = [], [], 0
         for part in parts(self.folder):
-            for scene in _scenes(part / f"{self.split}.txt"):
+            listed = part / f"{self.split}.txt"
+            for scene in listed.read_text("utf-8").split() if listed.is_file() else ():
                 found = sorted((part / scene).glob("*_im.exr"))
                 whole = [path for path in found if all(_sibling(path, name).is_file() for name in MAPS)]
                 self.pictures += whole
@@ -171,11 +172,6 @@ def _mask(path: Path, size: tuple[int, int]) -> Array:
     if values.shape != size:
         raise InputError(f"{file} is {values.shape}, but its picture is {size}.")
     return values > 0.5
-
-
-def _scenes(file: Path) -> list[str]:
-    """Names in a list of scenes; none when the part has no such list."""
-    return file.read_text("utf-8").split() if file.is_file() else []
 
 
 def _sibling(path: Path, name: str) -> Path:

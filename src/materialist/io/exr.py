@@ -68,8 +68,8 @@ def exr_size(header: dict[str, Any]) -> tuple[int, int]:
     return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
 
 
-def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
-    """Write [H, W] (channel Y), [H, W, 3] (RGB) or [H, W, 4] (RGBA) as float32, or as float16 with `half`.
+def write_exr(path: str | Path, array: Array) -> None:
+    """Write [H, W] (channel Y), [H, W, 3] (RGB) or [H, W, 4] (RGBA) as float32.
 
     Raises InputError for another shape, OutputError when the file cannot be written.
     """
@@ -79,7 +79,7 @@ def write_exr(path: str | Path, array: Array, half: bool = False) -> None:
     names = {2: "Y"}.get(array.ndim) or {(3, 3): "RGB", (3, 4): "RGBA"}.get((array.ndim, array.shape[-1]))
     if names is None:
         raise InputError(f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}.")
-    pixels = np.ascontiguousarray(array, np.float16 if half else np.float32)
+    pixels = np.ascontiguousarray(array, np.float32)
     if not is_utf8(str(path)):
         raise OutputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another.")
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

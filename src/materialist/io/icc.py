@@ -53,11 +53,11 @@ def matrix_profile(profile: bytes) -> MatrixProfile | None:
         tags = _tags(profile)
         if profile[16:20] != b"RGB " or profile[20:24] != b"XYZ " or b"rXYZ" not in tags:
             return None
-        columns = [_xyz(tags[name]) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
+        columns = [struct.unpack_from(">3i", tags[name], 8) for name in (b"rXYZ", b"gXYZ", b"bXYZ")]
         curves = tuple(_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC"))
     except (KeyError, ValueError, IndexError, struct.error):
         return None
-    return MatrixProfile(curves, np.linalg.inv(_REC709_D50) @ np.array(columns).T)  # type: ignore[arg-type]
+    return MatrixProfile(curves, np.linalg.inv(_REC709_D50) @ np.array(columns).T / 65536)  # type: ignore[arg-type]
 
 
 def _tags(profile: bytes) -> dict[bytes, bytes]:
@@ -65,11 +65,6 @@ def _tags(profile: bytes) -> dict[bytes, bytes]:
     (count,) = struct.unpack_from(">I", profile, 128)
     entries = (struct.unpack_from(">4sII", profile, 132 + 12 * i) for i in range(min(count, 200)))
     return {name: profile[start : start + size] for name, start, size in entries}
-
-
-def _xyz(data: bytes) -> list[float]:
-    """An XYZType tag: three s15Fixed16 numbers."""
-    return [value / 65536 for value in struct.unpack_from(">3i", data, 8)]
 
 
 def _curve(data: bytes) -> Array:

@@ -73,7 +73,6 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
 
 
 def _write(scene: Scene, folder: Path) -> None:
-    """Every file of the package into an empty folder."""
     photo = scene.photo
     write_exr(folder / "photo.exr", photo.linear)
     write_png(folder / "photo.png", photo.linear)
@@ -100,7 +99,6 @@ def _write(scene: Scene, folder: Path) -> None:
 
 
 def _meta(scene: Scene, original: str) -> dict[str, Any]:
-    """The content of scene.json."""
     photo = scene.photo
     return {
         "format": FORMAT,
@@ -155,7 +153,6 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
 
 
 def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    """Materials, normals and depth of a folder."""
     names = ("albedo", "roughness", "metallic", "normal", "depth")
     maps = [_exr(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in names]
     return Materials(*maps[:3]), maps[3], maps[4]
@@ -175,7 +172,6 @@ def _exr(path: Path, shape: tuple[int, ...] | None) -> Array:
 
 
 def _read_labels(path: Path, shape: tuple[int, int]) -> Array:
-    """[H, W] int8 plane labels."""
     from PIL import Image
 
     try:

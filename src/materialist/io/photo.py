@@ -152,7 +152,6 @@ def _working(original: Array, size: int) -> Array:
 
 
 def _require_content(linear: Array, name: str) -> None:
-    """Refuse a picture with nothing to fit."""
     low, high = float(linear.min()), float(linear.max())
     if high <= 1e-4:
         raise InputError(f"{name} is entirely black; there is no light in it to explain.")

@@ -6,7 +6,7 @@ import json
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,9 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file, writing
 from materialist.types import Array, Camera, Materials, Prediction
+
+Progress = Callable[[str, int, int], None]
+"""Told (what, how many are done, how many there are)."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,6 @@ class Sample:
     """[H, W, 3] float32 with image = albedo (1 - metallic) shading + rest; None where it is not known."""
 
     def truth(self) -> Prediction:
-        """The true maps as a prediction."""
         return Prediction(
             Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, predictor="truth"
         )
@@ -170,6 +172,16 @@ def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
     """An .npz of arrays, whole or not at all. Raises OutputError where it cannot be written."""
     with whole_file(path, force=True) as temporary, open(temporary, "wb") as file:
         np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def complete(
+    folder: Path, names: Sequence[str], make: Callable[[int], dict[str, Array]], what: str, progress: Progress
+) -> None:
+    """Write those of the files that FOLDER lacks, each whole or not at all: `make` gives the arrays of number k."""
+    for k, name in enumerate(names):
+        if not (folder / name).exists():
+            write_arrays(folder / name, make(k))
+        progress(what, k + 1, len(names))
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:

@@ -22,9 +22,9 @@ def mse(a: Array, b: Array, *, mask: Array | None = None) -> float:
     return _mean_square(linear_to_srgb(_checked(a, b)), linear_to_srgb(b), mask)
 
 
-def mse_linear(a: Array, b: Array, *, mask: Array | None = None) -> float:
+def mse_linear(a: Array, b: Array) -> float:
     """Mean squared error of [H, W, 3] arrays as they are: linear, not clipped (the paper's MSE of envmaps)."""
-    return _mean_square(_checked(a, b), np.asarray(b, np.float32), mask)
+    return _mean_square(_checked(a, b), np.asarray(b, np.float32))
 
 
 def psnr(a: Array, b: Array, *, mask: Array | None = None) -> float:
@@ -40,7 +40,7 @@ def psnr_without_noise(first: Array, second: Array, b: Array) -> float:
     (all sRGB-encoded, clipped to [0, 1]): unbiased but for what encoding makes of noise. At most 80 dB, where chance
     takes more away than there is.
     """
-    noise = _mean_square(linear_to_srgb(_checked(first, second)), linear_to_srgb(second), None) / 4
+    noise = _mean_square(linear_to_srgb(_checked(first, second)), linear_to_srgb(second)) / 4
     return float(-10 * np.log10(max(mse((first + second) / 2, b) - noise, 1e-8)))
 
 
@@ -102,10 +102,9 @@ def sh_error(a: Array, b: Array, degree: int = 3) -> float:
     return _rms_norm(sh_coefficients(a, degree) - sh_coefficients(b, degree))
 
 
-def sh_error_relative(estimate: Array, truth: Array, degree: int = 3) -> float:
+def sh_error_relative(estimate: Array, truth: Array) -> float:
     """`sh_error` divided by the same norm of the true envmap: 0 is perfect, 1 is as bad as darkness."""
-    norm = _rms_norm(sh_coefficients(truth, degree))
-    error = sh_error(estimate, truth, degree)
+    norm, error = _rms_norm(sh_coefficients(truth)), sh_error(estimate, truth)
     return error / norm if norm > 0 else (0.0 if error == 0 else float("inf"))
 
 
@@ -148,7 +147,7 @@ def _rms_norm(coefficients: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(coefficients**2, axis=0))))
 
 
-def _mean_square(a: Array, b: Array, mask: Array | None) -> float:
+def _mean_square(a: Array, b: Array, mask: Array | None = None) -> float:
     """Mean of (a - b)**2 over pixels (of mask [H, W], if given) and channels, in double precision."""
     square = (a.astype(np.float64) - b) ** 2
     if mask is not None:

@@ -17,17 +17,19 @@ from materialist.types import Array, Prediction
 
 LEAST_SURFACE = 0.01
 """A picture with less surface than this part of it is not scored."""
+PAIRS, ORDERED = 50_000, 0.02
+"""Pixel pairs whose order in depth is compared, and the relative difference from which a pair has one."""
 
 
-def score(predicted: Prediction, true: Prediction, *, mask: Array | None = None) -> dict[str, float]:
-    """All figures for one picture; maps of both have one size. `mask` [H, W] bool narrows down what counts.
+def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
+    """All figures for one picture; maps of both have one size.
 
     Keys: albedo_psnr, albedo_ssim (aligned), albedo_psnr_raw, albedo_ssim_raw, albedo_scale, roughness_psnr,
     roughness_ssim, metallic_psnr, metallic_ssim, depth_mae, depth_rmse (aligned), depth_mae_raw, depth_rmse_raw,
     depth_si_log_rmse, depth_coverage, normal_angle, mask_iou. PSNR in dB, angle in degrees. Empty when there is
     next to no surface. Square errors are given as *_mse as well, so that a set can be pooled.
     """
-    surface = true.depth > 0 if mask is None else (true.depth > 0) & mask
+    surface = true.depth > 0
     if surface.mean() < LEAST_SURFACE:
         return {}
     found = _albedo(predicted.materials.albedo, true.materials.albedo, surface)
@@ -58,19 +60,16 @@ def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, fl
     return found
 
 
-def ordinal_accuracy(
-    predicted: Array, true: Array, *, pairs: int = 50_000, tolerance: float = 0.02, seed: int = 0
-) -> float:
-    """Part of random pixel pairs whose order in depth [H, W] is right; those closer than `tolerance` do not count.
+def ordinal_accuracy(predicted: Array, true: Array) -> float:
+    """Part of random pixel pairs whose order in depth [H, W] is right; those closer than ORDERED do not count.
 
     A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out; what is
     predicted to have none (0) is sky, behind everything.
     """
-    rng = np.random.default_rng(seed)
-    known = np.flatnonzero(true > 0)
-    first, second = rng.choice(known, pairs), rng.choice(known, pairs)
+    rng, known = np.random.default_rng(0), np.flatnonzero(true > 0)
+    first, second = rng.choice(known, PAIRS), rng.choice(known, PAIRS)
     t = np.log(true.ravel()[first]) - np.log(true.ravel()[second])
-    clear = np.abs(t) > np.log1p(tolerance)
+    clear = np.abs(t) > np.log1p(ORDERED)
     found = np.where(predicted > 0, predicted, np.inf).ravel()
     a, b = found[first], found[second]
     right = np.where(a == b, 0.5, (a > b) == (t > 0))

@@ -49,11 +49,17 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
     return found
 
 
-def _open(spec: str, device: str) -> Predictor:
-    """The predictor of one source. Raises as `get_predictor`."""
+def parsed(spec: str) -> tuple[str, str]:
+    """Name of a predictor, and what follows its colon. Raises InputError for an unknown name."""
     name, _, argument = spec.partition(":")
     if name not in CLASSES or (argument and name in ("auto", "constant")):
         raise InputError(f"There is no predictor '{spec}'; choose one of {CHOICES}.")
+    return name, argument
+
+
+def _open(spec: str, device: str) -> Predictor:
+    """The predictor of one source. Raises as `get_predictor`."""
+    name, argument = parsed(spec)
     module, _, kind = CLASSES[name].partition(":")
     make = getattr(import_module(f"materialist.predict.{module}"), kind)
     if name == "constant":

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from materialist.errors import WeightsError
+from materialist.io.atomic import whole_file
 
 if TYPE_CHECKING:
     from torch import Tensor, nn
@@ -113,9 +114,8 @@ def write_weights(path: Path, tensors: Mapping[str, Tensor], texts: dict[str, st
     from safetensors.torch import save_file
 
     half = {name: tensor.detach().cpu().to(torch.float16).contiguous() for name, tensor in tensors.items()}
-    partial = path.with_name(path.name + ".part")
-    save_file(half, str(partial), texts)
-    partial.replace(path)
+    with whole_file(path, force=True) as file:
+        save_file(half, str(file), texts)
 
 
 def metadata(path: Path) -> dict[str, str]:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError
 from materialist.procedural import patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.options import HELD_OUT
+from materialist.procedural.options import captures
 from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array
 
@@ -35,7 +34,7 @@ def arrangement(scene_index: int, *, seed: int, data: Path | None, unseen: bool 
     unseen: natural colours, and of the meshes only those that no training set may use.
     """
     rng = np.random.default_rng([seed, 1, scene_index])
-    meshes = _mesh_files(data, unseen)
+    meshes = captures(data / "meshes", "**/*.ply", unseen or None) if data else []
     items = _room(rng, walls=scene_index % 3, natural=unseen)
     taken: list[tuple[float, float, float]] = []
     for _ in range(int(rng.integers(3, 8))):
@@ -67,16 +66,6 @@ def in_camera(item: Item, camera: Viewpoint) -> Item:
     solid = item.solid
     vertices = (solid.vertices - camera.position) @ camera.to_scene
     return replace(item, solid=replace(solid, vertices=vertices, normals=solid.normals @ camera.to_scene))
-
-
-def _mesh_files(data: Path | None, unseen: bool) -> list[Path]:
-    """The PLY files below DATA/meshes; raises InputError when DATA is given and has none."""
-    if data is None:
-        return []
-    files = [p for p in sorted((data / "meshes").rglob("*.ply")) if not unseen or p.stem in HELD_OUT]
-    if not files:
-        raise InputError(f"{data / 'meshes'} holds no .ply meshes; give a folder that does, or leave out --data.")
-    return files
 
 
 def _room(rng: np.random.Generator, walls: int, natural: bool) -> list[Item]:

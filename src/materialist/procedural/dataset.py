@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import numpy as np
 
 from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import SampleFolder, claim, described, write_arrays
+from materialist.io.samples import Progress, SampleFolder, claim, described, write_arrays
 from materialist.procedural.objects import things
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
@@ -26,7 +26,6 @@ CONTENT = 7
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
 """What decides what the samples of a set hold."""
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -110,21 +109,15 @@ def _description(options: DataSetOptions) -> dict[str, Any]:
     return told | {"options": drawn | ({"only": options.only} if options.only else {}), "tool_version": __version__}
 
 
-def read_description(folder: str | Path) -> dict[str, Any]:
-    """The content of DIR/dataset.json. Raises InputError where there is none that this version can read."""
+def identity(folder: str | Path) -> dict[str, Any]:
+    """What tells the samples of one set from those of another, whatever their number and place.
+
+    Raises InputError where DIR/dataset.json is none that this version can read.
+    """
     file = Path(folder) / DESCRIPTION
     found = described(file)
     if found is None or found.get("format") != FORMAT:
         raise InputError(f"{file} describes no data set of format {FORMAT}; make one: materialist train data.")
-    return found
-
-
-def identity(folder: str | Path) -> dict[str, Any]:
-    """What tells the samples of one set from those of another, whatever their number and place.
-
-    Raises InputError as `read_description` does.
-    """
-    found = read_description(folder)
     return {name: found.get(name) for name in _IDENTITY}
 
 

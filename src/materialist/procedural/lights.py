@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import luminance
-from materialist.errors import InputError
 from materialist.procedural.objects.shapes import turn_upright
-from materialist.procedural.options import HELD_OUT
+from materialist.procedural.options import captures
 from materialist.types import Array
 
 HEIGHT = 256
@@ -44,11 +43,7 @@ def environment(light_index: int, *, seed: int, data: Path | None, unseen: bool 
     rng = np.random.default_rng([seed, 3, light_index])
     if data is None:
         return _KINDS[light_index % len(_KINDS)](rng)
-    files = [p for p in sorted((data / "envmaps").glob("*.exr")) if not unseen or p.stem in HELD_OUT]
-    if not files:
-        raise InputError(
-            f"{data / 'envmaps'} holds no .exr environment maps; give a folder that does, or leave out --data."
-        )
+    files = captures(data / "envmaps", "*.exr", unseen or None)
     order = np.random.default_rng([seed, 4]).permutation(len(files))
     return _capture(files[order[light_index % len(files)]], rng.uniform(0, 2 * np.pi))
 

@@ -65,7 +65,6 @@ def near(rng: np.random.Generator, colour: Colour, low: float, high: float) -> C
 
 
 def uniform(colour: Colour, roughness: float, metallic: float = 0.0, grain: float = 0.0) -> Material:
-    """One colour all over."""
     return Material(0, (colour,) * 3, grain, (roughness, roughness), (metallic, metallic))
 
 
@@ -117,7 +116,6 @@ class Finish:
     """Whether the tile is turned by 90 degrees half of the time."""
 
     def __call__(self, rng: np.random.Generator) -> Material:
-        """A material of the family."""
         first = shade(rng, self.base)
         rough = rng.uniform(*pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness)))
         size = float(np.exp(rng.uniform(*np.log(self.repeat))))
@@ -209,7 +207,6 @@ METALS = ((0.91, 0.90, 0.88), (0.62, 0.61, 0.60), (0.95, 0.78, 0.36), (0.93, 0.6
 
 
 def fabric(rng: np.random.Generator) -> Material:
-    """Upholstery, curtains, table cloths, clothes."""
     return (woven if rng.random() < 0.3 else printed_cloth)(rng)
 
 

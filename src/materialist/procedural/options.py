@@ -21,6 +21,18 @@ HELD_OUT = frozenset((
 """Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
 
 
+def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[Path]:
+    """Files of a folder by a pattern, sorted: all, or only those that are HELD_OUT, or only the others.
+
+    Raises InputError where there are none.
+    """
+    found = sorted(p for p in folder.glob(pattern) if held_out is None or (p.stem in HELD_OUT) == held_out)
+    if not found:
+        which = "" if held_out is None else f" {'kept aside for testing' if held_out else 'to train on'}"
+        raise InputError(f"{folder} holds no {Path(pattern).suffix} files{which}; give another folder, or none.")
+    return found
+
+
 @dataclass(frozen=True, kw_only=True)
 class DataSetOptions(OperationOptions):
     """What decides, with the number of a sample, what it shows.
@@ -64,7 +76,5 @@ class DataSetOptions(OperationOptions):
             return ()
         if not folder.is_dir():
             raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
-        wanted = [p for p in folder.rglob(f"*{ending}") if (p.stem in HELD_OUT) == (self.split == "heldout")]
-        if not wanted:
-            raise InputError(f"{folder} holds no {ending} file for the split {self.split!r}; give another or none.")
+        wanted = captures(folder, f"**/*{ending}", self.split == "heldout")
         return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))

@@ -191,7 +191,6 @@ def _panels(rng, size, power) -> Parts:
 
 
 def _globes(rng, size, power) -> Parts:
-    """Hanging balls in a row."""
     w, d, h = size
     n, r, drop = int(rng.integers(1, 4)), rng.uniform(0.06, 0.2), rng.uniform(0.3, 0.9)
     glow, cord = _glow(rng, power, n * 4 * np.pi * r * r), m.metal(rng)
@@ -202,7 +201,6 @@ def _globes(rng, size, power) -> Parts:
 
 
 def _shade(rng, size, power) -> Parts:
-    """Floor lamp with a glowing shade."""
     w, d, _ = size
     r, tall, height = rng.uniform([0.12, 1.1, 0.18], [0.25, 1.7, 0.35])
     at = np.array([rng.choice([-1, 1]) * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])

@@ -31,10 +31,14 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
 
     Raises SetupError where Mitsuba or the denoiser is missing.
     """
+    from materialist.procedural.tracer import SampleTracer
+
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([options.seed, index, attempt, *SPLITS[options.split]])
         world = make_world(rng, options)
-        probe, tracer = _look(world, rng, options)
+        camera = Camera(options.size, options.size, world.view.fov)
+        tracer = SampleTracer(packing.pack(world, rng), camera, device=options.device)
+        probe = tracer.probe(PROBE)
         if attempt == ATTEMPTS - 1 or worth_seeing(probe):
             break
     return _developed(world, probe, tracer, rng, options)
@@ -45,14 +49,6 @@ def make_world(rng: np.random.Generator, options: DataSetOptions) -> World:
     makers, shares = zip(*([MAKERS[options.only]] if options.only else MAKERS.values()))
     weight = np.array(shares)
     return makers[rng.choice(len(makers), p=weight / weight.sum())](rng, options.mesh_files, options.envmap_files)
-
-
-def _look(world: World, rng: np.random.Generator, options: DataSetOptions):
-    from materialist.procedural.tracer import SampleTracer
-
-    camera = Camera(options.size, options.size, world.view.fov)
-    tracer = SampleTracer(packing.pack(world, rng), camera, device=options.device)
-    return tracer.probe(PROBE), tracer
 
 
 def worth_seeing(probe: dict[str, Array]) -> bool:
@@ -67,7 +63,6 @@ def worth_seeing(probe: dict[str, Array]) -> bool:
 
 
 def _developed(world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions) -> dict[str, Array]:
-    """Render, denoise, expose, quantise."""
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
     image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, device=tracer.device)

@@ -69,17 +69,13 @@ def make_sample(
     truth_scene = _true_scene(scene_index, view_index, height, width, folder, seed, unseen)
     radiance = lights.environment(light_index, seed=seed, data=folder, unseen=unseen)
     envmap = lights.envmap(radiance, truth_scene.view.to_scene)
-    picture = truth_scene.render(envmap, spp=spp, seed=_photo_seed(scene_index, view_index, light_index))
+    photo_seed = int(np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31))
+    picture = truth_scene.render(envmap, spp=spp, seed=photo_seed)
     exposure = _exposure(picture, truth_scene.truth.depth > 0)
     linear = np.clip(picture * exposure, 0, 1).astype(np.float32)
     name = f"scene {scene_index} view {view_index} light {light_index}"
     photo = Photo(linear=linear, camera=truth_scene.camera, original=linear, fov_source="option", path=name)
     return SyntheticSample(photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene, name)
-
-
-def _photo_seed(*index: int) -> int:
-    """A seed of its own for the path tracer of every photo."""
-    return int(np.random.default_rng(index).integers(1, 2**31))
 
 
 def _exposure(picture: Array, surface: Array) -> float:

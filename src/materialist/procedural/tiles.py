@@ -52,7 +52,6 @@ def _step(x: Array, soft: float = 0.01) -> Array:
 
 
 def _from_line(x: Array) -> Array:
-    """Distance to the nearest whole number."""
     return np.abs(x - np.round(x))
 
 

@@ -68,7 +68,6 @@ def board(left: float, bottom: float, size: ArrayLike, look: m.Material, out: fl
 
 
 def frame(hole: Opening, wide: float, deep: float, look: m.Material) -> Parts:
-    """Boards around a rectangle."""
     left, right, bottom, top = hole
     parts = [board(x, bottom, (wide, top - bottom, deep), look) for x in (left - wide, right)]
     return parts + [board(left - wide, y, (right - left + 2 * wide, wide, deep), look) for y in (bottom - wide, top)]

@@ -9,6 +9,8 @@ from typing import Any
 import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
+from materialist.io.atomic import whole_file
+from materialist.predict.weights import reason
 
 NAME = "checkpoint.pt"
 VERSION = 3
@@ -25,12 +27,10 @@ def save(folder: Path, state: dict[str, Any]) -> None:
 
     state["kind"] is the command whose run it is: 'matnet', 'clicks' or 'refraction'. Raises OutputError.
     """
-    partial = folder / (NAME + ".part")
     try:
-        torch.save({"version": VERSION, **state}, partial)
-        partial.replace(folder / NAME)
-    except (OSError, RuntimeError) as error:
-        partial.unlink(missing_ok=True)
+        with whole_file(folder / NAME, force=True) as file:
+            torch.save({"version": VERSION, **state}, file)
+    except RuntimeError as error:  # torch's own, of a full disk
         raise OutputError(f"The checkpoint cannot be written to {folder}: {error}.") from error
 
 
@@ -52,8 +52,7 @@ def load(folder: Path, kind: str, device: Any = "cpu") -> dict[str, Any]:
     try:
         state = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch raises whatever its unpickler or zip reader raises
-        reason = str(error).splitlines()[0][:200] if str(error) else type(error).__name__
-        raise WeightsError(f"{path} is damaged ({reason}); start the run anew in another folder.") from error
+        raise WeightsError(f"{path} is damaged ({reason(error)}); start the run anew in another folder.") from error
     if not isinstance(state, dict) or state.get("version") != VERSION:
         raise WeightsError(f"{path} is no checkpoint of this version; start the run anew in another folder.")
     if state["kind"] != kind:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,7 +16,7 @@ from torch.nn import functional as F
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.samples import SampleFolder, claim, read_arrays, read_sample, write_arrays
+from materialist.io.samples import Progress, SampleFolder, claim, complete, read_arrays, read_sample
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import features
 from materialist.predict.clicks.network import ClickNet
@@ -27,7 +26,6 @@ from materialist.procedural.photographic import photographic
 from materialist.train.task import Batch, Examples, Recipe, Task
 from materialist.types import Array, Camera, Photo
 
-Progress = Callable[[str, int, int], None]
 DESCRIPTION = "views.json"
 """Of which data set the views beside it are."""
 RECIPE = Recipe(side=224, batch=16, rate=1.5e-3, growth=((0.5, 128),))
@@ -70,8 +68,8 @@ class ClickView:
     """[H, W] int16: number of what is seen, negative for walls and the like, 0 for nothing."""
 
 
-def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None) -> int:
-    """Make the views that FOLDER lacks, by the bundled network; returns how many are there.
+def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None) -> None:
+    """Make the views that FOLDER lacks, by the bundled network.
 
     Raises InputError for a data set without a description or without things and for a FOLDER with views of another
     set, OutputError for one that cannot be written.
@@ -80,22 +78,21 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
     said = identity(data)
     claim(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
-    for number, path in enumerate(source.paths):
-        target = folder / path.name
-        if not target.exists():
-            arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
-            if "thing" not in arrays:
-                raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
-            linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
-            camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
-            found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
-            made = {
-                "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": arrays["thing"],
-                "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
-            }  # fmt: skip
-            write_arrays(target, made)
-        progress("views", number + 1, len(source.paths))
-    return len(source.paths)
+
+    def view(number: int) -> dict[str, Array]:
+        path = source.paths[number]
+        arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
+        if "thing" not in arrays:
+            raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
+        linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
+        camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
+        found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
+        return {
+            "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": arrays["thing"],
+            "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
+        }  # fmt: skip
+
+    complete(folder, [path.name for path in source.paths], view, "views", progress)
 
 
 def load_views(folder: Path) -> list[ClickView]:
@@ -104,15 +101,13 @@ def load_views(folder: Path) -> list[ClickView]:
     return [ClickView(**read_arrays(path, *names)) for path in sorted(folder.glob("[0-9]*.npz"))]
 
 
-def draw_click(
-    view: ClickView, side: int, rng: np.random.Generator, settings: ClickDraw = DRAW
-) -> tuple[Array, Array] | None:
+def draw_click(view: ClickView, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
     """([C, side, side] features, [side, side] bool) of a random part of a view and a click in it; None without things.
 
     The part is mirrored or not and recoloured, its maps are made worse at times; some examples have several clicks.
     """
     height, width = view.thing.shape
-    size = round(min(height, width) * rng.uniform(settings.smallest_crop, 1.0))
+    size = round(min(height, width) * rng.uniform(DRAW.smallest_crop, 1.0))
     top, left = rng.integers(height - size + 1), rng.integers(width - size + 1)
     part = np.s_[top : top + size, left : left + size]
     smooth = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
@@ -127,34 +122,34 @@ def draw_click(
     if rng.random() < 0.5:
         thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
         normal = normal[:, ::-1] * [-1, 1, 1]
-    chosen = _chosen(thing, rng, settings)
+    chosen = _chosen(thing, rng)
     if chosen is None:
         return None
     mask = thing == chosen
-    count = int(rng.integers(2, 4)) if rng.random() < settings.several else 1
+    count = int(rng.integers(2, 4)) if rng.random() < DRAW.several else 1
     known = mask & (depth > 0)
-    clicks = [place for _ in range(count) if (place := click_in(known, rng, settings.depth_inside)) is not None]
+    clicks = [place for _ in range(count) if (place := click_in(known, rng, DRAW.depth_inside)) is not None]
     if not clicks:
         return None
-    if rng.random() < settings.worsened:
-        normal, depth = worse(normal, depth, rng, settings)
+    if rng.random() < DRAW.worsened:
+        normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
     return features(rgb, normal, depth, clicks), mask
 
 
-def worse(normal: Array, depth: Array, rng: np.random.Generator, settings: ClickDraw = DRAW) -> tuple[Array, Array]:
+def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """Normals [H, W, 3] and depth [H, W] as of a photo that the network understands badly: blurred, with slow waves.
 
     Pixels without depth keep none.
     """
     side, known = max(depth.shape), depth > 0
     blur = lambda v, s: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)  # noqa: E731
-    sigma = float(np.exp(rng.uniform(*np.log(settings.blur))))
+    sigma = float(np.exp(rng.uniform(*np.log(DRAW.blur))))
     logarithm = np.log(np.where(known, depth, 1)) * known
     share = np.maximum(blur(known, sigma), 1e-3)
     even = blur(logarithm, sigma) / share
     waves = blur(rng.normal(size=(*depth.shape, 4)), rng.uniform(0.06, 0.2))
-    waves = waves * (rng.uniform(0, settings.waves) / max(float(waves.std()), 1e-6))
+    waves = waves * (rng.uniform(0, DRAW.waves) / max(float(waves.std()), 1e-6))
     spread = float(even[known].std()) if known.any() else 0.0
     bent = np.where(known, np.exp(even + waves[..., 3] * spread), 0).astype(np.float32)
     return unit(blur(normal * known[..., None], sigma) / share[..., None] + waves[..., :3]), bent
@@ -170,15 +165,15 @@ def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int,
     return int(column), int(row)
 
 
-def _chosen(thing: Array, rng: np.random.Generator, settings: ClickDraw) -> int | None:
+def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
     """The number of something to click on: things rather than walls, large ones somewhat rather than small ones."""
     numbers, count = np.unique(thing[thing != 0], return_counts=True)
-    large = count >= settings.fewest_pixels
+    large = count >= DRAW.fewest_pixels
     numbers, count = numbers[large], count[large]
     if not len(numbers):
         return None
     weight = np.sqrt(count)
-    for kind, share in ((numbers > 0, settings.things), (numbers < 0, 1 - settings.things)):
+    for kind, share in ((numbers > 0, DRAW.things), (numbers < 0, 1 - DRAW.things)):
         if kind.any():
             weight[kind] *= share / weight[kind].sum()
     return int(rng.choice(numbers, p=weight / weight.sum()))

@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 SILOG_LAMBDA = 0.5
-"""Weight of the mean term (paper, equation of L_D)."""
+"""Weight of the mean term (paper, equation of L_D): 1 would not see the scale at all, 0 fully."""
 SILOG_RANGE = (1e-3, 20.0)
 """Depths that count (paper: "we set the mask to a depth value in [0, 20]"); a logarithm needs more than 0."""
 
@@ -37,22 +37,18 @@ def cosine(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     return mean(1 - F.cosine_similarity(predicted, true, dim=1).unsqueeze(1), mask)
 
 
-def silog(predicted: Tensor, true: Tensor, mask: Tensor, lam: float = SILOG_LAMBDA) -> Tensor:
-    """The paper's L_D of depths: sqrt(E[g^2] - lam E[g]^2), g = log true - log predicted, for depths in (0, 20].
-
-    lam = 1 does not see the scale at all, lam = 0 sees it fully.
-    """
+def silog(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    """The paper's L_D of depths: sqrt(E[g^2] - lambda E[g]^2), g = log true - log predicted, for depths in (0, 20]."""
     mask = mask * ((true > SILOG_RANGE[0]) & (true <= SILOG_RANGE[1]))
     g = true.clamp(min=SILOG_RANGE[0]).log() - predicted.clamp(min=SILOG_RANGE[0]).log()
     # A root has no gradient at 0.
-    return (mean(g.square(), mask) - lam * mean(g, mask).square()).clamp(min=1e-8).sqrt()
+    return (mean(g.square(), mask) - SILOG_LAMBDA * mean(g, mask).square()).clamp(min=1e-8).sqrt()
 
 
-def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor, limit: float = 2.0) -> Tensor:
+def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """L1 of logarithmic depths after each picture's mean difference is removed: blind to scale, robust to outliers."""
     difference = predicted - true
-    shift = per_picture(difference, mask)
-    return mean((difference - shift).abs().clamp(max=limit), mask)
+    return mean((difference - per_picture(difference, mask)).abs().clamp(max=2), mask)
 
 
 def scaled_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:

@@ -80,7 +80,6 @@ class PaperTask(MapsTask):
         return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        """The five losses of L_MatNet, all with weight 1."""
         image, mask = batch["image"], batch["mask"]
         height, width = image.shape[-2:]
         size = _patches(height), _patches(width)

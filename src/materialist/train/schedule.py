@@ -6,8 +6,9 @@ import math
 import signal
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 from materialist.errors import InputError
@@ -49,7 +50,6 @@ class TrainingSchedule:
         self._start = time.monotonic()
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for a checkpoint."""
         return {
             "step": self.step, "seconds": self.seconds, "steps": self.budget.steps, "minutes": self.budget.minutes,
             "first_step": self.first_step, "first_seconds": self._first_seconds, "done": self.done,
@@ -69,7 +69,6 @@ class TrainingSchedule:
 
     @property
     def done(self) -> bool:
-        """Whether the budget is spent."""
         return self.progress >= 1
 
     def rate(self, warm_up: int, last: float) -> float:
@@ -82,32 +81,34 @@ class TrainingSchedule:
         return rise * (last + (1 - last) * 0.5 * (1 + math.cos(math.pi * self.progress)))
 
 
+@dataclass
 class StopRequest:
-    """Notes SIGTERM or Ctrl-C so that a run can end with a checkpoint; the second signal ends it at once.
+    """Whether a run was asked to end with a checkpoint, and whether by Ctrl-C."""
+
+    asked: bool = False
+    interrupted: bool = False
+
+
+@contextmanager
+def stop_requests() -> Iterator[StopRequest]:
+    """Note SIGTERM or Ctrl-C, so that a run can end with a checkpoint; the second signal ends it at once.
 
     Outside of the main thread nothing is noted.
     """
+    found, before = StopRequest(), dict[int, Any]()
 
-    def __init__(self) -> None:
-        self.asked = False
-        self.interrupted = False
-        """Whether the signal was Ctrl-C."""
-        self._before: dict[int, Any] = {}
+    def restore() -> None:
+        while before:
+            number, handler = before.popitem()
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
-    def __enter__(self) -> StopRequest:
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGTERM, signal.SIGINT):
-                self._before[number] = signal.signal(number, self._note)
-        return self
+    def note(number: int, _: Any) -> None:
+        found.asked, found.interrupted = True, number == signal.SIGINT
+        restore()
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None):
-        self._restore()
-
-    def _restore(self) -> None:
-        while self._before:
-            number, before = self._before.popitem()
-            signal.signal(number, signal.SIG_DFL if before is None else before)
-
-    def _note(self, number: int, _: Any) -> None:
-        self.asked, self.interrupted = True, number == signal.SIGINT
-        self._restore()
+    if threading.current_thread() is threading.main_thread():
+        before.update({number: signal.signal(number, note) for number in (signal.SIGTERM, signal.SIGINT)})
+    try:
+        yield found
+    finally:
+        restore()

@@ -13,14 +13,14 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from materialist.errors import InputError, OutputError
-from materialist.io.atomic import make_folder
+from materialist.errors import InputError
+from materialist.io.atomic import make_folder, writing
+from materialist.io.samples import Progress
 from materialist.train import checkpoint, stream
-from materialist.train.schedule import Budget, StopRequest, TrainingSchedule
+from materialist.train.schedule import Budget, StopRequest, TrainingSchedule, stop_requests
 from materialist.train.task import Batch, Task
 
 Note = Callable[[str], None]
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -74,10 +74,8 @@ class Trainer:
         self.last_scores: dict[str, Any] = {}
         if state is not None:
             self._restore(state)
-        try:
+        with writing(folder):
             make_folder(folder)
-        except OSError as error:
-            raise OutputError(f"{folder} cannot be made ({error.strerror or error}); choose another folder.") from error
         for text in task.notes:
             note(text)
 
@@ -86,7 +84,7 @@ class Trainer:
 
         Always leaves a checkpoint and the averaged weights.
         """
-        with StopRequest() as stop:
+        with stop_requests() as stop:
             self._train(stop, progress)
             self.interrupted = stop.interrupted
             scores = {} if stop.asked else self.score()
@@ -115,7 +113,6 @@ class Trainer:
                 since += saved - start  # the curve tells the speed of training alone
 
     def save(self) -> None:
-        """Write the averaged weights and the checkpoint."""
         schedule = self.schedule.as_dict()
         facts = {
             "step": schedule["step"], "minutes": round(schedule["seconds"] / 60, 1),
@@ -185,7 +182,6 @@ class Trainer:
             mine.copy_(theirs)
 
     def _report(self, losses: dict[str, float], count: int, seconds: float, progress: Progress) -> None:
-        """One line of the curve."""
         line: dict[str, Any] = {"step": self.schedule.step, "seconds": self.schedule.seconds, "epoch": self.epoch}
         line |= {"rate": self.optimizer.param_groups[0]["lr"]}
         line |= {"per_second": count * self.recipe.batch / max(seconds, 1e-6)}
@@ -194,7 +190,6 @@ class Trainer:
         progress("train", round(1000 * self.schedule.progress), 1000)
 
     def _restore(self, state: dict[str, Any]) -> None:
-        """Go on from a checkpoint."""
         if state["architecture"] != self.network.architecture.as_dict():
             raise InputError(f"{self.folder} holds a run of another network; resume it with the options it began with.")
         self.network.load_state_dict(state["network"])

@@ -27,7 +27,6 @@ def _board_look(rng) -> m.Material:
 
 
 def _cluttered(rng, width, depth, height, count, meshes) -> Parts:
-    """Things on a surface."""
     return placed(things.scattered(rng, count, (width / 2, depth / 2), (0.08, 0.38), meshes), (0, height + 0.003, 0))
 
 
@@ -45,7 +44,6 @@ def table(rng, meshes=(), fewest: int = 0) -> Parts:
 
 
 def set_table(rng, meshes=()) -> Parts:
-    """A table with many things on it."""
     return table(rng, meshes, 3)
 
 
@@ -65,7 +63,6 @@ def chair(rng, meshes=()) -> Parts:
 
 
 def sofa(rng, meshes=()) -> Parts:
-    """Sofa or armchair with cushions."""
     width = rng.uniform(0.75, 1.0) if rng.random() < 0.5 else rng.uniform(1.4, 2.3)
     depth, seat, back, arm, r = rng.uniform([0.75, 0.36, 0.3, 0.1, 0.03], [0.95, 0.45, 0.5, 0.22, 0.09])
     cloth = m.fabric(rng)
@@ -102,7 +99,6 @@ def cupboard(rng, meshes=()) -> Parts:
 
 
 def sideboard(rng, meshes=()) -> Parts:
-    """A low cupboard with things on it."""
     return _closed(rng, rng.uniform(0.45, 1.0), meshes)
 
 
@@ -133,7 +129,6 @@ def kitchen(rng, meshes=()) -> Parts:
 
 
 def shelf(rng, meshes=()) -> Parts:
-    """Open shelves with rows of books and things."""
     width, depth, height = rng.uniform([0.6, 0.25, 0.9], [1.8, 0.38, 2.2])
     levels, look = int(rng.integers(2, 6)), _board_look(rng)
     parts = [block((0.025, height, depth), (x * width / 2, 0, 0), look) for x in (-1, 1)]
@@ -161,7 +156,6 @@ def _shelf_load(rng, width, depth, height, meshes) -> Parts:
 
 
 def bed(rng, meshes=()) -> Parts:
-    """Bed with a rumpled cover and pillows."""
     width, length, height, head = rng.uniform([0.9, 1.9, 0.35, 0.7], [1.8, 2.1, 0.5, 1.2])
     frame, cover, wave = _board_look(rng), m.fabric(rng), s.lumps(rng, 0.05, 2.0)
     soft = s.sheet((-width / 2 - 0.02, 0, length / 2), (width + 0.04, 0, 0), (0, 0, -length * 0.85), 44)

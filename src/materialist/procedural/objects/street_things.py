@@ -100,7 +100,6 @@ def person(rng, meshes=()) -> Parts:
 
 
 def post(rng) -> Parts:
-    """Lamp post, bollard or sign."""
     height, look = rng.uniform(0.8, 5), m.one_of(rng, m.metal, m.plastic)
     parts = [rod([(0, 0, 0), (0, height, 0)], rng.uniform(0.04, 0.12), look, 12)]
     if height > 2 and rng.random() < 0.7:

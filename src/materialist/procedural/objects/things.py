@@ -118,7 +118,6 @@ def _bowl(rng, size) -> Parts:
 
 
 def _bottle(rng, size) -> Parts:
-    """Bottle with a cap and a label."""
     r, neck, shoulder = size * rng.uniform(0.12, 0.2), rng.uniform(0.3, 0.5), rng.uniform(0.5, 0.75)
     profile = np.array([(1e-3, 0), (0.95, 0), (1, 0.03), (1, shoulder), (neck + 0.1, shoulder + 0.15), (neck, 0.92),
                         (neck * 1.1, 0.93), (neck * 1.1, 1), (1e-3, 1)]) * [r, size]  # fmt: skip
@@ -133,7 +132,6 @@ def _bottle(rng, size) -> Parts:
 
 
 def _books(rng, size) -> Parts:
-    """A stack of books."""
     parts, top, paper = [], 0.0, m.uniform(m.hsv(0.12, 0.12, 0.9), 0.8, grain=0.2)
     for _ in range(int(rng.integers(1, 6))):
         w, h, d = extent = size * rng.uniform([0.7, 0.06, 0.5], [1.1, 0.2, 0.8])
@@ -146,7 +144,6 @@ def _books(rng, size) -> Parts:
 
 
 def plant(rng, size) -> Parts:
-    """Pot plant: a pot, stems, leaves."""
     pot, leaf, n = size * rng.uniform(0.25, 0.4), m.foliage(rng), int(rng.integers(20, 120))
     control, height = np.array([(0.75, 0), (0.9, 0.5), (1, 1)]) * [pot * 0.5, pot], size - pot
     soil = ScenePart(s.moved(s.disc(pot * 0.46), (0, 0.85 * pot, 0)), m.uniform(m.hsv(0.07, 0.5, 0.25), 0.9, grain=0.8))
@@ -187,7 +184,6 @@ def _stacked(rng, size) -> Parts:
 
 
 def cushion(rng, size) -> Parts:
-    """A soft cushion, leaning back."""
     base = s.superquadric(size * np.array([1, rng.uniform(0.7, 1), 0.3]), 0.35, 0.35, 24)
     bump = s.lumps(rng, 0.05 * size, 2 / size)
     solid = s.warped(base, lambda p: p + bump(p)[:, None] * [0, 0, 1])

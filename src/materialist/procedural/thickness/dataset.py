@@ -7,21 +7,19 @@ not drawn, since the network is not shown it.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from materialist.errors import InputError
-from materialist.io.samples import claim, read_arrays, write_arrays
+from materialist.io.samples import Progress, claim, complete, read_arrays
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
 from materialist.procedural.objects.glassware import SPLITS, Shape, make_shape
 from materialist.procedural.thickness.ray_paths import Paths, ShapeTracer, towards
 from materialist.types import Array
 
-Progress = Callable[[str, int, int], None]
 DESCRIPTION = "views.json"
 FORMAT = 3
 
@@ -38,19 +36,14 @@ class ViewPlan:
     seed: int = 0
 
 
-def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) -> float:
-    """Make the views that FOLDER lacks; shape i depends on the plan's split and seed and on i alone. Returns seconds.
+def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) -> None:
+    """Make the views that FOLDER lacks; shape i depends on the plan's split and seed and on i alone.
 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
     """
     claim(folder, DESCRIPTION, {"format": FORMAT, **asdict(plan)}, ("format", "views", "split", "seed"))
-    start = time.monotonic()
-    for index in range(plan.shapes):
-        path = folder / f"{index:05d}.npz"
-        if not path.exists():
-            write_arrays(path, make_views(index, plan))
-        progress("shapes", index + 1, plan.shapes)
-    return time.monotonic() - start
+    names = [f"{index:05d}.npz" for index in range(plan.shapes)]
+    complete(folder, names, lambda index: make_views(index, plan), "shapes", progress)
 
 
 def make_views(index: int, plan: ViewPlan) -> dict[str, Array]:
@@ -149,7 +142,7 @@ def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -
     turn = rng.uniform(0, 2 * np.pi)
     tilt = np.radians(rng.uniform(-5, 55)) if upright else np.arcsin(rng.uniform(-0.5, 0.95))
     roll = rng.normal(0, 0.06)
-    to_camera = _about(2, roll) @ _about(0, tilt) @ _about(1, turn)
+    to_camera = Rotation.from_euler("yxz", [turn, tilt, roll]).as_matrix()
     distance = np.exp(rng.uniform(np.log(1.4), np.log(6)))
     aside = rng.uniform(-0.35, 0.35, 2) * distance * rng.uniform(0, 1)
     return CameraPose(stretch, to_camera, np.array([*aside, -distance]))
@@ -179,15 +172,6 @@ def look(tracer: ShapeTracer, pose: CameraPose, rays: Array) -> tuple[Paths, Arr
     flat = rays.reshape(-1, 3)
     first, last = towards(paths.normal @ back, flat, -1), towards(paths.exit_normal @ back, flat, 1)
     return paths, first.reshape(rays.shape).astype(np.float32), last.reshape(rays.shape).astype(np.float32)
-
-
-def _about(axis: int, angle: float) -> Array:
-    """[3, 3] rotation about an axis."""
-    a, b = (axis + 1) % 3, (axis + 2) % 3
-    rotation = np.eye(3)
-    rotation[a, a] = rotation[b, b] = np.cos(angle)
-    rotation[a, b], rotation[b, a] = -np.sin(angle), np.sin(angle)
-    return rotation
 
 
 def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -> Array:

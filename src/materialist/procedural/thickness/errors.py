@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
+from materialist.procedural.options import captures
 from materialist.procedural.thickness.dataset import draw_views
 from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.types import Array
@@ -28,7 +28,6 @@ def degrees(found: Array, truth: Array, inside: Array) -> Array:
 
 
 def mean_errors(network, views: dict[str, Array]) -> dict[str, float]:
-    """Means of `errors` over views."""
     return {name: float(np.nanmean(values)) for name, values in errors(network, views).items()}
 
 
@@ -63,11 +62,8 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
 
 def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str, Array]]:
     """Views of every .ply mesh below a folder, by the mesh's name: upright, exact maps. Raises InputError."""
-    files = sorted(folder.rglob("*.ply"))
-    if not files:
-        raise InputError(f"{folder} holds no .ply meshes; give a folder that does.")
     found: dict[str, dict[str, Array]] = {}
-    for file in files:
+    for file in captures(folder, "**/*.ply"):
         shape = Shape(centred(mesh(file)), hollow=False, upright=True)
         rng = np.random.default_rng([seed, len(found)])
         found[file.stem] = draw_views(shape, ShapeTracer(shape.solid), rng, views, exact=True)
