@@ -8,7 +8,7 @@ from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
-from materialist.studio.controls import control_values
+from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
@@ -31,6 +31,19 @@ def test_an_edit_from_click_to_recipe(session):
     session.set("edit", hue=None)
     session.set("edit", roughness=None)
     assert apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min() == 0.5
+
+
+def test_a_slider_without_a_number_writes_nothing(session):
+    click(session)
+    session.set("edit", hue="120")
+    session.act("toggle", 0)  # what is switched off is not applied, so nobody else would notice
+    session.act("choose", 0)
+    for name in ("hue", "roughness", "texture_scale", "scale", "turn"):
+        with pytest.raises(InputError, match="no finite number"):
+            set_option(name, session, float("nan"))
+    with pytest.raises(InputError, match="no finite number"):
+        place_lamp(session, 25, 24, float("inf"))
+    assert "nan" not in (session.workspace / "edits.yaml").read_text() and not session.next_object
 
 
 def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):

@@ -5,6 +5,7 @@ import socket
 import time
 
 import pytest
+from studio_scenes import named
 
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
@@ -93,11 +94,23 @@ def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
     assert [job.state for job in jobs.values()] == [STOPPED] * 2 + [QUEUED] * 2
 
 
-def test_the_end_of_a_job_is_said_and_cannot_carry_html(tmp_path):
+def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
+    text = f"/srv/a b.txt: {tmp_path}/photo-001/x.png and '/home/me/y.exr' are damaged; see https://a.example/b (1/2)"
+    assert shared.shown(text) == "a b.txt: photo-001/x.png and 'y.exr' are damaged; see https://a.example/b (1/2)"
+    assert str(tmp_path) not in str(named(shared).message(InputError(text)))
+    session = shared.session("page", "a" * 32)
+    session.project = shared.work.new("One", session.person)
+    assert str(tmp_path) not in widgets.commands(session) and "photo-001" in widgets.commands(session)
+    shared.single_user = True
+    assert shared.shown(text) == text
+
+
+def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
     queue, job = JobQueue(1), Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
-    assert "Done in" in list(widgets.follow(queue, job))[-1]
+    assert "Done in" in list(named(shared).follow(job))[-1]
     job.state, job.message = FAILED, "<script>alert(1)</script>"
-    assert "<script>" not in widgets.shown(queue, job) and 'role="alert"' in widgets.shown(queue, job)
+    shown = widgets.box(*widgets.shown(queue, job))
+    assert "<script>" not in shown and 'role="alert"' in shown
     assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
     queue.close()
 

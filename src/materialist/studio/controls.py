@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from contextlib import suppress
@@ -11,6 +12,7 @@ from typing import Any
 import gradio as gr
 import numpy as np
 
+from materialist.errors import InputError
 from materialist.option_kinds import ON, OperationOptions, declarations
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight
 from materialist.studio import objects
@@ -22,12 +24,15 @@ WHITE = "#ffffff"
 
 
 def number_text(value: float) -> str:
-    """A number as the list of edits has it."""
+    """A number as the list of edits has it. Raises InputError for what a slider cannot give."""
+    if not math.isfinite(float(value)):
+        raise InputError(f"The value {value} is no finite number; move the slider again.")
     return f"{float(value):.4g}"
 
 
-def hex_colour(value: str) -> str:
-    """A colour picker's text (#rrggbb or rgba(r, g, b, a)) as #rrggbb."""
+def hex_colour(value: Any) -> str:
+    """A colour picker's text (#rrggbb or rgba(r, g, b, a)) as #rrggbb; grey for anything else."""
+    value = str(value)
     if re.fullmatch(r"#[0-9a-fA-F]{6}", value):
         return value.lower()
     numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]

@@ -23,7 +23,7 @@ from materialist.studio.selection import read_pick, sam_missing
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
-from materialist.studio.widgets import LIVE, LONG, PageContext, handler, steps
+from materialist.studio.widgets import LIVE, LONG, PageContext, steps
 
 TITLE = "Materialist studio"
 _HEAD = (
@@ -99,7 +99,7 @@ def _wire(context: PageContext) -> None:
         script = f"(v) => {{ document.body.dataset.{name} = v; }}"
         context[name].change(None, context[name], None, js=script, api_visibility="private")
 
-    @handler
+    @context.handler
     def pick(
         sam: bool, kelvin: float, power: float, before: float, event: gr.EventData, request: gr.Request
     ) -> dict[Any, Any]:
@@ -113,7 +113,7 @@ def _wire(context: PageContext) -> None:
             session.pick(wanted, "sam2" if sam else "network")
         return context.everything(session)
 
-    @handler
+    @context.handler
     def act(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
         what = str(event._data.get("what"))
@@ -146,7 +146,7 @@ def _wire_final(context: PageContext) -> None:
     """Path-traced pictures, and the button that stops the one that this page asked for."""
 
     def render(spp: int) -> Any:
-        @handler
+        @context.handler
         def run(request: gr.Request) -> Any:
             session = context.session(request)
             _ = session.scene

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import secrets
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,8 +48,10 @@ class FinalPicture:
 class Session:
     """The state of one page. Its methods may be called from any thread."""
 
-    def __init__(self, person: str):
+    def __init__(self, person: str, shown: Callable[[str], str] = str):
         self.person = person
+        self.shown = shown
+        """Takes what the person must not see out of a text for the page, see `Studio.shown`."""
         self.beats = 0
         """Requests that the page holds as long as it is open."""
         self.seen = 0.0

@@ -12,7 +12,7 @@ from materialist.errors import InputError
 from materialist.studio import SETTINGS, lights, uploads
 from materialist.studio.controls import SUN, number_text, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LIVE, PageContext, handler
+from materialist.studio.widgets import LIVE, PageContext
 from materialist.studio.workspace import store
 from materialist.types import Array
 
@@ -54,7 +54,7 @@ def wire(context: PageContext) -> None:
     """The events."""
     parts = context.parts
 
-    @handler
+    @context.handler
     def choose(event: gr.SelectData, request: gr.Request) -> dict:
         session = context.session(request)
         if event.index == 0:
@@ -89,7 +89,7 @@ def place_lamp(
     depth = float(session.scene.depth[int(y), int(x)])
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
-    new = [f"{x:.0f}", f"{y:.0f}", f"{depth * before:.4g}", f"{kelvin:g}", f"{power:.3g}"]
+    new = [f"{x:.0f}", f"{y:.0f}", *(number_text(v) for v in (depth * before, kelvin, power))]
     place = session.edits.light
     known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
     session.light(lamps=[*known, new])

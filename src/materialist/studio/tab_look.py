@@ -11,7 +11,7 @@ from materialist.color import srgb_levels
 from materialist.studio import tasks
 from materialist.studio.session import Session
 from materialist.studio.stage import maps, picture, report
-from materialist.studio.widgets import LONG, PageContext, follow, handler
+from materialist.studio.widgets import LONG, PageContext
 from materialist.types import Array
 
 MESH = "mesh.glb"
@@ -42,18 +42,18 @@ def wire(context: PageContext) -> None:
     """The events."""
     parts, studio = context.parts, context.studio
 
-    @handler
+    @context.handler
     def look(request: gr.Request) -> dict[Any, Any]:
         session = context.session(request)
         if session.live is None:
             return {}
         return {
             parts["compare"]: compared(session),
-            parts["report"]: report(session.scene),
+            parts["report"]: session.shown(report(session.scene)),
             parts["maps"]: maps(session.scene),
         }
 
-    @handler
+    @context.handler
     def make_mesh(request: gr.Request) -> Any:
         session = context.session(request)
         _ = session.scene
@@ -63,9 +63,9 @@ def wire(context: PageContext) -> None:
             return
         scene = str(session.project.scene)
         job = studio.submit(session, tasks.mesh, session.workspace, scene=scene, output=str(file))
-        yield from follow(studio.jobs, job)
+        yield from context.follow(job)
 
-    @handler
+    @context.handler
     def show_mesh(request: gr.Request) -> Any:
         file = context.session(request).workspace / MESH
         return studio.public_copy(file) if file.is_file() else None

@@ -11,7 +11,7 @@ import gradio as gr
 from materialist.studio import objects, uploads
 from materialist.studio.controls import hex_colour, option_text, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LONG, PageContext, box, handler
+from materialist.studio.widgets import LONG, PageContext, box
 from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
@@ -114,14 +114,14 @@ def _make_glass(session: Session, *values: Any) -> None:
 def _wire_following(context: PageContext) -> None:
     """The stage asks to be told when the glass that it waits for is there."""
 
-    @handler
+    @context.handler
     def follow(request: gr.Request) -> Iterator[dict[Any, Any]]:
         session, said = context.session(request), ""
         client = session.glass
         while client is not None and client is session.glass:
             state = client.state
             if not state.waiting:
-                end = box(state.words, bad=True) if state.bad else box("The glass follows its sliders.")
+                end = box(session.shown(state.words), bad=True) if state.bad else box("The glass follows its sliders.")
                 yield {**context.picture(session), context["progress"]: end}
                 return
             if state.words != said:
@@ -138,14 +138,17 @@ def _wire_fall(context: PageContext) -> None:
     """An object that falls, and lies there."""
     parts = context.parts
 
-    @handler
+    @context.handler
     def rest(height: float, request: gr.Request) -> Any:
         session = context.session(request)
         yield {parts["fall_progress"]: box("It falls …")}
         try:
-            notes = objects.let_fall(session, float(height))
+            notes = session.shown(" ".join(objects.let_fall(session, float(height))))
         finally:
             yield {parts["fall_progress"]: ""}
-        yield {**context.everything(session), parts["fall_progress"]: box(" ".join(notes)) if notes else ""}
+        yield {
+            **context.everything(session),
+            parts["fall_progress"]: box(notes) if notes else "",
+        }
 
     parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **LONG)

@@ -15,7 +15,7 @@ from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
-from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box, follow, handler
+from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box
 from materialist.studio.workspace import Project
 
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
@@ -59,7 +59,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     """The events."""
     parts, studio = context.parts, context.studio
 
-    @handler
+    @context.handler
     def uploaded(file: str | None) -> str:
         if file is None:
             return ""
@@ -69,11 +69,11 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         uploads.checked_picture(Path(file), name)
         return box(f"{name} is ready.")
 
-    @handler
+    @context.handler
     def choose_example(name: str | None) -> Any:
         return None if name is None else gr.update(value=None)
 
-    @handler
+    @context.handler
     def start(file: str | None, example: str | None, predictor: str, size: int, fov: str, request: gr.Request):
         session = context.session(request)
         if file is not None and Path(file).suffix.lower() == ".zip":
@@ -85,14 +85,14 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
                 return
         yield from _show_project(context, session, project)
 
-    @handler
+    @context.handler
     def resume(name: str | None, request: gr.Request):
         session = context.session(request)
         if not name:
             raise InputError("Choose one of your photos in the list first.")
         yield from _resume(context, session, name)
 
-    @handler
+    @context.handler
     def arrive(last: str, request: gr.Request):
         session = context.session(request)
         known = _projects(context, session)
@@ -164,7 +164,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
         parts["start"]: gr.update(interactive=False),
     }
     shown = 0
-    for html in follow(studio.jobs, job):
+    for html in context.follow(job):
         update: dict[Any, Any] = {parts["fit"]: html}
         if len(job.found) > shown:
             shown = len(job.found)

@@ -15,7 +15,7 @@ from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
 from materialist.studio.session import EDITS, Session
 from materialist.studio.stage import stage
-from materialist.studio.widgets import LONG, PageContext, box, handler
+from materialist.studio.widgets import LONG, PageContext, box
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -57,7 +57,7 @@ def wire(context: PageContext) -> None:
     parts = context.parts
     outputs = [parts[name] for name in ("make_progress", "download", "make_stop", "stage")]
 
-    @handler
+    @context.handler
     def make(what: str, request: gr.Request) -> Any:
         session = context.session(request)
         if what not in KINDS:

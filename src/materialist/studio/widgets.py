@@ -43,42 +43,6 @@ _WORDS = {
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 
 
-def handler(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function (or generator) with its exceptions turned into messages on the page; the server goes on."""
-    if inspect.isgeneratorfunction(function):
-
-        @functools.wraps(function)
-        def steps(*args: Any, **kwargs: Any) -> Iterator[Any]:
-            try:
-                yield from (outputs or gr.skip() for outputs in function(*args, **kwargs))
-            except Exception as error:
-                raise _message(error) from error
-
-        return steps
-
-    @functools.wraps(function)
-    def once(*args: Any, **kwargs: Any) -> Any:
-        try:
-            outputs = function(*args, **kwargs)
-        except Exception as error:
-            raise _message(error) from error
-        # Gradio takes an empty dict for one value, not for "no component changes".
-        return gr.skip() if isinstance(outputs, dict) and not outputs else outputs
-
-    return once
-
-
-def _message(error: Exception) -> Exception:
-    if isinstance(error, gr.Error):
-        return error
-    if isinstance(error, MaterialistError):  # its message may hold a name that a stranger chose
-        text = escape(str(error), quote=False)
-        return gr.Error(text, duration=SETTINGS.message_seconds, title="That did not work", print_exception=False)
-    traceback.print_exception(error)
-    text = f"Something went wrong inside ({type(error).__name__}); the terminal of the studio has the details."
-    return gr.Error(text, duration=SETTINGS.message_seconds, title="Our mistake", print_exception=False)
-
-
 @dataclass
 class PageContext:
     """The studio, and the components of one page that more than one tab changes."""
@@ -93,6 +57,42 @@ class PageContext:
     def session(self, request: Any) -> Session:
         """The session of the page that sent a request."""
         return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
+
+    def handler(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function (or generator) with its exceptions turned into messages on the page; the server goes on."""
+        if inspect.isgeneratorfunction(function):
+
+            @functools.wraps(function)
+            def steps(*args: Any, **kwargs: Any) -> Iterator[Any]:
+                try:
+                    yield from (outputs or gr.skip() for outputs in function(*args, **kwargs))
+                except Exception as error:
+                    raise self.message(error) from error
+
+            return steps
+
+        @functools.wraps(function)
+        def once(*args: Any, **kwargs: Any) -> Any:
+            try:
+                outputs = function(*args, **kwargs)
+            except Exception as error:
+                raise self.message(error) from error
+            # Gradio takes an empty dict for one value, not for "no component changes".
+            return gr.skip() if isinstance(outputs, dict) and not outputs else outputs
+
+        return once
+
+    def message(self, error: Exception) -> Exception:
+        """An exception as Gradio shows it; what was not foreseen goes to the terminal."""
+        known = isinstance(error, MaterialistError)
+        text = f"Something went wrong inside ({type(error).__name__}); the terminal of the studio has the details."
+        if known:  # its message may hold a name that a stranger chose
+            text = escape(self.studio.shown(str(error)), quote=False)
+        elif not isinstance(error, gr.Error):
+            traceback.print_exception(error)
+        title = "That did not work" if known else "Our mistake"
+        shown = gr.Error(text, duration=SETTINGS.message_seconds, title=title, print_exception=False)
+        return error if isinstance(error, gr.Error) else shown
 
     def picture(self, session: Session) -> dict[Any, Any]:
         """Updates after a change of edits."""
@@ -132,7 +132,7 @@ class PageContext:
         arguments of Gradio's event beside LIVE.
         """
 
-        @handler
+        @self.handler
         def run(request: gr.Request, *values: Any) -> dict[Any, Any]:
             session = self.session(request)
             updates = change(session, *values)
@@ -155,8 +155,12 @@ class PageContext:
 
     def following(self, job: Job, words: str, stop: str) -> Iterator[dict[Any, Any]]:
         """Updates of the component `words` and of the button `stop` until a job is over."""
-        for html in follow(self.studio.jobs, job):
+        for html in self.follow(job):
             yield {self[words]: html, self[stop]: gr.update(visible=not job.over)}
+
+    def follow(self, job: Job) -> Iterator[str]:
+        """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
+        return (box(self.studio.shown(text), part, bad) for text, part, bad in follow(self.studio.jobs, job))
 
     def traced(self, session: Session, spp: int, words: str, stop: str) -> Generator[Any, Any, FinalPicture | None]:
         """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
@@ -179,36 +183,39 @@ class PageContext:
     def stops(self, button: str, *kinds: str) -> None:
         """Let a button stop the jobs of some kinds that its page asked for."""
 
-        @handler
+        @self.handler
         def stop(request: gr.Request) -> None:
             self.session(request).stop(self.studio.jobs, *kinds)
 
         self[button].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 
-def follow(jobs: JobQueue, job: Job) -> Iterator[str]:
-    """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
-    last = ""
+State = tuple[str, float | None, bool]
+"""What a job does in words, how much of it is done, and whether it failed; arguments of `box`."""
+
+
+def follow(jobs: JobQueue, job: Job) -> Iterator[State]:
+    """The state of a job whenever it changed, until it is over; the last one says how it ended."""
+    last = None
     while not job.over:
-        text = shown(jobs, job)
-        if text != last:
-            last = text
-            yield text
+        if (state := shown(jobs, job)) != last:
+            yield (last := state)
         time.sleep(SETTINGS.poll_seconds)
     yield shown(jobs, job)
 
 
-def shown(jobs: JobQueue, job: Job) -> str:
-    """One state as HTML."""
+def shown(jobs: JobQueue, job: Job) -> State:
+    """One state."""
     if job.state == QUEUED:
-        return box(f"Waiting: {jobs.ahead(job)} before yours.", 0.0)
+        return f"Waiting: {jobs.ahead(job)} before yours.", 0.0, False
     if job.state == STOPPED:
-        return box("Stopped; nothing was changed.")
+        return "Stopped; nothing was changed.", None, False
     if job.state == FAILED:
-        return box(failure(job), bad=True)
+        return failure(job), None, True
     if job.over:
-        return box(f"Done in {job.seconds:.0f} s.")
-    return box(f"{words(job.stage)} … {job.seconds:.0f} s", min(1.0, job.done / job.total) if job.total else 0.0)
+        return f"Done in {job.seconds:.0f} s.", None, False
+    part = min(1.0, job.done / job.total) if job.total else 0.0
+    return f"{words(job.stage)} … {job.seconds:.0f} s", part, False
 
 
 def failure(job: Job) -> str:
@@ -249,7 +256,7 @@ def commands(session: Session) -> str:
     project = session.project
     if project is None:
         return ""
-    lines, scene = [f"cd {quote(str(project.folder))}"], quote(str(project.scene))
+    lines, scene = [f"cd {quote(session.shown(str(project.folder)))}"], quote(session.shown(str(project.scene)))
     if session.edits.active:
         lines.append(f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene")
         scene = "edited.scene"
