@@ -2,10 +2,15 @@
 
 import os
 import socket
+import subprocess
+import sys
 import time
+import urllib.request
 
 import pytest
+from made_tasks import until
 from studio_scenes import named
+from studio_server import free_port
 
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
@@ -141,3 +146,39 @@ def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
     shared.jobs._jobs = [Job("invert", "a" * 32, folders["busy"], print)]
     shared.sweep()
     assert [name for name, folder in folders.items() if not folder.exists()] == ["old"]
+
+
+def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
+    """Two jobs at work, two in the queue, two pages open."""
+    script = """if True:
+        import sys
+        from functools import partial
+        from pathlib import Path
+
+        from made_tasks import answer
+        from materialist.cli import app
+        from materialist.cli.outcome import run_to_exit_code
+        from materialist.jobs.queue import Job
+        from materialist.studio import server
+
+        work, port = sys.argv[1:]
+        made = server.new_studio(work, single_user=True, workers=2)
+        server.new_studio = lambda *a, **k: made
+        for _ in range(4):
+            made.jobs.submit(Job("final", "me", Path(work), answer, {"how": "wait", "out": work}))
+        sys.exit(run_to_exit_code(app, ["studio", "--port", port, "--work", work]))
+    """
+    path = os.pathsep.join([os.environ.get("PYTHONPATH", ""), *sys.path])
+    port, command = free_port(), [sys.executable, "-c", script, str(tmp_path / "work")]
+    process = subprocess.Popen(
+        [*command, str(port)], env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": path}, stdout=subprocess.PIPE
+    )
+    for line in process.stdout:
+        if b"The studio is open" in line:
+            break
+    until(lambda: len(list((tmp_path / "work").glob(".partial-*"))) == 2, 60)
+    held = [urllib.request.urlopen(f"http://127.0.0.1:{port}/gradio_api/heartbeat/{page}") for page in "ab"]
+    process.terminate()
+    assert process.wait(30) == -15 and held
+    until(lambda: not list((tmp_path / "work").glob(".partial-*")))
+    assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []

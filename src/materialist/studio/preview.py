@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import json
+import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -128,6 +132,19 @@ def _build(scene: Scene) -> Any:
     from materialist.edits.preview import Preview
 
     return Preview(scene)
+
+
+def free_memory() -> Future[None]:
+    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
+
+    def free() -> None:
+        gc.collect()
+        if "drjit" in sys.modules:
+            sys.modules["drjit"].flush_malloc_cache()
+        with suppress(OSError, AttributeError):  # glibc has it
+            ctypes.CDLL(None).malloc_trim(0)
+
+    return _THREAD.submit(free)
 
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import re
 import secrets
 import shutil
@@ -17,6 +16,7 @@ from typing import Any
 from materialist.errors import InputError, OutputError
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
+from materialist.studio.preview import free_memory
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import Project, WorkFolder
 
@@ -107,7 +107,7 @@ class Studio:
 
         project = self.project(name, session.person)
         session.close()
-        gc.collect()
+        free_memory().result()
         if psutil.virtual_memory().available < SETTINGS.free_for_scene:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
@@ -134,7 +134,7 @@ class Studio:
             session.stop(self.jobs, *ENDING)
             session.close()
             del session
-            gc.collect()
+            free_memory()
 
     def sweep(self) -> None:
         """Forget pages that never showed that they are open, and photos that were not taken apart to the end."""
