@@ -33,9 +33,6 @@ class Preview:
     What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
     that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once
     (seconds), keep it.
-
-    Args:
-        scene: the fitted scene.
     """
 
     def __init__(self, scene: Scene):

@@ -45,12 +45,9 @@ class Part:
 def scene_parts(scene: Scene, max_triangles: int | None = None) -> list[Part]:
     """The depth surface, then the continued planes, with the materials the renderer gives them.
 
-    Args:
-        max_triangles: rebuild the mesh from a coarser depth map where the scene's has more triangles than this; the
-            texture keeps its size. None: the scene's own mesh.
-
-    Raises:
-        InputError: a mesh without a depth surface, or too small a number of triangles.
+    max_triangles: rebuild the mesh from a coarser depth map where the scene's has more triangles than this; the
+        texture keeps its size. None: the scene's own mesh.
+    Raises InputError for a mesh without a depth surface, or too small a number of triangles.
     """
     geometry = scene.geometry
     if not (geometry.mesh.face_plane == -1).any():

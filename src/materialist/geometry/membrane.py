@@ -22,12 +22,7 @@ def nearest(known: Array) -> tuple[Array, Array]:
 def membrane(values: Array, known: Array) -> Array:
     """Fill the unknown places of a map with a nearly harmonic surface: a membrane spanned by what is known around.
 
-    Args:
-        values: [H, W] or [H, W, C]; what is not known is not read.
-        known: [H, W] bool.
-
-    Returns:
-        float32 like `values`; known places as they were; the mean of nothing is 0.
+    values: [H, W] or [H, W, C]; what is not known [H, W] bool is not read. float32; the mean of nothing is 0.
     """
     known = np.asarray(known, bool)
     flat = np.where(known[..., None], np.asarray(values, np.float32).reshape(*known.shape, -1), 0)

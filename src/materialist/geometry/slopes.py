@@ -21,11 +21,9 @@ SHARP = 0.5
 def slopes(normal: Array, rays: Array, steepest: float = 0.12) -> tuple[Array, Array]:
     """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
 
-    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r).
+    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). steepest: smallest n.v that is followed.
 
-    Args:
-        normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
-        steepest: smallest n.v that is followed (0.12: 7 degrees): beyond, the slope runs to infinity.
+    normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
     """
     x, y = rays[..., 0], rays[..., 1]
     across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
@@ -53,10 +51,8 @@ def least_squares_change(
 ) -> Array:
     """[N] float64, min over u of sum of weight |u_second - u_first - wanted|^2 + sum of pull |u|^2.
 
-    Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say.
-
-    Args:
-        first, second: [P] which of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
+    Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
+    of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
     """
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import cg
@@ -104,14 +100,12 @@ def continued(values: Array, known: Array) -> Array:
 
 
 def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -> Array:
-    """[H, W, 3] unit normals, away from the camera, of a surface that is seen from within.
+    """[H, W, 3] unit normals, away from the camera, of a surface that is seen from within; 0 where it is not known.
 
     Planes are planes in 1/z, too, whatever the perspective, so slopes of 1/z are exact on flat backs.
 
-    Args:
-        back: [H, W] planar depth, scene units. known: [H, W] bool; 0 is returned elsewhere.
-        rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
-        sigma: of the window of `depth_slopes`, pixels.
+    back: [H, W] planar depth, scene units. known: [H, W] bool. sigma: of the window of `depth_slopes`, pixels.
+    rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
     """
     depth = np.where(known, back, 1).astype(np.float64)
     right, down = depth_slopes(1 / depth, known, sigma)

@@ -12,20 +12,13 @@ from materialist.types import Array
 
 
 def denoise(image: Array, *, albedo: Array, normal: Array, device: str = "cpu") -> Array:
-    """Remove the path tracer's noise, guided by the scene's own maps, whose edges stay.
+    """[H, W, 3] float32 linear without the path tracer's noise, guided by the scene's own maps, whose edges stay.
 
-    Args:
-        image: [H, W, 3] linear radiance, >= 0, any range.
-        albedo: [H, W, 3] linear, in [0, 1].
-        normal: [H, W, 3] unit, or 0 where there is no surface.
-        device: where the filter runs, `cpu` or `cuda`.
+    image: [H, W, 3] linear radiance, >= 0, any range. albedo: [H, W, 3] linear, in [0, 1].
+    normal: [H, W, 3] unit, or 0 where there is no surface. device: where the filter runs, `cpu` or `cuda`.
 
-    Returns:
-        [H, W, 3] float32 linear radiance, >= 0. Equal inputs give equal pictures on one machine.
-
-    Raises:
-        InputError: the guides are not of the image's size.
-        SetupError: the optional package pyoidn is missing or broken.
+    Equal inputs give equal pictures on one machine. Raises InputError where the guides are not of the image's size,
+    SetupError where pyoidn is missing or broken.
     """
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide.shape != image.shape:

@@ -25,22 +25,14 @@ _WAVEFRONT = 2**24
 
 
 class RenderScene:
-    """Path tracing of one geometry from one camera.
+    """Path tracing of one geometry from one camera, a pinhole at the origin.
 
     `mi_scene` is Mitsuba's scene. Its shapes are `surface`, with the faces that `geometry.mesh` gives the depth
     surface in their order, `plane0`, `plane1`, ...: the continued planes likewise (see `part`), `body0`, ...,
-    and `lamp0`, ...
+    and `lamp0`, ... The depth surface carries the per-pixel maps, a continued plane the mean of the maps over its
+    pixels; bodies have materials of their own, lamps are glowing spheres.
 
-    Args:
-        geometry: the depth surface carries the per-pixel maps; the continuation of a plane carries the mean of the
-            maps over the plane's pixels.
-        camera: pinhole at the origin.
-        bodies: things with materials of their own.
-        lamps: glowing spheres.
-        device: `auto`, `cpu` or `cuda`.
-
-    Raises:
-        InputError: a picture below 2 x 2 pixels, or a mesh without a depth surface. SetupError: see `variant.setup`.
+    Raises InputError for a picture below 2 x 2 pixels, or a mesh without a depth surface; SetupError as `setup`.
     """
 
     def __init__(
@@ -93,14 +85,10 @@ class RenderScene:
         self.params.update()
 
     def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH) -> Array:
-        """Path-trace the picture.
+        """[H, W, 3] float32 linear radiance, path-traced.
 
-        Args:
-            spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
-            max_depth: path length; 2 is direct light alone, 1 the sky alone.
-
-        Returns:
-            [H, W, 3] float32 linear radiance.
+        spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
+        max_depth: path length; 2 is direct light alone, 1 the sky alone.
         """
         _check_options(spp, max_depth)
         mi = self.mi
@@ -115,17 +103,12 @@ class RenderScene:
         return (total / passes).astype(np.float32)
 
     def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
-        """Differentiable rendering by path replay backpropagation (the paper's engine; section Implementation Details).
+        """[H, W, 3] linear, differentiable by path replay backpropagation (paper, section Implementation Details).
 
-        Continued planes follow the means of the maps, and so do their gradients.
+        Continued planes follow the means of the maps, and so do their gradients. The scene keeps materials and light.
 
-        Args:
-            albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors.
-            spp: samples per pixel of the image; its gradient uses as many, with another seed.
-            max_depth: as in `render`.
-
-        Returns:
-            [H, W, 3] linear radiance, a torch tensor; its scene keeps these materials and this light.
+        albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors.
+        spp: samples per pixel of the image; its gradient uses as many, with another seed. max_depth: as in `render`.
         """
         import drjit as dr
         import torch

@@ -44,10 +44,8 @@ class LLVM:
 def find_llvm() -> LLVM:
     """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the best of the usual places.
 
-    The best is the newest up to `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded into this process.
-
-    Raises:
-        SetupError: none of version 17 or later is found; the message names the package to install.
+    The best is the newest up to `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded into this process. Raises
+    SetupError where none of version 17 or later is found; the message names the package to install.
     """
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
     paths = [chosen] if chosen else {os.path.realpath(path) for place in _PLACES for path in glob(place)}
@@ -139,11 +137,8 @@ def setup(device: str = "auto"):
     The first call decides for the whole process; later calls with the same device, or `auto`, return at once. The CPU
     variant runs on the processors this process may use, or on OMP_NUM_THREADS of them, as torch does.
 
-    Args:
-        device: `auto` (CUDA where a driver answers), `cpu` or `cuda`.
-
-    Raises:
-        InputError: an unknown device. SetupError: LLVM or CUDA is missing, or another device was chosen before.
+    device: `auto` (CUDA where a driver answers), `cpu` or `cuda`. Raises InputError for an unknown one, SetupError
+    where LLVM or CUDA is missing, or another device was chosen before.
     """
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")

@@ -44,23 +44,18 @@ def closed_proxy(
     depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *,
     wall: float | None = None, behind: Array | None = None, back: Array | None = None,
 ) -> Shell:  # fmt: skip
-    """The closed object behind a mask.
+    """The closed object behind a mask; watertight: every edge has two faces that run through it in opposite directions.
 
     Args:
-        depth: [H, W] planar depth of the front, scene units, 0 = none.
-        normal: [H, W, 3] unit.
+        depth: [H, W] planar depth of the front, scene units, 0 = none. normal: [H, W, 3] unit.
         mask: [H, W] bool or weights. Its parts become bodies of their own, its holes stay open (unless a pixel wide).
         thickness: [H, W] length of the camera ray inside the solid object, scene units >= 0.
         wall: the object is hollow: thickness of its wall, scene units. A second surface is added inside.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
         back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
 
-    Returns:
-        A watertight surface: every edge has two faces that run through it in opposite directions.
-
-    Raises:
-        InputError: shapes that differ, a thickness that is negative or not finite, or a mask without a surface or too
-            thin for one.
+    Raises InputError for shapes that differ, a thickness that is negative or not finite, or a mask without a surface
+    or too thin for one.
     """
     inside = surface_in(mask, depth, camera)
     _check(normal, thickness, inside)

@@ -41,14 +41,11 @@ def surface_of_revolution(
 ) -> tuple[Revolution, Array] | None:
     """An object that is a surface of revolution and its thickness [H, W] float32 along the rays, scene units; or None.
 
-    Args:
-        depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
-        up: [3] unit, the axis' direction in the camera's frame, where a support tells it; else the camera is taken
-            not to lean sideways, and the angle at which it looks down is found with the axis.
-        behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
-
-    Raises:
-        InputError: maps of different sizes, or a mask without any surface.
+    depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object.
+    up: [3] unit, the axis' direction in the camera's frame, where a support tells it; else the camera is taken
+        not to lean sideways, and the angle at which it looks down is found with the axis.
+    behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
+    Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
     if inside.sum() < DEFAULT.fewest:

@@ -207,12 +207,8 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
 def vessel(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     """The line around the wall of an open vessel: up its outside, over a round rim, down its inside.
 
-    Args:
-        wall: its thickness, scene units.
-
-    Returns:
-        Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the
-        axis to the axis; None where the profile is no single body around its axis, or has no room inside.
+    Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the
+    axis to the axis; None where the profile is no single body around its axis, or has no room inside a `wall`.
     """
     outer, inner = _around(profile.lines()), _around(profile.lines(wall))
     if outer is None or inner is None:

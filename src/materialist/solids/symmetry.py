@@ -34,19 +34,10 @@ DEFAULT = SymmetrySettings()
 
 
 def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera) -> Array:
-    """Length of each camera ray between the visible front and the mirrored back of an object.
+    """[H, W] float32 length of each camera ray between the front and the mirrored back, scene units; 0 outside.
 
-    Args:
-        depth: [H, W] planar depth, scene units, 0 where there is no surface.
-        normal: [H, W, 3] unit, camera frame.
-        mask: [H, W] bool or weights: the object. Pixels without a surface do not count.
-        camera: its size must be that of the maps.
-
-    Returns:
-        [H, W] float32, scene units along the ray, >= 0; 0 outside the mask.
-
-    Raises:
-        InputError: maps of different sizes, or a mask without any surface.
+    depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: the object.
+    Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
     if normal.shape != (*inside.shape, 3):
@@ -57,12 +48,8 @@ def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera
 def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     """`symmetric_thickness` on any window of a picture.
 
-    Args:
-        depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
-        rays: [H, W, 3] camera rays through the pixels at z = -1, evenly spaced.
-
-    Returns:
-        [H, W] float32, scene units along the ray; 0 outside.
+    depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
+    rays: [H, W, 3] camera rays through the pixels at z = -1, evenly spaced.
     """
     length = np.linalg.norm(rays, axis=-1)  # [H, W] of the ray per unit of planar depth
     border = border_distance(inside)

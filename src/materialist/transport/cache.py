@@ -68,12 +68,9 @@ def build_scene(mesh: Mesh) -> mi.Scene:
 
 
 class TransportCache:
-    """Traced visibility of one camera and mesh.
+    """Traced visibility of one camera and mesh; equal seeds of the point sets give equal caches.
 
-    Args:
-        geometry: the mesh; its faces carry the pixel whose radiance a ray that hits them sees.
-        camera: pinhole camera of the photograph.
-        seed: of the point sets; equal seeds give equal caches.
+    The faces of the mesh carry the pixel whose radiance a ray that hits them sees.
     """
 
     def __init__(
@@ -149,12 +146,10 @@ class TransportCache:
         return self._traced
 
     def gather(self, envmap: Array, radiance: Array | None) -> Tables:
-        """Tables for one light.
+        """Tables for one light, an envmap [h, 2h, 3] of linear radiance.
 
-        Args:
-            envmap: [h, 2h, 3] linear radiance.
-            radiance: [H, W, 3] linear radiance that leaves the surface seen by each pixel (for indirect light),
-                or None for direct light alone.
+        radiance: [H, W, 3] linear radiance that leaves the surface seen by each pixel (for indirect light), or None
+            for direct light alone.
         """
         pyramid = EnvmapPyramid(envmap)
         slots = floats(mi, self.slot_radiance(radiance))

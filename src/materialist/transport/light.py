@@ -86,10 +86,9 @@ def light_matrix(
 ) -> LightMatrix:
     """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows.
 
-    Args:
-        sphere_samples: rays of a pixel through the texels of the whole sphere, equally many through each and at least
-            one (half of them leave below the surface, and are not traced).
-        specular_samples: further rays of a pixel along its specular lobe.
+    sphere_samples: rays of a pixel through the texels of the whole sphere, equally many through each and at least
+        one (half of them leave below the surface, and are not traced).
+    specular_samples: further rays of a pixel along its specular lobe.
     """
     pixels = cache.pixels[rows]
     rough, metallic, albedo = (m[pixels] for m in flat(materials))

@@ -9,15 +9,10 @@ from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 
 def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
-    """Outgoing radiance of P surface pixels by the paper's simplified Disney BRDF (Preliminary).
+    """[P, 3] outgoing linear radiance by the paper's simplified Disney BRDF (Preliminary), with gradients.
 
-    Args:
-        tables: light transport at these pixels.
-        albedo: [P, 3] in [0, 1]; roughness: [P] perceptual; metallic: [P].
-
-    Returns:
-        [P, 3] linear radiance, differentiable in the materials:
-        A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
+    A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
+    tables: light transport at P pixels. albedo: [P, 3] in [0, 1]; roughness: [P] perceptual; metallic: [P].
     """
     r, m = roughness[:, None], metallic[:, None]
     diffuse = quadratic(tables.diffuse.split(3, -1), r)

@@ -35,25 +35,20 @@ def composite(
     device: str = "auto",
     progress=None,
 ) -> Array:
-    """The photograph with the edit in it.
+    """The photograph with the edit in it: [H0, W0, 3] float32 linear, at the photo's native size.
+
+    Bit for bit the photo's own values where the edit does not reach, everywhere if it changes nothing; HDR stays HDR.
 
     Args:
-        scene: the fitted scene; its photo is what stays.
-        edited: the same scene after `edit`, `relight`, ...
+        scene: the fitted scene; its photo is what stays. edited: the same scene after `edit`, `relight`, ...
         spp: paths per pixel, of each of the two renderings; None: 256 for new glass and another light, else 128.
-        full_render: the plain rendering of the edited scene at working size, as in the paper, and no photo.
+        full_render: the plain rendering of the edited scene [H, W, 3], as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
         upscale: with `full_render`, a super-resolution of yours that brings the rendering to the photo's native size
             (paper, appendix Post-Processing with Super-Resolution). The composite has the photo's own detail instead.
 
-    Returns:
-        [H0, W0, 3] float32 linear, at the photo's native size; bit for bit the photo's own values where the edit does
-        not reach, everywhere if it changes nothing. HDR photos stay HDR. With `full_render` [H, W, 3], or [H0, W0, 3]
-        with `upscale` as well.
-
-    Raises:
-        InputError: `upscale` without `full_render`, or a result of it that is not a picture of native size;
-            `full_render` of glass of the two-interface model, which only the photo shows.
+    Raises InputError for `upscale` without `full_render`, or a result of it that is not a picture of native size; for
+    `full_render` of glass of the two-interface model, which only the photo shows.
     """
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")

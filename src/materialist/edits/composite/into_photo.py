@@ -169,11 +169,8 @@ DIMMING = DimmingSettings()
 def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Array | None = None) -> Array:
     """[H0, W0, 3] a composite in which emitters show the photo itself, dimmed: with the trees in the window.
 
-    Clipped pixels have the estimated radiance of the emitters.
-
-    Args:
-        seen: [H, W] bool: where lights are seen. found: `core.surfaces.KEY` of the provenance.
-        before: [H0, W0] share of new bodies, which stand before the lights.
+    Clipped pixels have the estimated radiance of the emitters. seen: [H, W] bool: where lights are seen. found:
+    `core.surfaces.KEY` of the provenance. before: [H0, W0] share of new bodies, which stand before the lights.
     """
     dim = float(found["dim"])
     if dim == 1 or not seen.any():

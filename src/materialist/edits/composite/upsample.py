@@ -50,11 +50,7 @@ class GuidedUpsample:
     """Joint bilateral upsampling (Kopf et al. 2007), a strip of native rows at a time.
 
     Each native pixel takes the mean of the 4 x 4 working pixels around it, weighted by distance and by how alike the
-    photo looks there at working size and here at native size.
-
-    Args:
-        small: [H, W, 3] linear photo at working size.
-        large: [H0, W0, 3] the same at native size.
+    photo looks there at working size (`small` [H, W, 3] linear) and here at native size (`large` [H0, W0, 3]).
     """
 
     def __init__(self, small: Array, large: Array):

@@ -46,10 +46,8 @@ def ground_field(
 ) -> Field:  # fmt: skip
     """Heights of a scene with its bodies, under and around places.
 
-    Args:
-        places: [n, 2] x and y over which things fall.
-        tops: [n] z from which the ground is seen, over each place and over what lies nearest to it.
-        metres: longest side of the falling things.
+    places: [n, 2] x and y over which things fall. metres: longest side of the falling things.
+    tops: [n] z from which the ground is seen, over each place and over what lies nearest to it.
     """
     from materialist.render.scene import RenderScene
 

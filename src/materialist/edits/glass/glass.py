@@ -34,13 +34,10 @@ def glass(
     The model `closed` path-traces a closed body (`solids.closed`); `two-interface` is the paper's: every camera ray
     is bent twice and looks up the background, and there are no shadows.
 
-    Args:
-        mask: [H, W] bool, or weights in [0, 1], at working size: one object, or several.
-        options, values: `Glass`, or single fields of it.
-        fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
-
-    Raises:
-        InputError: an option out of its range, or a mask that cannot be used. WeightsError: a network without weights.
+    mask: [H, W] bool, or weights in [0, 1], at working size: one object, or several.
+    options, values: `Glass`, or single fields of it.
+    fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
+    Raises InputError for an option out of its range, or a mask that cannot be used; WeightsError without weights.
     """
     options = Glass.given(options, **values)
     own = checked_region(scene, mask) > 0.5

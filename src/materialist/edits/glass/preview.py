@@ -27,14 +27,10 @@ class GlassPreview:
     """An object of a fitted scene as glass, again and again with other glass.
 
     The background and the closed body are made when it is built (seconds); a picture then takes the paths inside the
-    object's rectangle alone. Its shadow and caustics on the surroundings, which `composite` adds, are not shown: around
-    the object stands the photo with the object gone.
+    object's rectangle alone. Its shadow and caustics on the surroundings, which `composite` adds, are not shown:
+    around the object stands the photo with the object gone.
 
-    Args:
-        scene, mask, options, values: as for `glass.glass`; `model` must be `closed`.
-
-    Raises:
-        InputError: as `glass.glass`, and for another model.
+    scene, mask, options, values: as for `glass.glass`. Raises InputError as that, and for a model that is not `closed`.
     """
 
     def __init__(self, scene: Scene, mask: Array, options: Glass | None = None, **values: Any):

@@ -69,18 +69,16 @@ def objects_in(mask: Array) -> list[Array]:
 def object_thickness(
     scene: Scene, mask: Array, method: str | Array | Path = "auto", *, behind: Array | None = None
 ) -> ObjectThickness:
-    """The thickness of the object under a mask (paper, Thickness Prior Prediction).
+    """The thickness of the object under a mask [H, W] bool (paper, Thickness Prior Prediction).
 
     Args:
-        mask: [H, W] bool at working size.
-        method: `auto` (a surface of revolution where its normals or its outline say so, else
-            RefractionNet), `network` (RefractionNet), `symmetry` (the paper's assumption), a map [H, W] of scene
-            units along the rays, or a file with one.
+        method: `auto` (a surface of revolution where its normals or its outline say so, else RefractionNet),
+            `network` (RefractionNet), `symmetry` (the paper's assumption), or a map [H, W] of scene
+            units along the rays, or its file.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
 
-    Raises:
-        InputError: an unknown method, a map of another size or with negative values, a mask without a surface.
-        WeightsError: the weights of RefractionNet are missing.
+    Raises InputError for an unknown method, a map of another size or with negative values, a mask without a surface;
+    WeightsError where the weights of RefractionNet are missing.
     """
     inside = surface_in(mask, scene.depth, scene.camera)
     rays, photo, maps = pixel_rays(scene.camera), scene.photo.linear, (scene.normal, scene.depth, scene.camera)

@@ -69,10 +69,9 @@ def two_interface(
     camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, behind: Backdrop, options: Glass,
     back: Array | None = None,
 ) -> Array:  # fmt: skip
-    """The object under the mask as glass.
+    """The object under the mask as glass: [H, W, 3] float32 linear radiance inside the mask, 0 outside.
 
     Args:
-        camera: its size is that of all maps.
         normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
         mask: [H, W] bool or weights.
         thickness: [H, W] scene units, >= 0: along the camera ray; of a back without normals of its own also d1.
@@ -80,11 +79,7 @@ def two_interface(
         back: [H, W, 3] unit outward normals of the back, read at the exit's place in the picture; d1 is then the
             distance to the surface that `thickness` describes. None: the paper's assumption, -N_p of the front there.
 
-    Returns:
-        [H, W, 3] float32 linear radiance inside the mask, 0 outside.
-
-    Raises:
-        InputError: maps of another size than the camera's.
+    Raises InputError for maps of another size than the camera's.
     """
     inside = surface_in(mask, depth, camera)
     for name, value in (("thickness", thickness), ("background depth", behind.depth), ("normals", normal),

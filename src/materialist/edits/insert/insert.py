@@ -32,7 +32,9 @@ SETTINGS = InsertSettings()
 def insert(
     scene: Scene, mesh: str | Path | MeshModel, at: tuple[float, float], options: Insertion | None = None, **values: Any
 ) -> Scene:
-    """The scene with a mesh standing on the surface under a pixel; photo, maps and light are shared.
+    """The scene with a mesh standing on the surface under a pixel, one more body for each material of the mesh.
+
+    What is wrong with the mesh, or its place, is added to `report.warnings`.
 
     Args:
         mesh: an OBJ, PLY, STL, glTF or GLB file, or what `meshes.read_model` made of one.
@@ -40,13 +42,8 @@ def insert(
             front (+Z) looks to the camera.
         options, values: see `options.Insertion`; `values` are fields of it, as in `insert(scene, mesh, at, scale=2)`.
 
-    Returns:
-        The scene with one more body for each material of the mesh. What is wrong with the mesh, or its place, is added
-        to `report.warnings`.
-
-    Raises:
-        InputError: a place outside the photo, on the sky, or so near that the mesh would reach behind the camera; a
-            mesh that cannot be used; a number out of its range.
+    Raises InputError for a place outside the photo, on the sky, or so near that the mesh would reach behind the
+    camera; a mesh that cannot be used; a number out of its range.
     """
     wanted = Insertion.given(options, **values)
     model = repainted(mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material)

@@ -66,12 +66,9 @@ def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMIT
     texture coordinates that are missing are 0, materials that are missing a grey. Base colours are decoded from sRGB;
     a transparent texture is taken as opaque. A closed mesh that is inside out is turned.
 
-    Args:
-        up: axis of the file that points up, `y` or `z`; `auto`: z for STL, y for the others.
-
-    Raises:
-        InputError: no such file, another format, damaged, without faces, beyond the limits, with vertices that are
-            not finite, or with references that lead outside of its folder.
+    up: axis of the file that points up, `y` or `z`; `auto`: z for STL, y for the others.
+    Raises InputError: no such file, another format, damaged, without faces, beyond the limits, with vertices that are
+    not finite, or with references that lead outside of its folder.
     """
     path = Path(path)
     if up not in ("auto", "y", "z"):

@@ -80,13 +80,10 @@ def dimmed(
     radiance is that with which the two together explain the photo best, and at least its white; of emitters that are
     not clipped it is the photo's. With dim = 1 the scene gives about the same picture as before.
 
-    Args:
-        lights: [H, W] bool mask of the emitters, at working size; None takes `visible_lights`.
-        fitted: the scene before its edits, whose rendering is the photo: emitters are found in it.
-
-    Raises:
-        InputError: the scene is edited, and `fitted` is not given, no clipped region of the
-            photo is large enough, or the mask has another size or no surface in it.
+    lights: [H, W] bool mask of the emitters, at working size; None takes `visible_lights`.
+    fitted: the scene before its edits, whose rendering is the photo: emitters are found in it.
+    Raises InputError where the scene is edited, and `fitted` is not given, no clipped region of the photo is large
+    enough, or the mask has another size or no surface in it.
     """
     if any(body.name.startswith(PHOTO_LIGHT) for body in scene.bodies):
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")

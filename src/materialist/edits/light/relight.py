@@ -40,12 +40,9 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
     Dimmed lights become surfaces that glow and stay where they are, whatever happens to the light from around. A sun
     replaces the brightest spot of the map (see `with_sun`), and `ambient` does not act on it.
 
-    Args:
-        options, values: see `options.Relight`; `values` are fields of it, as in `relight(scene, rotate=90)`.
-        fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
-
-    Raises:
-        InputError: a map that is not 2:1, not finite or negative, or a number out of its range.
+    options, values: see `options.Relight`; `values` are fields of it, as in `relight(scene, rotate=90)`.
+    fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
+    Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
     wanted = resolved(scene, Relight.given(options, **values))
     if wanted.dim is not None:

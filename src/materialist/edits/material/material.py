@@ -21,15 +21,12 @@ def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **value
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
 
     Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or
-    metallic sets it, a text with a sign ("+0.5", "-0.5") shifts it; +-0.5 are the paper's high and low. Hue, saturation
-    and value act on a new albedo or texture, too.
+    metallic sets it, a text with a sign ("+0.5", "-0.5") shifts it; +-0.5 are the paper's high and low. Hue,
+    saturation and value act on a new albedo or texture, too.
 
-    Args:
-        mask: [H, W] bool, or weights in [0, 1], at working size.
-        options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
-
-    Raises:
-        InputError: a mask of another size or empty, or a value out of its range.
+    mask: [H, W] bool, or weights in [0, 1], at working size.
+    options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
+    Raises InputError for a mask of another size or empty, or a value out of its range.
     """
     wanted = MaterialEdit.given(options, **values)
     weight = checked_region(scene, mask)

@@ -83,11 +83,8 @@ def seamless(
     """Radiance or albedo [H, W, C] with a hole filled by pieces, their levels as the hole's borders say; float32.
 
     Gradients are those of logarithms, so that light changes a pattern as a factor. None is kept where two surfaces
-    meet.
-
-    Args:
-        hole: [H, W] bool. source, label: [H, W] int row-major sources and surfaces (see `patches.patch_sources`).
-        exact: [H, W] bool: sources that a symmetry gives; None for nowhere.
+    meet. hole: [H, W] bool. source, label: [H, W] int row-major sources and surfaces (see `patches.patch_sources`).
+    exact: [H, W] bool: sources that a symmetry gives; None for nowhere.
     """
     from scipy.sparse import coo_matrix, diags
     from scipy.sparse.linalg import splu

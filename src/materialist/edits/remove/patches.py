@@ -34,18 +34,16 @@ SETTINGS = PatchSettings()
 def patch_sources(
     features: Array, hole: Array, usable: Array, label: Array, *, known: Array | None = None, seed: int = 0
 ) -> Array | None:  # fmt: skip
-    """Find the pixels from which a hole takes its values.
+    """[H, W] int: the row-major pixel that each pixel takes its values from, outside a hole itself.
+
+    None where there is nothing to copy.
 
     Args:
-        features: [H, W, F] what is compared; [0, 1], such as sRGB. Not read in the hole.
-        hole: [H, W] bool.
+        features: [H, W, F] what is compared; [0, 1], such as sRGB. Not read in the hole. hole: [H, W] bool.
         usable: [H, W] bool: what may be copied; the hole never is.
         label: [H, W] int: surfaces, known in the hole too; patches of another one are avoided.
         known: [H, W] int row-major sources that are known already (see `symmetry.repeated_sources`), -1 for none;
             patches are sought for the rest of the hole, and fit to these.
-
-    Returns:
-        [H, W] int row-major source of each pixel, outside the hole itself. None where there is nothing to copy.
     """
     found = np.full(hole.shape, -1) if known is None else np.where(hole, known, -1)
     rest, given = hole & (found < 0), found >= 0

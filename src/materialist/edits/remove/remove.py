@@ -27,14 +27,10 @@ def remove(
     In the result `photo` and `rerender` are filled alike, from the same places: their difference is what the fit
     misses of the surroundings. `composite` takes both as they are.
 
-    Args:
-        mask: [H, W] bool, or weights in [0, 1], at working size.
-        options, values: `Removal`, or single fields of it.
-        fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
-
-    Raises:
-        InputError: an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all of the
-            photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
+    mask: [H, W] bool, or weights in [0, 1], at working size. options, values: `Removal`, or single fields of it.
+    fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
+    Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
+    of the photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
     """
     from materialist.geometry.build import rebuilt
 

@@ -37,16 +37,12 @@ SETTINGS = TranslationSettings()
 def repeated_sources(
     albedo: Array, shown: Array, hole: Array, source: Array, label: Array, depth: Array, camera: Camera
 ) -> Array:  # fmt: skip
-    """Where periodic planes say that each pixel of a hole takes its value from.
+    """[H, W] int: the row-major pixel from which periodic planes say that a pixel of a hole takes its value; -1: none.
 
-    Args:
-        albedo: [H, W, 3] sRGB, which repeats whatever light falls on it. shown: [H, W, F] in [0, 1]: of the repeats of
-            a place the most usual one is taken. Neither is read in the hole.
-        hole: [H, W] bool. source: [H, W] bool: what may be copied.
-        label: [H, W] int: the plane of a pixel, < 0 for none. depth: [H, W] planar. Both known in the hole too.
-
-    Returns:
-        [H, W] int row-major pixel, -1 where no symmetry tells it.
+    albedo: [H, W, 3] sRGB, which repeats whatever light falls on it. shown: [H, W, F] in [0, 1]: of the repeats of
+        a place the most usual one is taken. Neither is read in the hole.
+    hole: [H, W] bool. source: [H, W] bool: what may be copied.
+    label: [H, W] int: the plane of a pixel, < 0 for none. depth: [H, W] planar. Both known in the hole too.
     """
     import cv2
 

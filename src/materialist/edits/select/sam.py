@@ -27,12 +27,8 @@ def segment(
 ) -> Array:
     """[H, W] bool of the object at the clicks (column, row) or in the box, by SAM 2.
 
-    Args:
-        linear: [H, W, 3] photo.
-        where: a folder that holds the model, or a hub id that was downloaded.
-
-    Raises:
-        SetupError: transformers is missing. WeightsError: the weights are not there, or damaged.
+    linear: [H, W, 3] photo. where: a folder that holds the model, or a hub id that was downloaded.
+    Raises SetupError where transformers is missing, WeightsError where the weights are not there, or damaged.
     """
     import torch
 

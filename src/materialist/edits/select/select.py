@@ -27,15 +27,13 @@ def select(
     """[H, W] bool mask at working size of the object at a click, in a box, or in a rough mask.
 
     Args:
-        click: (x, y) at working size, or several, all of them on the object.
-        box: (x0, y0, x1, y1) around the object.
+        click: (x, y) at working size, or several, all of them on the object. box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
         method: `network` (ClickNet and GrabCut), `grabcut` (without ClickNet) or `sam2` (needs its weights).
         device: `auto`, `cpu` or `cuda`, for `sam2`.
 
-    Raises:
-        InputError: none or several of click, box and mask; a click or box outside the photo or on the sky; an empty
-            mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
+    Raises InputError for none or several of click, box and mask; a click or box outside the photo or on the sky; an
+    empty mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
     """
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
