@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -111,9 +112,11 @@ def visible_gpus() -> list[str]:
     chosen = os.environ.get("CUDA_VISIBLE_DEVICES")
     if chosen is not None:
         return [name.strip() for name in chosen.split(",") if name.strip()]
-    import torch
+    import ctypes
 
-    return [str(k) for k in range(torch.cuda.device_count())]
+    count = ctypes.c_int()
+    ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1").cuDeviceGetCount(ctypes.byref(count))
+    return [str(k) for k in range(count.value)]
 
 
 def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:

@@ -203,8 +203,8 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     problem, traced = timed(lambda: cached.material_problem(light))
     mesh = RenderScene(geometry, camera, device=bench.device)
     path: Any = PathEngine(mesh, camera, cached.pixels.numpy(), seed=seed)
-    parts = (prior.materials.albedo, prior.materials.roughness, prior.materials.metallic)
-    maps = torch.from_numpy(np.dstack(parts).reshape(-1, 5).astype(np.float32))[cached.pixels]
+    stacked = np.dstack(tuple(vars(prior.materials).values())).reshape(-1, 5)
+    maps = torch.from_numpy(stacked.astype(np.float32))[cached.pixels]
     target = torch.from_numpy(photo.linear.reshape(-1, 3))[cached.pixels]
 
     def seconds(problem: Any, steps: int) -> list[float]:

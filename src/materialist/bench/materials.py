@@ -45,10 +45,8 @@ class MaterialsBench(Benchmark):
                 ("ssim", "SSIM", "higher", 3),
             )
         ),
-        Column("depth_mae", "depth MAE", "lower"),
-        Column("depth_rmse", "depth RMSE", "lower"),
-        Column("depth_mae_raw", "depth MAE raw", "lower"),
-        Column("depth_rmse_raw", "depth RMSE raw", "lower"),
+        *(Column(f"depth_{key}", f"depth {key.upper()}", "lower") for key in ("mae", "rmse")),
+        *(Column(f"depth_{key}_raw", f"depth {key.upper()} raw", "lower") for key in ("mae", "rmse")),
         Column("depth_si_log_rmse", "depth SI log RMSE", "lower"),
         Column("depth_order", "depth order", "higher"),
         Column("normal_angle", "normal angle", "lower", 1),
