@@ -12,7 +12,9 @@ from materialist.bsdf.ggx import alpha_of
 PLUGIN = "materialist_disney"
 
 
-def _define():
+def register() -> None:
+    """Make the plugin known to the active variant."""
+
     class SimplifiedDisney(mi.BSDF):
         """f_r = f_s + (1 - M) f_d (paper, Preliminary); both sides shade alike.
 
@@ -118,8 +120,4 @@ def _define():
         def to_string(self):
             return f"SimplifiedDisney[{self.base_color}, {self.roughness}, {self.metallic}]"
 
-    return SimplifiedDisney
-
-
-def register() -> None:
-    mi.register_bsdf(PLUGIN, _define())
+    mi.register_bsdf(PLUGIN, SimplifiedDisney)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 
 import torch
@@ -25,7 +26,7 @@ class Encoder(nn.Module):
         self.pos_embed = nn.Parameter(torch.zeros(1, 1 + grid * grid, width))
         # Only masked pre-training uses it; checkpoints carry it.
         self.mask_token = nn.Parameter(torch.zeros(1, width))
-        self.patch_embed = _PatchEmbedding(width)
+        self.patch_embed = nn.ModuleDict({"proj": nn.Conv2d(3, width, PATCH, stride=PATCH)})
         self.blocks = nn.ModuleList(_Block(width, heads) for _ in range(blocks))
         self.norm = nn.LayerNorm(width, eps=1e-6)
         nn.init.trunc_normal_(self.pos_embed, std=0.02)
@@ -36,7 +37,7 @@ class Encoder(nn.Module):
         14] of an image [B, 3, H, W], whose sides are multiples of 14.
         """
         rows, columns = image.shape[-2] // PATCH, image.shape[-1] // PATCH
-        patches = self.patch_embed(image)  # [B, rows * columns, width]
+        patches = self.patch_embed["proj"](image).flatten(2).transpose(1, 2)  # [B, rows * columns, width]
         tokens = torch.cat([self.cls_token.expand(len(patches), -1, -1), patches], 1)
         tokens = tokens + self._positions(rows, columns)
         found = []
@@ -58,17 +59,6 @@ class Encoder(nn.Module):
         return torch.cat([self.pos_embed[:, :1], resized.flatten(2).transpose(1, 2)], 1)
 
 
-class _PatchEmbedding(nn.Module):
-    """Non-overlapping patches [B, 3, H, W] to tokens [B, N, width]."""
-
-    def __init__(self, width: int):
-        super().__init__()
-        self.proj = nn.Conv2d(3, width, PATCH, stride=PATCH)
-
-    def forward(self, image: Tensor) -> Tensor:
-        return self.proj(image).flatten(2).transpose(1, 2)
-
-
 class _Block(nn.Module):
     """Attention and a two-layer perceptron, each normalised before and scaled after (LayerScale)."""
 
@@ -76,14 +66,15 @@ class _Block(nn.Module):
         super().__init__()
         self.norm1 = nn.LayerNorm(width, eps=1e-6)
         self.attn = _Attention(width, heads)
-        self.ls1 = _LayerScale(width)
+        self.ls1 = nn.ParameterDict({"gamma": torch.ones(width)})
         self.norm2 = nn.LayerNorm(width, eps=1e-6)
-        self.mlp = _Perceptron(width)
-        self.ls2 = _LayerScale(width)
+        layers = {"fc1": nn.Linear(width, 4 * width), "gelu": nn.GELU(), "fc2": nn.Linear(4 * width, width)}
+        self.mlp = nn.Sequential(OrderedDict(layers))
+        self.ls2 = nn.ParameterDict({"gamma": torch.ones(width)})
 
     def forward(self, tokens: Tensor) -> Tensor:
-        tokens = tokens + self.ls1(self.attn(self.norm1(tokens)))
-        return tokens + self.ls2(self.mlp(self.norm2(tokens)))
+        tokens = tokens + self.ls1["gamma"] * self.attn(self.norm1(tokens))
+        return tokens + self.ls2["gamma"] * self.mlp(self.norm2(tokens))
 
 
 class _Attention(nn.Module):
@@ -100,22 +91,3 @@ class _Attention(nn.Module):
         query, key, value = qkv.permute(2, 0, 3, 1, 4)
         mixed = F.scaled_dot_product_attention(query, key, value)
         return self.proj(mixed.transpose(1, 2).flatten(2))
-
-
-class _Perceptron(nn.Module):
-    def __init__(self, width: int):
-        super().__init__()
-        self.fc1 = nn.Linear(width, 4 * width)
-        self.fc2 = nn.Linear(4 * width, width)
-
-    def forward(self, tokens: Tensor) -> Tensor:
-        return self.fc2(F.gelu(self.fc1(tokens)))
-
-
-class _LayerScale(nn.Module):
-    def __init__(self, width: int):
-        super().__init__()
-        self.gamma = nn.Parameter(torch.ones(width))
-
-    def forward(self, tokens: Tensor) -> Tensor:
-        return tokens * self.gamma

@@ -5,6 +5,7 @@ Its decoders are DPT (Ranftl et al. 2021) as Depth Anything builds it, with the 
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -89,36 +90,28 @@ class Head(nn.Module):
                 nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1),
             ]
         )
-        self.scratch = _Scratch(pyramid, fused, outputs)
+        self.scratch = nn.ModuleDict()  # the name is the checkpoints'
+        for k, channels in enumerate(pyramid, 1):
+            self.scratch[f"layer{k}_rn"] = nn.Conv2d(channels, fused, 3, padding=1, bias=False)
+            self.scratch[f"refinenet{k}"] = _Fusion(fused)
+        self.scratch["output_conv1"] = nn.Conv2d(fused, fused // 2, 3, padding=1)
+        last = nn.Conv2d(fused // 2, 32, 3, padding=1), nn.ReLU(), nn.Conv2d(32, outputs, 1)
+        self.scratch["output_conv2"] = nn.Sequential(*last)
 
     def forward(self, features: Sequence[Tensor]) -> Tensor:
         """[B, outputs, 14 h, 14 w] without a last activation, from four tensors [B, width, h, w]."""
         rows, columns = features[0].shape[-2:]
         steps = zip(features, self.projects, self.resize_layers, strict=True)
         layers = [resize(project(x)) for x, project, resize in steps]
-        return self.scratch(layers, (rows * PATCH, columns * PATCH))
-
-
-class _Scratch(nn.Module):
-    """From the coarsest scale to the finest, then two convolutions. The name is the checkpoints'."""
-
-    def __init__(self, pyramid: Sequence[int], fused: int, outputs: int):
-        super().__init__()
-        for k, channels in enumerate(pyramid, 1):
-            self.add_module(f"layer{k}_rn", nn.Conv2d(channels, fused, 3, padding=1, bias=False))
-            self.add_module(f"refinenet{k}", _Fusion(fused))
-        self.output_conv1 = nn.Conv2d(fused, fused // 2, 3, padding=1)
-        self.output_conv2 = nn.Sequential(nn.Conv2d(fused // 2, 32, 3, padding=1), nn.ReLU(), nn.Conv2d(32, outputs, 1))
-
-    def forward(self, layers: Sequence[Tensor], size: tuple[int, int]) -> Tensor:
-        """[B, outputs, *size] from the four scales, finest first."""
-        fine = [getattr(self, f"layer{k}_rn")(x) for k, x in enumerate(layers, 1)]
-        fuse = [getattr(self, f"refinenet{k}") for k in range(1, 5)]
+        # From the coarsest scale to the finest, then two convolutions.
+        fine = [self.scratch[f"layer{k}_rn"](x) for k, x in enumerate(layers, 1)]
+        fuse = [self.scratch[f"refinenet{k}"] for k in range(1, 5)]
         path = fuse[3](fine[3], None, fine[2].shape[-2:])
         path = fuse[2](path, fine[2], fine[1].shape[-2:])
         path = fuse[1](path, fine[1], fine[0].shape[-2:])
         path = fuse[0](path, fine[0], tuple(2 * n for n in path.shape[-2:]))
-        return self.output_conv2(_resized(self.output_conv1(path), size))
+        whole = _resized(self.scratch["output_conv1"](path), (rows * PATCH, columns * PATCH))
+        return self.scratch["output_conv2"](whole)
 
 
 class _Fusion(nn.Module):
@@ -128,23 +121,19 @@ class _Fusion(nn.Module):
         super().__init__()
         self.out_conv = nn.Conv2d(channels, channels, 1)
         # The coarsest one never uses its first unit, but checkpoints carry it.
-        self.resConfUnit1 = _Residual(channels)
-        self.resConfUnit2 = _Residual(channels)
+        self.resConfUnit1 = _convolutions(channels)
+        self.resConfUnit2 = _convolutions(channels)
 
     def forward(self, path: Tensor, layer: Tensor | None, size: Sequence[int]) -> Tensor:
         if layer is not None:
-            path = path + self.resConfUnit1(layer)
-        return self.out_conv(_resized(self.resConfUnit2(path), size))
+            path = path + layer + self.resConfUnit1(layer)
+        return self.out_conv(_resized(path + self.resConfUnit2(path), size))
 
 
-class _Residual(nn.Module):
-    def __init__(self, channels: int):
-        super().__init__()
-        self.conv1 = nn.Conv2d(channels, channels, 3, padding=1)
-        self.conv2 = nn.Conv2d(channels, channels, 3, padding=1)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return x + self.conv2(F.relu(self.conv1(F.relu(x))))
+def _convolutions(channels: int) -> nn.Sequential:
+    """What a residual unit adds to its input."""
+    relu, conv = nn.ReLU, lambda: nn.Conv2d(channels, channels, 3, padding=1)
+    return nn.Sequential(OrderedDict(relu1=relu(), conv1=conv(), relu2=relu(), conv2=conv()))
 
 
 def _resized(x: Tensor, size: Sequence[int]) -> Tensor:
