@@ -116,7 +116,8 @@ def test_impossible_lamps_are_named():
 def test_envmap_files(tmp_path):
     write_exr(tmp_path / "sky.exr", spot(32))
     np.testing.assert_array_equal(read_envmap(tmp_path / "sky.exr"), spot(32))
-    assert read_envmap(tmp_path / "sky.exr").shape == (256, 512, 3)
+    write_exr(tmp_path / "large.exr", spot(300))
+    assert read_envmap(tmp_path / "large.exr").shape == (256, 512, 3)
     film = np.concatenate([spot(32), np.zeros((32, 64, 1), np.float32)], -1)  # as renderers write a world's picture
     write_exr(tmp_path / "film.exr", film)
     np.testing.assert_array_equal(read_envmap(tmp_path / "film.exr"), spot(32))

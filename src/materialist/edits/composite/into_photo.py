@@ -24,7 +24,7 @@ class CompositeSettings:
 
     floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
     most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
-    light_fade: float = 12.0  # how fast the fit's error goes when the light changes, per logarithm of the change
+    known: float = 2.0  # multiple of the fit's radiance up to which a pixel follows another light; by eye, 4 photos
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
     threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
@@ -104,23 +104,17 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
 
 
 def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
-    """out = edited + factor (photo - small) + kept (small - base), small the photo at working size.
+    """out = factor followed + (photo - followed), with followed = min(photo, known base) and factor = edited / base.
 
-    Beyond working size the photo has texture, which goes with the light: factor = edited / base. At working size the
-    fit's error is mostly shading, which belongs to the old light: it is kept as far as the new light is the old one
-    but for a constant g per channel, kept = g exp(-light_fade |ln(edited / base) - ln g|), averaged nearby.
+    What the fit leaves unexplained is mostly texture, which goes with the light as the surface does. A pixel far
+    brighter than the fit shows light that the fit does not know: that much of it stays as it is.
     """
-    import cv2
-
-    base, edited, floor = layers.base, layers.edited, DEFAULT.floor
-    ratio = np.log((np.maximum(edited, 0) + floor) / (np.maximum(base, 0) + floor))
-    overall = np.median(ratio.reshape(-1, 3), axis=0)
-    size = max(3, max(ratio.shape[:2]) // 8)
-    away = cv2.blur(np.abs(ratio - overall), (size, size), borderType=cv2.BORDER_REFLECT)
-    kept = np.exp(overall - DEFAULT.light_fade * away)
+    base, edited, floor = np.maximum(layers.base, 0), np.maximum(layers.edited, 0), DEFAULT.floor
+    factor = (edited + floor) / (base + floor)
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
-    change = edited + kept * (held - base) - photo.linear
-    return change, np.minimum(np.exp(ratio), DEFAULT.most_detail) - 1, photo.linear
+    followed = np.minimum(held + floor, DEFAULT.known * (base + floor))
+    change = (factor - 1) * followed + held - photo.linear
+    return change, np.minimum(factor, DEFAULT.most_detail) - 1, photo.linear
 
 
 def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
