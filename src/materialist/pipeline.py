@@ -139,8 +139,6 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
     if is_peaked(found.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
     poor = float((residual > 0.1).mean())
-    if poor > 0.05:
-        notes.append(f"The re-rendering is off by more than 0.1 (sRGB) on {poor:.0%} of the pixels; see overview.png.")
     return FitReport(
         stages=stages,
         metrics={

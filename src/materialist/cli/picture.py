@@ -120,10 +120,12 @@ def finish(
 ) -> None:  # fmt: skip
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import warnings_since
+    from materialist.edits.core.notes import effect_notes, warnings_since
     from materialist.io.package import save_scene
 
     save, warnings = rendering.save, warnings_since(scene, edited)
+    if not rendering.full_render:
+        warnings += effect_notes(scene, edited, picture)
     lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
         save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)

@@ -49,6 +49,8 @@ def invert(
     seconds = time.monotonic() - start
     quality = scene.report.metrics.get("rerender_psnr_path")
     figure = f", re-rendering {quality:.1f} dB" if quality is not None else ""
+    if (whole := scene.report.metrics.get("rerender_psnr_residual")) is not None:
+        figure += f" ({whole:.1f} with its shading residual)"
     lines = [
         f"{output}: done in {seconds:.0f} s with predictor {scene.prior.predictor}{figure}.",
         *(f"Note: {warning}" for warning in warnings),

@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from materialist.types import Scene
+import numpy as np
 
+from materialist.color import linear_to_srgb
+from materialist.types import Array, Scene
+
+LITTLE = 5 / 255
+"""Mean change of a picture (sRGB-encoded) below which another light is hardly seen."""
 PICTURED = "Glass of the two-interface model is a picture in the photo: "
 """The beginning of messages about glass that no rendering shows."""
 
@@ -25,6 +30,22 @@ def warned(scene: Scene, *notes: str) -> Scene:
 def warnings_since(scene: Scene, edited: Scene) -> list[str]:
     """The warnings of the edits that led from one scene to another, each once."""
     return list(dict.fromkeys(edited.report.warnings[len(scene.report.warnings) :]))
+
+
+def effect_notes(scene: Scene, edited: Scene, picture: Array) -> list[str]:
+    """What to say of a composite [H0, W0, 3] linear under another light that hardly differs from the photo."""
+    from materialist.edits.core.renderer import is_relit
+
+    if not is_relit(scene, edited):
+        return []
+    change = float(np.abs(linear_to_srgb(picture) - linear_to_srgb(scene.photo.original)).mean())
+    if change >= LITTLE:
+        return []
+    return [
+        f"The new light changes the picture by {255 * change:.1f} of 255 levels in the mean: the light that was found "
+        "is nearly even, or the new one does not reach what the photo shows. A lamp, a stronger or lower sun, or a "
+        "smaller ambient shows more."
+    ]
 
 
 def is_pictured(scene: Scene) -> bool:
