@@ -100,7 +100,7 @@ class EditBench(Benchmark):
 
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
         scene, mask, sample = awaited(self.latency, data, self.seed)
-        preview, cost = timed(Preview, scene, **shared)
+        preview, cost = timed(Preview, scene)
         yield {"method": "preview: built once", "sample": sample, **cost}
         changes = [edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
