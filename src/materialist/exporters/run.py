@@ -24,16 +24,9 @@ PAGE_TRIANGLES = 60_000
 
 
 def export(
-    scene: Scene,
-    path: str | Path,
-    *,
-    to: str | None = None,
-    force: bool = False,
-    max_triangles: int | None = None,
-    blender: str | None = None,
-    shadow_catcher: bool = False,
-    fitted_material: bool = False,
-) -> Exported:
+    scene: Scene, path: str | Path, *, to: str | None = None, force: bool = False, max_triangles: int | None = None,
+    blender: str | None = None, shadow_catcher: bool = False, fitted_material: bool = False,
+) -> Exported:  # fmt: skip
     """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
 
     Args:

@@ -58,14 +58,7 @@ class _Sheet:
     """Radius about its middle within which it goes on behind what the picture shows, scene units."""
 
 
-def complete(
-    mesh: Mesh,
-    planes: list[Plane],
-    depth: Array,
-    camera: Camera,
-    *,
-    walls: bool = False,
-) -> Mesh:
+def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, walls: bool = False) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.

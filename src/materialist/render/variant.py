@@ -188,15 +188,8 @@ def _start(mi, device: str) -> None:
         mi.set_variant(_VARIANTS[device])
     except ImportError as error:
         raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}).") from error
-    if device == "cpu":
-        _limit_threads()
-
-
-def _limit_threads() -> None:
-    import drjit as dr
-
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
-    if asked.isdigit() and 0 < int(asked) < dr.thread_count():
+    if device == "cpu" and asked.isdigit() and 0 < int(asked) < dr.thread_count():
         dr.set_thread_count(int(asked))
 
 

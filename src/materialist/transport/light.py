@@ -76,14 +76,9 @@ class _Product(torch.autograd.Function):
 
 
 def light_matrix(
-    cache: TransportCache,
-    materials: Materials,
-    rows: Array,
-    height: int,
-    *,
-    sphere_samples: int = 1024,
+    cache: TransportCache, materials: Materials, rows: Array, height: int, *, sphere_samples: int = 1024,
     specular_samples: int = 64,
-) -> LightMatrix:
+) -> LightMatrix:  # fmt: skip
     """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows.
 
     sphere_samples: rays of a pixel through the texels of the whole sphere, equally many through each and at least

@@ -24,17 +24,9 @@ RERENDERED = 64
 
 
 def composite(
-    scene: Scene,
-    edited: Scene,
-    *,
-    spp: int | None = None,
-    seed: int = 0,
-    full_render: bool = False,
-    denoise: bool = True,
-    upscale: Upscale | None = None,
-    device: str = "auto",
-    progress=None,
-) -> Array:
+    scene: Scene, edited: Scene, *, spp: int | None = None, seed: int = 0, full_render: bool = False,
+    denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
+) -> Array:  # fmt: skip
     """The photograph with the edit in it: [H0, W0, 3] float32 linear, at the photo's native size.
 
     Bit for bit the photo's own values where the edit does not reach, everywhere if it changes nothing; HDR stays HDR.

@@ -38,9 +38,14 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
     At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
     """
+    return _in_front(
+        _changed(photo, layers) if layers.reached.any() else photo.original.copy(), layers.native, photo.hdr
+    )
+
+
+def _changed(photo: Photo, layers: Layers) -> Array:
+    """[H0, W0, 3] the same without the new bodies."""
     out = photo.original.copy()
-    if not layers.reached.any():
-        return _in_front(out, layers.native, photo.hdr)
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
@@ -49,7 +54,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
     changed = layers.changed
     reached = (stack[..., :3] != 0).any(-1)
     if not reached.any():
-        return _in_front(out, layers.native, photo.hdr)
+        return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
 
     def laid(rows: slice) -> None:
@@ -68,7 +73,7 @@ def into_photo(photo: Photo, layers: Layers) -> Array:
 
     with ThreadPoolExecutor(min(DEFAULT.threads, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
-    return _in_front(out, layers.native, photo.hdr)
+    return out
 
 
 def onto_working(photo: Photo, layers: Layers) -> Array:

@@ -61,20 +61,17 @@ class EditRenderer:
         seen = np.zeros(self.scene.depth.shape, bool)
         for scene, other in ((self.scene, edited), (edited, self.scene)):
             own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
-            own += new_lamps(other, scene)
-            if own:
-                seen |= self._seen(scene, own) > 0
+            seen |= self._seen(scene, own + new_lamps(other, scene)) > 0
         return seen
 
     def body_coverage(self, scene: Scene) -> Array:
         """[H, W] share of each pixel in which one of its bodies is seen."""
-        names = [f"body{k}" for k in range(len(scene.bodies))]
-        return self._seen(scene, names) if names else np.zeros(scene.depth.shape, np.float32)
+        return self._seen(scene, [f"body{k}" for k in range(len(scene.bodies))])
 
     def emitter_pixels(self, edited: Scene) -> Array:
         """[H, W] bool: where in-photo emitters of `edited` are seen."""
         names = [f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(PHOTO_LIGHT)]
-        return self._seen(edited, names) > 0.5 if names else np.zeros(edited.depth.shape, bool)
+        return self._seen(edited, names) > 0.5
 
     def guides(self, edited: Scene, covered: Array | None = None) -> tuple[Array, Array]:
         """Albedo and normal [H, W, 3] of the edited scene for the denoiser.
@@ -109,6 +106,8 @@ class EditRenderer:
         """[H, W] share of each pixel in which the named bodies are seen."""
         from materialist.render.coverage import coverage
 
+        if not names:
+            return np.zeros(scene.depth.shape, np.float32)
         return coverage(self._target(scene).mi_scene, scene.camera, names)
 
     def _target(self, scene: Scene):

@@ -28,7 +28,7 @@ def uniform_surface(albedo: Array | float, roughness: float, metallic: float, **
     return Surface(colour, flat(roughness), flat(metallic), **fields)
 
 
-def triple(values: Array) -> tuple[float, float, float]:
+def triple(values: Array | Sequence[float]) -> tuple[float, float, float]:
     """Three numbers as a tuple of plain floats, as files and comparisons want them."""
     a, b, c = (float(v) for v in values)
     return a, b, c

@@ -35,6 +35,7 @@ class GlassPreview:
 
     def __init__(self, scene: Scene, mask: Array, options: Glass | None = None, **values: Any):
         from materialist.edits.core.sky import photo_sky
+        from materialist.render.coverage import first_hits
         from materialist.render.variant import setup
 
         self._options = options = Glass.given(options, **values)
@@ -48,9 +49,13 @@ class GlassPreview:
         self._light = self._edited.envmap if sky is None else sky
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
-        self.share: Array
+        traced, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
+        self.share = first_hits(traced, scene.camera, body, self._size).share
         """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
-        self._look()
+        if not self.share.any():
+            raise InputError("The camera sees nothing of the object; mark another one.")
+        self._box = window(self.share > 0, margin=MARGIN)
+        self._guide = first_hits(traced, scene.camera, body, self._size, self._box)
 
     def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
         """[H, W, 3] float32 linear at working size: the photo with the object as glass.
@@ -78,17 +83,6 @@ class GlassPreview:
     def filled(self) -> Array:
         """[H, W] bool: where a picture is not the photo, for the object stood there and the glass does not."""
         return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
-
-    def _look(self) -> None:
-        """What of the body is seen where."""
-        from materialist.render.coverage import first_hits
-
-        scene, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
-        self.share = first_hits(scene, self.scene.camera, body, self._size).share
-        if not self.share.any():
-            raise InputError("The camera sees nothing of the object; mark another one.")
-        self._box = window(self.share > 0, margin=MARGIN)
-        self._guide = first_hits(scene, self.scene.camera, body, self._size, self._box)
 
     def _target(self, surface: Surface) -> RenderScene:
         """The ray tracer's scene with the body of that glass."""

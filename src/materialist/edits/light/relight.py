@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -241,19 +241,15 @@ def moving_light(
     closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
     for k in range(count):
         t = k / (count if closed else count - 1)
-        sun = tuple(_between(np.asarray(suns), t)) if suns else None
-        lamp = _lamp_between(lamps, t) if lamps else None
+        sun = tuple(_between(suns, t)) if suns else None
+        lamp = None
+        if lamps:
+            x, y, z, *power, radius = _between([(*one.position, *one.power, one.radius) for one in lamps], t)
+            lamp = Lamp((x, y, z), triple(power), radius)
         yield relight(scene, wanted, rotate=t * turn, sun=sun, lamps=(lamp,) if lamp else ())
 
 
-def _between(stations: Array, t: float) -> Array:
-    """[...] at time t in [0, 1] between stations [n, ...]."""
-    place = t * (len(stations) - 1)
-    k = min(int(place), max(len(stations) - 2, 0))
-    following = stations[min(k + 1, len(stations) - 1)]
-    return stations[k] + (following - stations[k]) * (place - k)
-
-
-def _lamp_between(lamps: tuple[Lamp, ...], t: float) -> Lamp:
-    at = lambda name: _between(np.array([getattr(lamp, name) for lamp in lamps], np.float64), t)  # noqa: E731
-    return replace(lamps[0], position=triple(at("position")), power=triple(at("power")), radius=float(at("radius")))
+def _between(stations: Sequence[tuple[float, ...]], t: float) -> list[float]:
+    """The numbers at time t in [0, 1] between stations at even times."""
+    times = np.linspace(0, 1, len(stations))
+    return [float(np.interp(t, times, numbers)) for numbers in zip(*stations, strict=True)]

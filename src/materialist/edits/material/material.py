@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from materialist.camera import unproject
+from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region
@@ -112,28 +112,20 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     points = unproject(scene.depth, scene.camera)
     right, up = _tangents(scene.normal[use].mean(0))
     across, along = points @ right, points @ -up  # [H, W], scene units, along growing downwards as rows do
-    u, v = _unit(across, use), _unit(along, use)
     h, w = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
     extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
-    u, v = u * np.ptp(across[use]) / (extent * w), v * np.ptp(along[use]) / (extent * h)
+    u, v = ((place - place[use].min()) / (extent * n) for place, n in ((across, w), (along, h)))
     return _repeated(picture, u, v)
 
 
 def _tangents(normal: Array) -> tuple[Array, Array]:
     """Unit vectors to the right and up in the plane of `normal` [3], as the camera sees them."""
-    normal = normal / max(float(np.linalg.norm(normal)), 1e-9)
+    normal = unit(normal)
     # On a floor the way up leads into the depth, on a ceiling out of it.
     up = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.9 else np.array([0.0, 0.0, -np.sign(normal[1])])
-    right = np.cross(up, normal)
-    right /= np.linalg.norm(right)
+    right = unit(np.cross(up, normal))
     return right, np.cross(normal, right)
-
-
-def _unit(values: Array, use: Array) -> Array:
-    """Values [H, W] moved and scaled so that the region runs from 0 to 1."""
-    low, high = values[use].min(), values[use].max()
-    return (values - low) / max(high - low, 1e-9)
 
 
 def _repeated(picture: Array, u: Array, v: Array) -> Array:

@@ -18,13 +18,9 @@ _CORNERS = (2, 3)
 
 
 def segment(
-    linear: Array,
-    points: Sequence[tuple[int, int]],
-    box: tuple[int, int, int, int] | None = None,
-    *,
-    where: str = REPO,
-    device: str = "auto",
-) -> Array:
+    linear: Array, points: Sequence[tuple[int, int]], box: tuple[int, int, int, int] | None = None, *,
+    where: str = REPO, device: str = "auto",
+) -> Array:  # fmt: skip
     """[H, W] bool of the object at the clicks (column, row) or in the box, by SAM 2.
 
     linear: [H, W, 3] photo. where: a folder that holds the model, or a hub id that was downloaded.

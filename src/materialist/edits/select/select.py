@@ -16,14 +16,10 @@ METHODS = ("network", "grabcut", "sam2")
 
 
 def select(
-    scene: Scene,
-    *,
-    click: Sequence[float] | Sequence[Sequence[float]] | None = None,
-    box: Sequence[float] | None = None,
-    mask: Array | str | Path | None = None,
-    method: str = "network",
+    scene: Scene, *, click: Sequence[float] | Sequence[Sequence[float]] | None = None,
+    box: Sequence[float] | None = None, mask: Array | str | Path | None = None, method: str = "network",
     device: str = "auto",
-) -> Array:
+) -> Array:  # fmt: skip
     """[H, W] bool mask at working size of the object at a click, in a box, or in a rough mask.
 
     Args:
