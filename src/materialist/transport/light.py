@@ -86,57 +86,34 @@ def light_matrix(
     specular_samples: further rays of a pixel along its specular lobe.
     """
     pixels = cache.pixels[rows]
-    rough, metallic, albedo = (m[pixels] for m in flat(materials))
-    shape = (height, 2 * height)
+    maps = materials.roughness, materials.metallic, materials.albedo
+    rough, metallic, albedo = (values.reshape(-1, *values.shape[2:])[pixels] for values in maps)
+    shape, per_texel = (height, 2 * height), max(1, round(sphere_samples / (2 * height * height)))
+    scene: Any = cache.scene
     parts = torch.zeros(2, len(rows), height * 2 * height)
-    free, faced = torch.zeros(2, height * 2 * height)
+    free, faced = torch.zeros(2, height * 2 * height)  # diffuse light that leaves the scene, and all that there is
     hits = []
-    for some in rays(cache, rows, rough, metallic, shape, per_texel(sphere_samples, height), specular_samples):
-        slot = met(cache, some.ray)
+    for some in rays(cache, rows, rough, metallic, shape, per_texel, specular_samples):
+        pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
+        slots_met = dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid())
+        slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] uint32 radiance slot that each ray meets
         index, share = bilinear(np.array(some.ray.d).T, shape)
         leaves = slot == MISS
         for part, weight in zip(parts, some.weights, strict=True):
             add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
         if some.diffuse is not None:
-            add_to_map(faced, index, share, some.diffuse)
-            add_to_map(free, index[leaves], share[leaves], some.diffuse[leaves])
+            for out, kept in ((faced, np.ones_like(leaves)), (free, leaves)):
+                add_footprints(out, index[kept], share[kept], some.diffuse[kept], 0 * some.row[kept])
         hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
     row, slots, hit_weight = (torch.from_numpy(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
         torch.from_numpy(pixels.astype(np.int64)), shape, parts, torch.stack([row, slots.long()]), hit_weight,
-        torch.from_numpy(albedo.astype(np.float32)), openness(free, faced),
+        torch.from_numpy(albedo.astype(np.float32)), torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0),
     )  # fmt: skip
 
 
-def flat(materials: Materials) -> tuple[Array, Array, Array]:
-    """Roughness [H * W], metallic [H * W] and albedo [H * W, 3]."""
-    return materials.roughness.reshape(-1), materials.metallic.reshape(-1), materials.albedo.reshape(-1, 3)
-
-
-def openness(free: torch.Tensor, faced: torch.Tensor) -> torch.Tensor:
-    """`LightMatrix.open` from the diffuse light that leaves the scene and all that there is, by texel."""
-    return torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0)
-
-
-def per_texel(samples: int, height: int) -> int:
-    """Rays through each texel of a map of so many rows, for so many over the sphere."""
-    return max(1, round(samples / (2 * height * height)))
-
-
-def met(cache: TransportCache, ray: Any) -> Array:
-    """[N] uint32 radiance slot that each ray meets, or MISS."""
-    scene: Any = cache.scene
-    pi = scene.ray_intersect_preliminary(ray, coherent=False)
-    return np.array(dr.select(pi.is_valid(), dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid()), MISS))
-
-
-def add_to_map(out: torch.Tensor, index: Array, share: Array, weight: Array) -> None:
-    """Add rays [N] to out [texels]: their weight [N] to the texels index [N, 4] by share [N, 4]."""
-    add_footprints(out, index, share, weight, np.zeros(len(index), np.int64))
-
-
 def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
-    """The same to the rows [N] of out [rows, texels]."""
+    """Add rays [N] to their rows [N] of out [rows, texels]: their weight [N] to the texels index by share [N, 4]."""
     flat = row[:, None] * out.shape[-1] + index
     values = (share * weight[:, None]).astype(np.float32)
     out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))

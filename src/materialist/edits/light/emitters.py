@@ -92,11 +92,13 @@ def dimmed(
             "The lights of a photo are found in the scene before its edits; give that as fitted=, or dim first."
         )
     known = fitted or scene
-    masks = visible_lights(known) if lights is None else _given(known, lights)
-    if not masks:
+    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5)
+    if not any(mask.sum() >= DEFAULT.pixels for mask in masks):
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
             "mark the lights that you mean."
+            if lights is None
+            else f"The mask of lights has no connected part of {DEFAULT.pixels} pixels; mark the whole light."
         )
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
     masks = [part for mask in masks for part in _parts(mask & ~gone) if part.sum() >= DEFAULT.pixels]
@@ -122,14 +124,6 @@ def _parts(mask: Array) -> list[Array]:
 
     label, count = ndimage.label(mask)
     return [label == k for k in range(1, count + 1)]
-
-
-def _given(scene: Scene, lights: Array) -> list[Array]:
-    """The parts of a mask of emitters that are large enough to be a surface."""
-    masks = [part for part in _parts(checked_region(scene, lights) > 0.5) if part.sum() >= DEFAULT.pixels]
-    if not masks:
-        raise InputError(f"The mask of lights has no connected part of {DEFAULT.pixels} pixels; mark the whole light.")
-    return masks
 
 
 def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, float]], float | None]:
