@@ -71,6 +71,13 @@ def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):
     session.undo()
     session.undo()
     assert session.edits.steps[0].options["envmap"] == "a.exr"
+    session.undo(again=True)
+    session.undo(again=True)
+    assert session.edits.steps[0].options["envmap"] == "b.exr" and len(session.edits.steps[0].options["lamps"]) == 1
+    session.undo()
+    session.light(ambient="0.5")
+    with pytest.raises(InputError, match="nothing to do again"):
+        session.undo(again=True)
 
 
 def test_a_selection_that_grows_takes_its_edit_along(session):

@@ -14,11 +14,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from materialist.edits.recipe import Step
+from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.workspace import read_list, store, with_plain_files
+from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
@@ -43,7 +43,7 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
         with _members(archive, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (given, members):
             name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
             _extract(given, {name: members[name]}, folder, shown)
-            steps = read_list(folder / name)
+            steps = read_recipe(folder / name)
             wanted = _named(steps)
             if lacking := sorted(wanted - {*members}):
                 raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")

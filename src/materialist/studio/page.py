@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from functools import partial
 from typing import Any
 
 import gradio as gr
@@ -84,12 +85,14 @@ def _left(parts: dict[str, Any]) -> None:
         info=missing or "A trained network in place of colour, depth and normals; seconds a click.",
     )  # fmt: skip
     with gr.Row():
-        parts["undo"] = gr.Button("Undo", size="sm", min_width=80)
+        parts["undo"] = gr.Button("Undo", size="sm", min_width=70, elem_id="undo")
+        parts["redo"] = gr.Button("Redo", size="sm", min_width=70, elem_id="redo")
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
         parts["draft"] = gr.Button("Quick look, path traced", size="sm", min_width=150)
         parts["final"] = gr.Button("Final picture", size="sm", variant="primary", min_width=120)
-        parts["stop"] = gr.Button("Stop", size="sm", variant="stop", min_width=70, visible=False)
     parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
+    # Not beside "Final picture": it must not come to lie where that was just clicked.
+    parts["stop"] = gr.Button("Stop", size="sm", variant="stop", visible=False)
     parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
 
 
@@ -124,14 +127,10 @@ def _wire(context: PageContext) -> None:
     settings = [context[name] for name in ("sam", "kelvin", "power", "before")]
     context["stage"].pick(pick, settings, context.all_parts, **every)
     context["steps"].act(act, None, [*context.all_parts, context["tabs"], context["glass_part"]], **every)
-    context.on(context["undo"].click, _undo, everything=True, trigger_mode="multiple")
+    for name, change in (("undo", Session.undo), ("redo", partial(Session.undo, again=True))):
+        context.on(context[name].click, change, everything=True, trigger_mode="multiple")
     context.on(context["deselect"].click, Session.deselect, everything=True, trigger_mode="once")
     _wire_final(context)
-
-
-def _undo(session: Session) -> None:
-    if not session.undo():
-        raise InputError("There is nothing to take back.")
 
 
 def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:

@@ -72,7 +72,7 @@ class LivePreview:
             try:
                 return apply(self.scene, [step], onto=before)
             except InputError as error:
-                reason = str(error).removeprefix(f"Step 1 ({step.kind}): ").replace(f"{step.folder}/", "")
+                reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
                 raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
         return _kept(self._edited, steps, make) if steps else self.scene

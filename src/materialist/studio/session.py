@@ -48,10 +48,9 @@ class FinalPicture:
 class Session:
     """The state of one page. Its methods may be called from any thread."""
 
-    def __init__(self, person: str, shown: Callable[[str], str] = str):
-        self.person = person
-        self.shown = shown
-        """Takes what the person must not see out of a text for the page, see `Studio.shown`."""
+    def __init__(self, person: str, shown: Callable[[str], str] = str, local: bool = True):
+        self.person, self.shown, self.local = person, shown, local
+        """`shown` is `Studio.shown`; `local`: the person has the command line of this machine, too."""
         self.beats = 0
         """Requests that the page holds as long as it is open."""
         self.seen = 0.0
@@ -67,6 +66,8 @@ class Session:
         """How many falls were begun here: each tumbles in its own way."""
         self.edits = EditList()
         self._past: list[tuple[str, EditList, Selection]] = []
+        self._future: list[tuple[str, EditList, Selection]] = []
+        """What was taken back."""
         self.running: list[Job] = []
         """The jobs that this page asked for."""
         self.mark = secrets.token_hex(4)
@@ -115,8 +116,10 @@ class Session:
         try:
             steps = read_steps(workspace, workspace / EDITS) if kept is not None else ()
         except InputError as error:
-            raise InputError(f"The edits of this photo cannot be read, and were left as they are: {error} Repair or "
-                             f"rename {workspace / EDITS}.") from error  # fmt: skip
+            place = f"{EDITS} in {project.name}/{workspace.name} of the work folder"
+            raise InputError(
+                f"The edits of this photo cannot be read, and were left as they are: {error} Repair or rename {place}."
+            ) from error
         with self.lock:
             self.close()
             self.project, self.live, self.glass = project, LivePreview(loaded), GlassClient(project.scene)
@@ -133,7 +136,7 @@ class Session:
                 for suffix in (".png", ".exr", ".jpg"):
                     self.final.path.with_suffix(suffix).unlink(missing_ok=True)
             self.project = self.live = self.glass = self.final = None
-            self.edits, self._past = EditList(), []
+            self.edits, self._past, self._future = EditList(), [], []
             self.selection = Selection()
 
     # Selecting
@@ -226,17 +229,18 @@ class Session:
                 self._take_up_object()
             self.save()
 
-    def undo(self) -> bool:
-        """Take back the last change; False where there is none."""
+    def undo(self, *, again: bool = False) -> None:
+        """Take back the last change, or do it again. Raises InputError where there is none."""
         with self.lock:
-            if not self._past:
-                return False
+            source, target = (self._future, self._past) if again else (self._past, self._future)
+            if not source:
+                raise InputError("There is nothing to do again." if again else "There is nothing to take back.")
             self._check_unchanged()
-            _, self.edits, self.selection = self._past.pop()
+            target.append(("", self.edits, self.selection))
+            _, self.edits, self.selection = source.pop()
             if self._past:  # a slider that moves on now begins anew
                 self._past[-1] = ("", *self._past[-1][1:])
             self.save()
-            return True
 
     def read_edits(self, file: Path) -> None:
         """Put the steps of an uploaded edits.yaml, or of a zip of it and its files, in place of the edits.
@@ -268,6 +272,7 @@ class Session:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""
         if what != "select":
             self._check_unchanged()
+        self._future = []
         if not (moving and self._past and self._past[-1][0] == what):
             self._past = [*self._past[-SETTINGS.undo_steps :], (what, self.edits, self.selection)]
 
@@ -276,10 +281,7 @@ class Session:
         step = edits.current_step
         if step is None or not {*REGION} & {*step.options}:
             return Selection()
-        try:
-            return Selection((region_of(self.scene, step),))
-        except InputError as error:
-            raise InputError(str(error).replace(f"{step.folder}/", "")) from error
+        return Selection((region_of(self.scene, step),))
 
     def _check_unchanged(self) -> None:
         """Raises InputError where another page, or a person, has written the edits since this page did."""

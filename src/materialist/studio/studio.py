@@ -61,17 +61,17 @@ class Studio:
     def session(self, page: str | None, person: str) -> Session:
         """The session of a page, by Gradio's session hash. Raises InputError where it is another person's."""
         with self._lock:
-            known = self._sessions.setdefault(page, Session(person, self.shown)) if page else None
+            known = self._sessions.setdefault(page, Session(person, self.shown, self.single_user)) if page else None
             if known is None or known.person != person:
                 raise InputError(LOST)
             known.seen = time.monotonic()
             return known
 
     def shown(self, text: str) -> str:
-        """A text for a page: names alone in place of paths of this machine, where others can reach it."""
-        for root in () if self.single_user else (self.work.root, self.work.cache):
-            text = text.replace(f"{root}/", "")
-        return text if self.single_user else _FOLDERS.sub("", text)
+        """A text for a page: names in place of the paths of this machine."""
+        for root in (self.work.root, self.work.cache):
+            text = text.replace(f"{root}/", "/")
+        return _FOLDERS.sub("", text)
 
     def note_upload(self, person: str, size: str) -> None:
         """Count an upload by its Content-Length. Raises InputError above the quota, and where the disk is full."""

@@ -89,14 +89,8 @@ def _take_mesh(session: Session, file: Path) -> None:
     from materialist.edits.insert.meshes import read_model
 
     suffix = uploads.checked_mesh(file, file.name)
-    kept = session.workspace / store(session.workspace, file, "mesh", suffix)
-    try:
-        with uploads.without_folders(kept, file.name):
-            read_model(kept)
-    except Exception:
-        kept.unlink(missing_ok=True)
-        raise
-    objects.set_option(session, "mesh", kept.name)
+    read_model(file)
+    objects.set_option(session, "mesh", store(session.workspace, file, "mesh", suffix))
 
 
 def _made_of(session: Session, kind: str, colour: str) -> None:
@@ -146,9 +140,6 @@ def _wire_fall(context: PageContext) -> None:
             notes = session.shown(" ".join(objects.let_fall(session, float(height))))
         finally:
             yield {parts["fall_progress"]: ""}
-        yield {
-            **context.everything(session),
-            parts["fall_progress"]: box(notes) if notes else "",
-        }
+        yield {**context.everything(session), parts["fall_progress"]: box(notes) if notes else ""}
 
     parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **LONG)

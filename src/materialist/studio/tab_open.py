@@ -146,8 +146,7 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     project = context.studio.work.new(file.stem, session.person)
     try:
         archives.unpack_scene(file, project.scene, file.name)
-        with uploads.without_folders(project.scene, file.name):
-            load_scene(project.scene, most=SETTINGS.decoded_bytes)
+        load_scene(project.scene, most=SETTINGS.decoded_bytes)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise

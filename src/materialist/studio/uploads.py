@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from materialist.errors import InputError, MaterialistError
+from materialist.errors import InputError
 from materialist.io.bitmap import check_size
 from materialist.io.decode import RAW_SUFFIXES, image_size
 from materialist.studio import SETTINGS
@@ -27,9 +25,15 @@ def checked_picture(path: Path, name: str) -> str:
     if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
     check_bytes(path, shown)
-    size = None if suffix in RAW_SUFFIXES else _size(path, shown)
-    if size is not None:
-        width, height = size
+    if suffix not in RAW_SUFFIXES:
+        try:
+            width, height = image_size(path)
+        except InputError:
+            raise
+        except Exception as error:  # decoders raise anything
+            raise InputError(
+                f"{shown} is not an image this program can read; export it again as PNG or JPEG."
+            ) from error
         if width * height > SETTINGS.upload_pixels:
             raise InputError(
                 f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the studio takes up to "
@@ -37,16 +41,6 @@ def checked_picture(path: Path, name: str) -> str:
             )
         check_size(width, height, shown)
     return suffix
-
-
-def _size(path: Path, shown: str) -> tuple[int, int]:
-    """(width, height) from the header, without decoding. Raises InputError where there is none."""
-    try:
-        return image_size(path)
-    except InputError as error:
-        raise InputError(without_paths(str(error), path, shown)) from error
-    except Exception as error:  # decoders raise anything
-        raise InputError(f"{shown} is not an image this program can read; export it again as PNG or JPEG.") from error
 
 
 def checked_mesh(path: Path, name: str) -> str:
@@ -71,20 +65,6 @@ def checked_mesh(path: Path, name: str) -> str:
 def shown_name(name: str) -> str:
     """The user's name of a file, on one line for a message."""
     return " ".join(Path(name).name.split())[:60] or "The file"
-
-
-def without_paths(text: str, path: str | Path, name: str) -> str:
-    """A message that names a file as the user does, and no folder of this machine."""
-    return text.replace(str(path), name).replace(f"{Path(path).parent}/", "")
-
-
-@contextmanager
-def without_folders(path: Path, name: str) -> Iterator[None]:
-    """Pass errors about a file on `without_paths`."""
-    try:
-        yield
-    except MaterialistError as error:
-        raise type(error)(without_paths(str(error), path, shown_name(name))) from error
 
 
 def check_bytes(path: Path, shown: str) -> None:

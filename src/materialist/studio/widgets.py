@@ -25,7 +25,6 @@ from materialist.studio.edit_list import summary
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import PERSON, Studio
-from materialist.studio.uploads import without_paths
 
 LIVE: dict[str, Any] = {
     "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
@@ -219,16 +218,9 @@ def shown(jobs: JobQueue, job: Job) -> State:
 
 
 def failure(job: Job) -> str:
-    """The reason of a failure; it names files without their folders, and the photo by its title."""
-    text = job.message
-    for step in job.arguments.get("steps", ()):
-        text = text.replace(f"{step.folder}/", "")
-    for key in ("photo", "scene", "output"):
-        if key in job.arguments:
-            file = Path(job.arguments[key])
-            title = job.arguments.get("title", file.name) if key == "photo" else file.name
-            text = without_paths(text, file, str(title))
-    return text
+    """The reason of a failure; it names the photo by its title."""
+    photo = job.arguments.get("photo")
+    return job.message.replace(str(photo), job.arguments["title"]) if photo else job.message
 
 
 def words(stage: str) -> str:
@@ -256,7 +248,8 @@ def commands(session: Session) -> str:
     project = session.project
     if project is None:
         return ""
-    lines, scene = [f"cd {quote(session.shown(str(project.folder)))}"], quote(session.shown(str(project.scene)))
+    place = str if session.local else session.shown
+    lines, scene = [f"cd {quote(place(str(project.folder)))}"], quote(place(str(project.scene)))
     if session.edits.active:
         lines.append(f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene")
         scene = "edited.scene"

@@ -151,15 +151,7 @@ def _written(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
     """The steps of a list of edits, which may name files of this workspace only. Raises InputError."""
-    return tuple(confined(step, workspace) for step in read_list(file))
-
-
-def read_list(file: Path) -> list[Step]:
-    """`read_recipe`, with messages that do not say where the file lies."""
-    try:
-        return read_recipe(file)
-    except InputError as error:
-        raise InputError(str(error).replace(str(file), "the file")) from error
+    return tuple(confined(step, workspace) for step in read_recipe(file))
 
 
 def confined(step: Step, workspace: Path) -> Step:

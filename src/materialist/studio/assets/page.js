@@ -15,6 +15,12 @@
       if (name) box.setAttribute("aria-label", name.textContent.trim());
     }
   }).observe(document.body, { childList: true, subtree: true });
+  document.addEventListener("keydown", (e) => {
+    const key = e.key.toLowerCase(), typing = e.target.matches("textarea, input:not([type=range], [type=checkbox], [type=radio])");
+    if (!(e.ctrlKey || e.metaKey) || typing || (key !== "z" && key !== "y")) return;
+    e.preventDefault();
+    document.getElementById(key === "y" || e.shiftKey ? "redo" : "undo").click();
+  });
   let timer;
   const say = (text) => {
     // The server has made markup of a message harmless; here it is text again.
