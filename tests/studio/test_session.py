@@ -1,5 +1,7 @@
 """A page's session, on a small scene with a real preview."""
 
+import weakref
+
 import numpy as np
 import pytest
 from studio_scenes import block, click, named, room
@@ -10,6 +12,7 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
+from materialist.studio.preview import free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -149,7 +152,12 @@ def test_reopened_where_it_was_left(studio, session):
     assert "materialist apply" in commands(other) and "edits-me/edits.yaml" in commands(other)
     other.light(rotate="5")
     assert len(session.edits.steps) == 1  # in memory they are apart
+    other.live.wait()
+    stage(other)
+    known = [weakref.ref(one) for one in (other.live.scene, other.live._preview.result())]
     studio.leave("another page")
+    free_memory().result()
+    assert [one() for one in known] == [None, None]
     assert other.live is None and session.live is not None
     with pytest.raises(InputError, match="Open a photo"):
         other.set("edit", hue="1")

@@ -125,7 +125,8 @@ def serve(
         while not server.started and thread.is_alive():
             time.sleep(0.01)
         if on_ready is not None and server.started:
-            on_ready(f"http://{f'[{host}]' if ':' in host else host}:{port}/")
+            name = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+            on_ready(f"https://{proxy}/" if proxy else f"http://{name}:{port}/")
         while thread.is_alive() and not stop.wait(0.5):
             studio.sweep()
     except KeyboardInterrupt:
