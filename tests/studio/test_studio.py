@@ -182,3 +182,11 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
     assert process.wait(30) == -15 and held
     until(lambda: not list((tmp_path / "work").glob(".partial-*")))
     assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []
+
+
+def test_a_page_shows_that_it_is_open(shared):
+    """Without it a page would be forgotten a minute after its last request."""
+    pytest.importorskip("gradio", reason="needs gradio")
+    from materialist.studio.page import build
+
+    assert build(shared).get_config_file()["connect_heartbeat"]

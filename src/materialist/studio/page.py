@@ -56,6 +56,8 @@ def build(studio: Studio) -> Any:
         for tab in (tab_material, tab_light, tab_object, tab_look, tab_take):
             tab.wire(context)
         tab_open.wire(context, page)
+        # For an event of its end alone a page shows, by a request that it holds (`Gate`), that it is open.
+        page.unload(lambda: None)
     return page
 
 
