@@ -45,7 +45,15 @@ def invert(
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
-    start = time.perf_counter()
+    start = last = time.perf_counter()
+    stages: list[dict] = []
+
+    def lap(name: str) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        stages.append({"name": name, "seconds": round(now - last, 3)})
+        last = now
+
     wanted = InvertOptions.given(options, **values)
     preset = "paper" if wanted.engine == "path" else wanted.preset
     tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
@@ -54,8 +62,10 @@ def invert(
     if isinstance(photo, Photo) and wanted.fov != "auto":
         picture = replace(picture, camera=replace(picture.camera, fov=cast(float, wanted.fov)), fov_source="option")
     mask = _mask(wanted.mask, picture)
+    lap("read")
     tick("predict", 0, 1)
-    picture, prior, stages = _prior(picture, wanted)
+    picture, prior = _prior(picture, wanted)
+    lap("predict")
     if mask is not None and not (mask & (prior.depth > 0)).any():
         raise InputError("The mask lies wholly where there is no surface (sky); mark an object.")
     tell("prior", prior)
@@ -75,6 +85,7 @@ def invert(
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
         device=wanted.device, spp=wanted.spp,
     )  # fmt: skip
+    lap("setup")
     best = fitting.invert(fit_setup, progress=progress, found=tell)
     prepared = best.prepared
     report = _report(picture, prior, best, (*stages, *best.stages), start)
@@ -92,18 +103,16 @@ def invert(
     )  # fmt: skip
 
 
-def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction, tuple[dict, ...]]:
-    """(the photo as the predictor sees it, the prior, what the report says of it)."""
+def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
+    """The photo as the predictor sees it, and the prior."""
     if wanted.prior is not None:
-        return picture, wanted.prior, ()
+        return picture, wanted.prior
     from materialist.predict import get_predictor
 
     parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
     source = get_predictor(wanted.predictor, device=wanted.device, **parts)
     picture = _seen_by(source, picture)
-    start = time.perf_counter()
-    prior = _predict(picture, source, wanted.seed)
-    return picture, prior, ({"name": "predict", "seconds": round(time.perf_counter() - start, 3)},)
+    return picture, _predict(picture, source, wanted.seed)
 
 
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:

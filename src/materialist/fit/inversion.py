@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -63,23 +64,26 @@ class Fit:
     # -- stages --------------------------------------------------------------------------------------------------------
 
     def _fit_light(self, state: FitState, materials: Materials) -> None:
-        settings, photo = self.settings.light, self._photo()
+        start, settings, photo = time.perf_counter(), self.settings.light, self._photo()
         light = envmap_field(settings, seed=self.seed, start=start_radiance(photo, settings))
         problem = self.engine.light_problem(materials)
         result = fit_light(problem, photo, light, settings, seed=self.seed, progress=self.progress)
-        state.stages.append(result.summary())
         envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
         white = HDR_CLIP if self.photo.hdr else CLIPPED
         state.envmap = paste_visible_sky(envmap, self.photo.linear, self._surface(), self.photo.camera, white=white)
+        state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
         """From the state's maps, which L_cons holds on to."""
+        start = time.perf_counter()
         problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if self.mask is None else torch.from_numpy(self.mask.reshape(-1)[pixels.numpy()])
         model = material_field(held, settings, pixels, self.photo.camera, inside=inside, seed=self.seed)
         results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
-        state.stages += [r.summary() for r in results]
+        summaries = [r.summary() for r in results]
+        summaries[0]["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)  # the tables
+        state.stages += summaries
         state.maps = model().detach()
 
     def _white_light_first(self, state: FitState) -> FitState:
