@@ -12,7 +12,7 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
-from materialist.studio.preview import free_memory
+from materialist.studio.preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -159,6 +159,10 @@ def test_reopened_where_it_was_left(studio, session):
     free_memory().result()
     assert [one() for one in known] == [None, None]
     assert other.live is None and session.live is not None
+    live = LivePreview(session.scene)
+    live.close()
+    with pytest.raises(InputError, match="was closed"):  # it does not wait for ever
+        live.wait()
     with pytest.raises(InputError, match="Open a photo"):
         other.set("edit", hue="1")
 

@@ -113,6 +113,7 @@ class LivePreview:
         """Give the memory back."""
         self._preview.cancel()
         self._preview = Future()
+        self._preview.set_exception(InputError("This photo was closed; open it again."))  # for who waits
         self._edited.clear()
         self._panes.clear()
 
