@@ -24,7 +24,6 @@ class CompositeSettings:
 
     floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
     most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
-    known: float = 2.0  # multiple of the fit's radiance up to which a pixel follows another light; by eye, 4 photos
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
     threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
@@ -109,17 +108,18 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
 
 
 def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
-    """out = factor followed + (photo - followed), with followed = min(photo, known base) and factor = edited / base.
+    """out = photo factor, factor = edited / base, kept between `edited` and g photo, g the factor's median per channel.
 
-    What the fit leaves unexplained is mostly texture, which goes with the light as the surface does. A pixel far
-    brighter than the fit shows light that the fit does not know: that much of it stays as it is.
+    What the fit leaves unexplained is mostly texture, which goes with the light as the surface does. Highlights and
+    shadows that the fit has elsewhere than the photo are not: without the bounds they would print their negative.
     """
     base, edited, floor = np.maximum(layers.base, 0), np.maximum(layers.edited, 0), DEFAULT.floor
     factor = (edited + floor) / (base + floor)
+    overall = np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
-    followed = np.minimum(held + floor, DEFAULT.known * (base + floor))
-    change = (factor - 1) * followed + held - photo.linear
-    return change, np.minimum(factor, DEFAULT.most_detail) - 1, photo.linear
+    dimmed = overall * held
+    moved = np.clip((held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited))
+    return moved - photo.linear, np.minimum(factor, DEFAULT.most_detail) - 1, photo.linear
 
 
 def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
