@@ -1,6 +1,7 @@
 """Who may talk to the studio, and what a browser may do with its answers."""
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -102,7 +103,9 @@ def test_sockets_are_closed_and_the_lifespan_passes(studio):
         sent.append(message)
 
     for kind in ("websocket", "lifespan"):
-        asyncio.run(Gate(app, studio)({"type": kind, "headers": []}, None, send))
+        call = Gate(app, studio)({"type": kind, "headers": []}, None, send)
+        with ThreadPoolExecutor(1) as thread:  # browser tests leave an event loop running in this one
+            thread.submit(asyncio.run, call).result()
     assert reached == ["lifespan"] and sent == [{"type": "websocket.close", "code": 1008}]
 
 
