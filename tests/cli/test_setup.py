@@ -135,3 +135,8 @@ def test_download_without_a_hub_and_of_nothing(run):
     code, _, err = run("models", "download", "matnet")
     assert code == 2 and "cannot be fetched" in err and "matnet --from FOLDER" in err and "maps:DIR" in err
     assert run("models", "download", "nonsense")[0] == 2
+
+
+def test_train_on_without_a_folder_says_what_it_needs():
+    done = subprocess.run([str(ROOT / "scripts" / "train-on")], capture_output=True, text=True)
+    assert done.returncode == 2 and "RUN/data" in done.stderr
