@@ -66,7 +66,7 @@ def test_log_total_variation_equals_a_loop():
 
 def test_chroma_spares_white_most_and_warm_and_cool_more_than_red_and_green():
     cost = {
-        name: float(log_chroma(torch.tensor(colour).log()))
+        name: float(log_chroma(torch.tensor(colour).log(), 0.3))
         for name, colour in {
             "white": (2.0, 2.0, 2.0), "warm": (2.0, 1.0, 0.5), "cool": (0.5, 1.0, 2.0), "green": (1.0, 4.0, 1.0),
             "red": (4.0, 1.0, 1.0),

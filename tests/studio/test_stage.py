@@ -1,24 +1,16 @@
-"""Words for the page, lights, and the tasks of the worker."""
+"""Words for the page, and the tasks of the worker."""
 
 import numpy as np
 from studio_scenes import package, room
 
-from materialist.edits.light.relight import checked_envmap
 from materialist.edits.recipe import read_recipe
-from materialist.studio import lights, stage, tasks
+from materialist.studio import stage, tasks
 
 
 def test_the_report_is_plain_and_harmless():
     text = stage.report(room())
     assert "close to the photo" in text and "31.5 dB" in text and "too dark" in text and "40.0°" in text
     assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in stage.maps(room())) and len(stage.maps(room())) == 8
-
-
-def test_lights_are_environment_maps():
-    made = {name: lights.light(name, 64) for name in lights.names()}
-    assert all(checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20 for light in made.values())
-    assert made["Window"][:, 64:].sum() > made["Window"][:, :64].sum()  # on the right
-    assert made["Noon"][:32].sum() > made["Noon"][32:].sum()  # from above
 
 
 def test_taking_away(tmp_path):

@@ -63,7 +63,8 @@ def fit_light(
         value = rendering_loss(error)
         if settings.smooth or settings.chroma:
             log = envmap.clamp_min(1e-6).log()
-            value = value + settings.smooth * log_total_variation(log, weight) + settings.chroma * log_chroma(log)
+            value = value + settings.smooth * log_total_variation(log, weight)
+            value = value + settings.chroma * log_chroma(log, settings.warm_cool)
         return value
 
     return optimise("light", field.parameters(), loss, settings.schedule, progress=progress)

@@ -9,9 +9,6 @@ from materialist.fit.settings import Encoding, Loss, MaterialSettings
 CLIPPED = 0.99
 """Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
 
-WARM_COOL = 0.3
-"""Cost of a warm or cool light beside that of a red or green one; by eye, and on 5 scenes."""
-
 
 def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     """Radiance as the loss sees it: `linear` (paper), `srgb` (as an eye sees it), `log1p` (paper, HDR)."""
@@ -63,11 +60,11 @@ def log_total_variation(log_map: torch.Tensor, weight: torch.Tensor | None = Non
     return down.mean() + right.mean()
 
 
-def log_chroma(log_map: torch.Tensor) -> torch.Tensor:
+def log_chroma(log_map: torch.Tensor, warm_cool: float) -> torch.Tensor:
     """Mean colourfulness of log radiance [..., 3]: lights are white, often warm or cool, hardly ever red or green.
 
     Along black bodies the logarithm of green is about the mean of red's and blue's: leaving that line costs fully,
-    moving on it WARM_COOL as much.
+    moving on it `warm_cool` as much.
     """
     red, green, blue = log_map.unbind(-1)
-    return ((green - (red + blue) / 2).abs() + WARM_COOL * (red - blue).abs()).mean()
+    return ((green - (red + blue) / 2).abs() + warm_cool * (red - blue).abs()).mean()

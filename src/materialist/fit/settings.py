@@ -41,6 +41,7 @@ class LightSettings:
     free_from: float = 0.5  # share of a texel's light that must arrive for it to be as free as others; tuned by eye
     hidden_weight: float = 3.0  # largest factor on the smoothness of hidden texels; tuned on 5 synthetic scenes
     chroma: float = 0.0  # weight of the colourfulness of log radiance; larger: whiter; tuned on 5 scenes
+    warm_cool: float = 0.3  # part of that for a warm or cool light, not a red or green one; by eye, and on 5 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
 

@@ -16,7 +16,7 @@ MOST = 16e9
 """Bytes of a whole package once decoded; the largest that this program writes has half as many."""
 RAW_GROWS = 12
 """Bytes of a decoded camera RAW for one of its file."""
-_MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
+MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 
 
 def check_files(folder: Path, camera: Camera, original: str, bodies: int, most: float) -> None:
@@ -25,8 +25,8 @@ def check_files(folder: Path, camera: Camera, original: str, bodies: int, most: 
     Raises SceneError.
     """
     size = (camera.width, camera.height)
-    sized = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in _MAPS] + ["photo.exr", "rerender.exr"]
-    free = ["envmap.exr", *(f"bodies/{k}.{name}.exr" for k in range(bodies) for name in _MAPS[:3])]
+    sized = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS] + ["photo.exr", "rerender.exr"]
+    free = ["envmap.exr", *(f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3])]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
     try:
         total = sum(_exr_bytes(_inside(folder, name), size if name in sized else None) for name in (*sized, *free))

@@ -15,7 +15,7 @@ from materialist.errors import InputError, MaterialistError, SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
-from materialist.io.manifest import MOST, check_files
+from materialist.io.manifest import MAPS, MOST, check_files
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -153,8 +153,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
 
 
 def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    names = ("albedo", "roughness", "metallic", "normal", "depth")
-    maps = [_exr(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in names]
+    maps = [_exr(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
     return Materials(*maps[:3]), maps[3], maps[4]
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import gradio as gr
 import numpy as np
 
+from materialist.edits.light import presets
 from materialist.errors import InputError
-from materialist.studio import SETTINGS, lights, uploads
+from materialist.studio import SETTINGS, uploads
 from materialist.studio.controls import SUN, number_text, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import LIVE, PageContext
@@ -60,7 +61,7 @@ def wire(context: PageContext) -> None:
         if event.index == 0:
             session.light(envmap=None, gain=None)
         else:
-            session.light(envmap=_written(session, lights.names()[int(event.index) - 1]), gain="auto")
+            session.light(envmap=_written(session, presets.names()[int(event.index) - 1]), gain="auto")
         return context.picture(session)
 
     parts["lights"].select(choose, None, context.picture_parts, **LIVE)
@@ -101,7 +102,7 @@ def _written(session: Session, name: str) -> str:
 
     file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
-        write_exr(file, lights.light(name))
+        write_exr(file, presets.light(name))
     return file.name
 
 
@@ -111,4 +112,4 @@ def _gallery() -> list[tuple[Array, str]]:
     from materialist.io.display import light
 
     own = np.full((64, 128, 3), 225, np.uint8)
-    return [(own, OWN), *((light(lights.light(name, 64)), name) for name in lights.names())]
+    return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.names())]
