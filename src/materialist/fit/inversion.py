@@ -82,7 +82,8 @@ class Fit:
         model = material_field(held, settings, pixels, self.photo.camera, inside=inside, seed=self.seed)
         results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
         summaries = [r.summary() for r in results]
-        summaries[0]["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)  # the tables
+        for first in summaries[:1]:  # the tables are its
+            first["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)
         state.stages += summaries
         state.maps = model().detach()
 

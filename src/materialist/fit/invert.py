@@ -79,8 +79,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     photo, prior = setup.photo, setup.prior
     tick("geometry", 0, 1)
     geometry = timed(stages, "geometry", lambda: build_geometry(
-        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=setup.completion,
-        seed=setup.seed,
+        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=setup.completion, seed=setup.seed
     ))  # fmt: skip
     renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
