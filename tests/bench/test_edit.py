@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from materialist import bench, metrics
-from materialist.bench.edits import edits, true_scene
+from materialist.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
 from materialist.procedural.synthetic import make_sample
 
 
 @pytest.fixture(scope="module")
 def cases(mitsuba):
     sample = make_sample(0, 0, 0, size=40, spp=64)
-    return sample, {edit.kind: edit for edit in edits(sample, sample.envmap[:, ::-1], ("hue", "metal", "insert"))}
+    return sample, {edit.kind: edit for edit in edits(sample, sample.envmap[:, ::-1], KINDS)}
 
 
 def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
@@ -51,6 +51,29 @@ def test_a_material_edit_of_the_scene_is_the_true_one(cases):
     np.testing.assert_allclose(edited.materials.albedo[inside], stage.truth.materials.albedo[inside], atol=1e-5)
     np.testing.assert_allclose(edited.materials.roughness[inside], stage.truth.materials.roughness[inside], atol=1e-6)
     np.testing.assert_array_equal(edited.materials.albedo[~inside], scene.materials.albedo[~inside])
+
+
+def test_shifts_move_one_value_of_an_object_that_has_room(cases):
+    """The paper's "high" and "low": the maps of the edit are the true ones after it, clipped alike."""
+    sample, found = cases
+    scene = true_scene(sample)
+    assert {"roughness+", "roughness-", "metallic+"} <= set(found)
+    for kind in set(SHIFTS) & set(found):
+        name, by = SHIFTS[kind]
+        inside, truth = found[kind].mask, found[kind].truth.truth.materials
+        edited = found[kind].change(scene).materials
+        for other in ("albedo", "roughness", "metallic"):
+            np.testing.assert_allclose(getattr(edited, other)[inside], getattr(truth, other)[inside], atol=1e-5)
+        moved = getattr(truth, name)[inside] - getattr(sample.truth.materials, name)[inside]
+        assert (moved * np.sign(by) >= ROOM - 1e-6).all() and (np.abs(moved) <= abs(by) + 1e-6).all()
+
+
+def test_a_cup_of_glass_is_where_the_blue_one_is(cases):
+    sample, found = cases
+    blue, clear = found["insert"], found["glass cup"]
+    assert (blue.mask & clear.mask).sum() > 0.9 * (blue.mask | clear.mask).sum()
+    (body,) = clear.change(true_scene(sample)).bodies
+    assert body.surface.ior == 1.5 and clear.truth.items[-1].transparent
 
 
 def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(mitsuba, monkeypatch, tmp_path):

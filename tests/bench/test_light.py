@@ -37,6 +37,26 @@ def test_without_materials_the_paper_s_neutral_ones_are_given(sample, monkeypatc
     assert (neutral.roughness == 0.5).all() and np.allclose(neutral.metallic, 0.1)
 
 
+def test_predicted_maps_on_predicted_geometry_and_one_colour_of_light(sample):
+    """The paper's "w/ mat" is MatNet's maps, held fixed; a constant light is what a fit must beat."""
+    how = {"seed": 0, "device": "cpu"}
+    truth, predicted = (light.given_maps(sample, light.METHODS[f"paper{name}"], **how) for name in ("", " predicted"))
+    neutral = light.given_maps(sample, light.METHODS["paper predicted w/o mat"], **how)
+    assert truth is not predicted and not np.array_equal(predicted.depth, truth.depth)
+    assert np.array_equal(neutral.depth, predicted.depth) and (neutral.materials.roughness == 0.5).all()
+    found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
+    colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]
+    assert steps == 0 and colours.max() > 0.5 * found.shape[0] * found.shape[1] and found.min() >= 0
+
+
+def test_mirrors_are_photographed_under_the_same_light(sample):
+    polished = light.mirrored(sample)
+    changed = np.abs(polished.photo.linear - sample.photo.linear).max(-1) > 0.05
+    things = np.isin(sample.scene.seen, list(sample.scene.things))
+    assert (polished.truth.materials.metallic == things).all() and np.array_equal(polished.envmap, sample.envmap)
+    assert changed[things].mean() > 0.5 > changed[~things].mean()
+
+
 def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
     options = {"scenes": 1, "lights": 1, "size": 24, "spp": 16, "methods": "default", "relight": False}
     out = bench.run("light", output=tmp_path / "out", device="cpu", **options)

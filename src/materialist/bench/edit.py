@@ -42,7 +42,7 @@ class EditBench(Benchmark):
 
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)
-    kinds: str = option(",".join(KINDS[:4]), "Edits, with commas.", kind="name")
+    kinds: str = option(",".join(k for k in KINDS if k not in ("glass", "remove")), "Edits, with commas.", kind="name")
     spp: int = option(256, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)
     latency: int = option(512, "Size of the timed previews and final edit; 0: none.", **COUNT_OR_0)

@@ -16,7 +16,15 @@ from materialist.procedural.objects import shapes
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Prediction, Scene
 
-KINDS = ("hue", "metal", "relight", "insert", "glass", "remove")
+SHIFTS = {
+    "roughness+": ("roughness", 0.5), "roughness-": ("roughness", -0.5),
+    "metallic+": ("metallic", 0.5), "metallic-": ("metallic", -0.5),
+}  # fmt: skip
+"""The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
+ROOM = 0.25
+"""What is left of a shift in [0, 1], at the least."""
+KINDS = ("hue", "metal", "relight", "insert", "glass", "remove", "glass cup", *SHIFTS)
+INSERTIONS = ("insert", "glass cup")
 SHADOW = 0.02
 """Change of the sRGB value from which a pixel counts as part of an insertion's shadow or reflection."""
 COPPER = (0.85, 0.45, 0.3)
@@ -40,7 +48,7 @@ class Edit:
 
     def region(self, before: Array, after: Array) -> Array:
         """[H, W] bool: inside. For an insertion also where the true picture changes visibly."""
-        if self.kind != "insert":
+        if self.kind not in INSERTIONS:
             return self.mask
         return self.mask | (np.abs(linear_to_srgb(after) - linear_to_srgb(before)).max(-1) > SHADOW)
 
@@ -54,13 +62,15 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
 
     stage = sample.scene
     things = stage.things
-    largest = max(things, key=lambda k: things[k].sum(), default=None)  # object, neither floor nor wall
     for kind in kinds:
+        # Objects are neither floor nor wall.
+        able = [k for k in things if kind not in SHIFTS or _shift(stage.items[k], kind) >= ROOM]
+        largest = max(able, key=lambda k: things[k].sum(), default=None)
         if kind == "relight":
             everything = np.ones(stage.seen.shape, bool)
             yield Edit(kind, partial(relight, envmap=light), stage, light, everything)
-        elif kind == "insert":
-            yield from _insertion(sample, stage)
+        elif kind in INSERTIONS:
+            yield from _insertion(sample, stage, kind)
         elif largest is None:
             continue
         else:
@@ -68,14 +78,12 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
             if kind == "remove":
                 change, others = partial(remove, mask=mask), []
             elif kind == "glass":
-                up = LIFT * stage.view.to_scene[1]
-                lifted = replace(item.solid, vertices=item.solid.vertices + up)
-                change, others = partial(glass, mask=mask), [replace(item, solid=lifted, transparent=True)]
+                change, others = partial(glass, mask=mask), [_of_glass(item, stage)]
             else:
                 values, other = _material(kind, item)
                 change, others = partial(edit, mask=mask, **values), [other]
             items = [*stage.items[:largest], *others, *stage.items[largest + 1 :]]
-            yield Edit(kind, change, _staged(stage, items), sample.envmap, mask)
+            yield Edit(kind, change, staged(stage, items), sample.envmap, mask)
 
 
 def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
@@ -84,18 +92,35 @@ def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
 
     if kind == "hue":
         return {"hue": 120.0}, replace(item, albedo=shifted_hsv(item.albedo.astype(np.float32), 120.0, 0.0, 0.0))
+    if kind in SHIFTS:
+        name, by = SHIFTS[kind]
+        shifted: dict[str, Any] = {name: getattr(item, name) + np.sign(by) * _shift(item, kind)}
+        return {name: f"{by:+g}"}, replace(item, **shifted)
     colour = np.broadcast_to(np.array(COPPER, np.float32), item.albedo.shape).copy()
     values = {"albedo": COPPER, "metallic": 1.0, "roughness": 0.3}
     return values, replace(item, albedo=colour, metallic=1.0, roughness=0.3)
 
 
-def _staged(stage: TrueScene, items: list[Item]) -> TrueScene:
+def _shift(item: Item, kind: str) -> float:
+    """How much of one of the SHIFTS the limits 0 and 1 leave."""
+    name, by = SHIFTS[kind]
+    old = getattr(item, name)
+    return min(abs(by), 1 - old if by > 0 else old)
+
+
+def _of_glass(item: Item, stage: TrueScene) -> Item:
+    """The object in clear glass, LIFT above what it stands on."""
+    solid = replace(item.solid, vertices=item.solid.vertices + LIFT * stage.view.to_scene[1])
+    return replace(item, solid=solid, transparent=True)
+
+
+def staged(stage: TrueScene, items: list[Item]) -> TrueScene:
     """The true scene with other objects."""
     return TrueScene(items, stage.view, stage.camera.height, stage.camera.width)
 
 
-def _insertion(sample: SyntheticSample, stage: TrueScene) -> Iterator[Edit]:
-    """A cup in a free place of the floor, if any; the true one has the vertices that the fitted scene is given."""
+def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator[Edit]:
+    """A cup, blue or of glass, in a free place of the floor, if any; the true one has the vertices of the other one."""
     import cv2
 
     from materialist.edits.core.surfaces import uniform_surface
@@ -115,9 +140,11 @@ def _insertion(sample: SyntheticSample, stage: TrueScene) -> Iterator[Edit]:
     (body,) = insert(true_scene(sample), model, at).bodies
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
     cup = Item(placed, np.tile(body.surface.albedo, (2, 2, 1)), float(body.surface.roughness.mean()), 0.0)
-    truth = _staged(stage, [*stage.items, cup])
+    glassy = kind != "insert"
+    cup, material = (_of_glass(cup, stage), "glass") if glassy else (cup, "as-is")
+    truth = staged(stage, [*stage.items, cup])
     mask = truth.seen == len(stage.items)
-    yield Edit("insert", lambda scene: insert(scene, model, at), truth, sample.envmap, mask)
+    yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)
 
 
 def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]:

@@ -24,14 +24,17 @@ import numpy as np
 
 from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
+from materialist.bench.edits import staged
 from materialist.bench.report import CEILING, Column, Report
 from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC
 from materialist.procedural.synthetic import SyntheticSample, make_sample
-from materialist.types import Array, Materials
+from materialist.types import Array, Materials, Prediction
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
 """Albedo, roughness and metallic of the paper's runs without given materials."""
+POLISHED = 0.1
+"""Roughness of `mirrors`."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,12 @@ class Method:
 
     preset: str = "default"
     engine: str = "transport"
-    given: bool = True
-    """Whether the true materials are given, or neutral ones."""
+    maps: str = "true"
+    """The materials that are given: `true`, `predicted` by the bundled network, or `neutral`."""
+    shape: str = "true"
+    """The depth and normals that are given: `true` or `predicted`."""
     field: str | None = None
-    """Another light field than the preset's: mlp, mlp-uv, texels, sh."""
+    """Another light field than the preset's: mlp, mlp-uv, texels, sh; `constant` is one colour, without a fit."""
     height: int | None = None
     """Another height of the field's map than the preset's."""
     path_height: int = 256
@@ -52,11 +57,15 @@ class Method:
 
 METHODS = {
     "default": Method(),
-    "default w/o mat": Method(given=False),
+    "default w/o mat": Method(maps="neutral"),
+    "default predicted": Method(maps="predicted", shape="predicted"),
     "paper": Method("paper"),
-    "paper w/o mat": Method("paper", given=False),
+    "paper w/o mat": Method("paper", maps="neutral"),
+    "paper predicted": Method("paper", maps="predicted", shape="predicted"),
+    "paper predicted w/o mat": Method("paper", maps="neutral", shape="predicted"),
+    "constant predicted": Method(maps="predicted", shape="predicted", field="constant"),
     "paper path": Method("paper", "path"),
-    "paper path w/o mat": Method("paper", "path", given=False),
+    "paper path w/o mat": Method("paper", "path", maps="neutral"),
     "paper path 128x64": Method("paper", "path", path_height=64),
     "paper uv": Method("paper", field="mlp-uv"),
     "paper low": Method("paper", height=16),
@@ -79,6 +88,8 @@ class LightBench(Benchmark):
         Column("render_ssim", "render SSIM", "higher"),
         Column("render_psnr", "render PSNR", "higher", 2),
         Column("render_mse", "render MSE", "lower", 4),
+        Column("surface_ssim", "surface SSIM", "higher"),
+        Column("surface_psnr", "surface PSNR", "higher", 2),
         Column("mesh_psnr", "mesh PSNR", "higher", 2),
         Column("relit_psnr", "relit PSNR", "higher", 2),
         Column("albedo_l1", "albedo L1", "lower"),
@@ -96,6 +107,8 @@ class LightBench(Benchmark):
     completion: str = option("auto", "That of `invert`.", kind="name")
     relight: bool = option(True, "Relight whole inversions, with and without continued planes.", kind="switch")
     spp: int = option(256, "Samples a pixel of all pictures that are compared.", **COUNT)
+    unseen: bool = option(False, "Scenes in natural colours that no network was trained on.", kind="switch")
+    mirrors: bool = option(False, "Objects of polished metal (paper, table ab_envmap).", kind="switch")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist.render.variant import setup
@@ -105,8 +118,10 @@ class LightBench(Benchmark):
         for scene, view, light in product(range(self.scenes), range(self.views), range(self.lights)):
             first = scene + view + light
             sample, other = (
-                make_sample(scene, view, k, size=self.size, data=data, seed=self.seed) for k in (first, first + 1)
+                make_sample(scene, view, k, size=self.size, data=data, seed=self.seed, unseen=self.unseen)
+                for k in (first, first + 1)
             )
+            sample = mirrored(sample) if self.mirrors else sample
             stage = _Stage(self, sample, other.envmap)
             for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
                 yield {**row, "sample": sample.name}
@@ -165,8 +180,12 @@ class _Stage:
         """The map against the true one, and the true scene under it against the photo."""
         picture = self.sample.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
         of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
-        names = ("ssim", "psnr", "mse")
-        return of_map | {f"render_{name}": getattr(metrics, name)(picture, self.photo) for name in names}
+        of_picture = {f"render_{name}": getattr(metrics, name)(picture, self.photo) for name in ("ssim", "psnr", "mse")}
+        surface = self.sample.truth.depth > 0
+        of_surface = {
+            f"surface_{name}": getattr(metrics, name)(picture, self.photo, mask=surface) for name in ("ssim", "psnr")
+        }
+        return of_map | of_picture | of_surface
 
     def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
         """PSNR of a RenderScene with these materials, under this light and under the other."""
@@ -181,8 +200,8 @@ class _Stage:
 def fit(
     sample: SyntheticSample, method: Method, completion: str, *, mesh: Any = None, seed: int = 0, device: str = "auto"
 ) -> tuple[Array, int, Any]:
-    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of its true depth, in how many
-    steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
+    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of the depth that is given, in
+    how many steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
     import torch
 
     from materialist.fit.engine import PathEngine, prepared_envmap
@@ -191,23 +210,58 @@ def fit(
     from materialist.fit.light import envmap_field, fit_light
     from materialist.fit.settings import preset
 
-    photo, truth = sample.photo, sample.truth
-    named = preset(method.preset)
-    light = replace(named.light, field=method.field or named.light.field, height=method.height or named.light.height)
-    height = sample.envmap.shape[0]
-    surface = truth.depth > 0
-    maps = zip(vars(truth.materials).values(), NEUTRAL, strict=True)
-    given = truth if method.given else replace(truth, materials=Materials(*(np.full_like(m, v) for m, v in maps)))
+    photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
+    given = given_maps(sample, method, seed=seed, device=device)
     engine: Any
     if method.engine == "path":
-        pixels = np.flatnonzero(surface.reshape(-1))
+        pixels = np.flatnonzero(given.depth > 0)
         engine = PathEngine(mesh, photo.camera, pixels, envmap_height=method.path_height, seed=seed)
     else:
         setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
         prepared = prepare(setup)
         engine, mesh = prepared.fit.engine, prepared.renderer
-    problem = engine.light_problem(given.materials)
-    field = envmap_field(light, seed=seed)
-    result = fit_light(problem, torch.from_numpy(photo.linear.reshape(-1, 3)), field, light, seed=seed)
-    envmap = prepared_envmap(field(max(light.height, 16)), height)
-    return paste_visible_sky(envmap, photo.linear, surface, photo.camera), result.steps, mesh
+    problem, pixels_of_photo = engine.light_problem(given.materials), torch.from_numpy(photo.linear.reshape(-1, 3))
+    if method.field == "constant":
+        steps, envmap = 0, constant_light(problem, pixels_of_photo, height)
+    else:
+        light = named.light
+        light = replace(light, field=method.field or light.field, height=method.height or light.height)
+        field = envmap_field(light, seed=seed)
+        steps = fit_light(problem, pixels_of_photo, field, light, seed=seed).steps
+        envmap = prepared_envmap(field(max(light.height, 16)), height)
+    return paste_visible_sky(envmap, photo.linear, given.depth > 0, photo.camera), steps, mesh
+
+
+def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:
+    """The maps that a method is given: true, predicted, or with the paper's neutral materials."""
+    from materialist.predict import get_predictor
+
+    source: dict[str, Prediction] = {"true": sample.truth}
+    if "predicted" in (method.maps, method.shape):
+        source["predicted"] = get_predictor("bundled", device=device).predict(sample.photo, seed=seed)
+    if method.maps != "neutral":
+        return replace(source[method.shape], materials=source[method.maps].materials)
+    maps = zip(vars(sample.truth.materials).values(), NEUTRAL, strict=True)
+    return replace(source[method.shape], materials=Materials(*(np.full_like(m, v) for m, v in maps)))
+
+
+def constant_light(problem: Any, photo: Any, height: int) -> Array:
+    """[height, 2 height, 3] of the colour that explains the photo [H W, 3] with the least square error."""
+    import torch
+
+    dark, lit = (problem.render(torch.full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
+    gain, missing = lit - dark, photo[problem.pixels] - dark
+    colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)
+    return np.ascontiguousarray(colour.expand(height, 2 * height, 3).numpy())
+
+
+def mirrored(sample: SyntheticSample) -> SyntheticSample:
+    """The sample with its objects in polished metal, photographed under the same light."""
+    stage = sample.scene
+    polished = [
+        replace(x, roughness=POLISHED, metallic=1.0) if k in stage.things else x for k, x in enumerate(stage.items)
+    ]
+    scene = staged(stage, polished)
+    linear = np.clip(scene.render(sample.envmap, seed=1), 0, 1)
+    photo = replace(sample.photo, linear=linear, original=linear)
+    return replace(sample, photo=photo, truth=scene.truth, scene=scene, name=f"{sample.name} mirrors")

@@ -60,7 +60,7 @@ class PhotoAloneBench(Benchmark):
 
     scenes: int = option(24, "Photos.", **COUNT)
     size: int = option(256, "Their width and height.", **SIZE)
-    kinds: str = option(",".join(KINDS), "Edits, with commas.", kind="name")
+    kinds: str = option(",".join(KINDS[:6]), "Edits, with commas.", kind="name")
     predictor: str = option("bundled", "Where the maps come from.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
     decompose: bool = option(False, "Adds the rows that are given a part of the truth.", kind="switch")
