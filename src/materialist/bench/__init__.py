@@ -10,7 +10,7 @@ from materialist.errors import InputError
 
 BENCHMARKS = (
     "photo-alone", "invert", "beside", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
-    "select", "glass", "edit", "studio",
+    "select", "glass", "edit", "plate", "studio", "paper",
 )  # fmt: skip
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
 
@@ -26,7 +26,7 @@ def run(name: str, *, output: str | Path, data: str | Path | None = None, force:
     if name not in BENCHMARKS:
         raise InputError(f"There is no benchmark '{name}'; choose one of {', '.join(BENCHMARKS)}.")
     benchmark = benchmark_class(name).given(**options)
-    folder = claim(Path(output), force=force)
+    folder = claim(Path(output), force=force or getattr(benchmark, "resume", False))
     benchmark.run(None if data is None else Path(data), folder)
     return folder
 

@@ -69,10 +69,7 @@ class AblationBench(Benchmark):
     spp: int = option(128, "Paths a pixel of pictures that are compared.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.render.variant import setup
-
         wanted = names("tables", self.tables, TABLES)
-        setup(self.device)
         for k in range(self.scenes):
             sample = make_sample(k, 0, k, size=self.size, data=data, seed=self.seed)
             other = make_sample(k, 0, k + 1, size=self.size, data=data, seed=self.seed).envmap

@@ -53,6 +53,9 @@ class Benchmark(OperationOptions, ABC):
         from rich.console import Console
         from rich.progress import track
 
+        from materialist.render.variant import setup
+
+        setup(self.device)
         title, _, note = inspect.cleandoc(sys.modules[type(self).__module__].__doc__ or "").partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}
         settings["data"] = None if data is None else data.name

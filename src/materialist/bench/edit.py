@@ -50,10 +50,8 @@ class EditBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist import pipeline
-        from materialist.render.variant import setup
 
         kinds = names("kinds", self.kinds, KINDS)
-        setup(self.device)
         for scene in range(self.scenes):
             sample, other = (
                 make_sample(scene, 0, k, size=self.size, data=data, seed=self.seed) for k in (scene, scene + 1)

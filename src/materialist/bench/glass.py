@@ -72,13 +72,10 @@ class GlassBench(Benchmark):
     latency: int = option(0, "Size of the timed preview; 0: none.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.render.variant import setup
-
         if self.full:
             paper = replace(self, full=False, shapes=10, envmaps=30, iors="1.1,1.3")
             return (yield from paper.rows(data, report))
         iors = numbers("iors", self.iors, 1.001, 3, float)
-        setup(self.device)
         for case, behind in self._cases(data, iors) if self.shapes else ():
             shown: dict[str, Array] = {}
             yield from self._compared(case, behind, shown)

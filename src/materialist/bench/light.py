@@ -33,8 +33,6 @@ from materialist.types import Array, Materials, Prediction
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
 """Albedo, roughness and metallic of the paper's runs without given materials."""
-POLISHED = 0.1
-"""Roughness of `mirrors`."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class Method:
     shape: str = "true"
     """The depth and normals that are given: `true` or `predicted`."""
     field: str | None = None
-    """Another light field than the preset's: mlp, mlp-uv, texels, sh; `constant` is one colour, without a fit."""
+    """Another light field than the preset's: mlp, mlp-uv, texels, sh; `constant` is one colour."""
     height: int | None = None
     """Another height of the field's map than the preset's."""
     path_height: int = 256
@@ -111,10 +109,7 @@ class LightBench(Benchmark):
     mirrors: bool = option(False, "Objects of polished metal (paper, table ab_envmap).", kind="switch")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.render.variant import setup
-
         methods = names("methods", self.methods, METHODS)
-        setup(self.device)
         for scene, view, light in product(range(self.scenes), range(self.views), range(self.lights)):
             first = scene + view + light
             sample, other = (
@@ -180,12 +175,10 @@ class _Stage:
         """The map against the true one, and the true scene under it against the photo."""
         picture = self.sample.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
         of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
-        of_picture = {f"render_{name}": getattr(metrics, name)(picture, self.photo) for name in ("ssim", "psnr", "mse")}
-        surface = self.sample.truth.depth > 0
-        of_surface = {
-            f"surface_{name}": getattr(metrics, name)(picture, self.photo, mask=surface) for name in ("ssim", "psnr")
-        }
-        return of_map | of_picture | of_surface
+        for part, mask in (("render", None), ("surface", self.sample.truth.depth > 0)):
+            for name in ("ssim", "psnr", "mse") if mask is None else ("ssim", "psnr"):
+                of_map[f"{part}_{name}"] = getattr(metrics, name)(picture, self.photo, mask=mask)
+        return of_map
 
     def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
         """PSNR of a RenderScene with these materials, under this light and under the other."""
@@ -258,10 +251,8 @@ def constant_light(problem: Any, photo: Any, height: int) -> Array:
 def mirrored(sample: SyntheticSample) -> SyntheticSample:
     """The sample with its objects in polished metal, photographed under the same light."""
     stage = sample.scene
-    polished = [
-        replace(x, roughness=POLISHED, metallic=1.0) if k in stage.things else x for k, x in enumerate(stage.items)
-    ]
-    scene = staged(stage, polished)
+    polished: dict[str, Any] = {"roughness": 0.1, "metallic": 1.0}
+    scene = staged(stage, [replace(x, **polished if k in stage.things else {}) for k, x in enumerate(stage.items)])
     linear = np.clip(scene.render(sample.envmap, seed=1), 0, 1)
     photo = replace(sample.photo, linear=linear, original=linear)
     return replace(sample, photo=photo, truth=scene.truth, scene=scene, name=f"{sample.name} mirrors")

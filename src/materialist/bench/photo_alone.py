@@ -68,10 +68,7 @@ class PhotoAloneBench(Benchmark):
     truth_spp: int = option(256, "Paths a pixel of the truth.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.render.variant import setup
-
         kinds = names("kinds", self.kinds, KINDS)
-        setup(self.device)
         for scene in range(self.scenes):
             sample, light = unseen_sample(scene, data, self.size)
             scenes = {}

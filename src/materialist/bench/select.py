@@ -50,9 +50,7 @@ class SelectBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         from materialist.predict.bundled.predictor import BundledPredictor
-        from materialist.render.variant import setup
 
-        setup(self.device)
         if data is not None:
             arrangement(0, seed=self.seed, data=data)  # that there are meshes
         predictor = BundledPredictor()
